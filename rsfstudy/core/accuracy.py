@@ -1,0 +1,94 @@
+"""From the accuracy a user asks for to the tolerances that deliver it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsfstudy.errors import InvalidValue
+
+DEFAULT_RTOL = 1e-7
+TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
+DEFAULT_BUDGET = 500_000
+
+#: Relative error of leaving mass out up to a slip rate norm of 1; it goes with the square (measured
+#: in the tests).
+_MASS_ERROR = 1e-3
+
+
+def error_of_leaving_mass_out(norm: float) -> float:
+    """Relative error of a boundary computed without mass up to this slip rate norm."""
+    return _MASS_ERROR * norm**2
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The accuracy a result must meet, and the work it may cost.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative error allowed in headline numbers (of ln V for slip rates, of V_0/V_* - 1 for rate
+        steps).
+    budget : int
+        Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
+
+    Raises
+    ------
+    InvalidValue
+        For an rtol outside 1e-11 to 1e-2 or a budget below 1.
+    """
+
+    rtol: float = DEFAULT_RTOL
+    budget: int = DEFAULT_BUDGET
+
+    def __post_init__(self) -> None:
+        if not TIGHTEST_RTOL <= self.rtol <= LOOSEST_RTOL:
+            raise InvalidValue(
+                "rtol",
+                self.rtol,
+                f"must lie between {TIGHTEST_RTOL:g} and {LOOSEST_RTOL:g}",
+                remedy="Below that, rounding decides; above it, nothing is resolved.",
+            )
+        if self.budget < 1:
+            raise InvalidValue("budget", self.budget, "must be at least 1")
+
+    @property
+    def solver(self) -> float:
+        """Local tolerance for the integrator: local errors add up over a motion, so a part of
+        `rtol`.
+        """
+        return 0.02 * self.rtol
+
+    @property
+    def switch_norm(self) -> float:
+        """Slip rate norm w up to which the slow manifold stands in for the full equations.
+
+        The error of leaving it at w is about 0.03 w**4 (the tests measure it); a third of `rtol` is
+        given to it.
+        """
+        return min(math.sqrt(math.sqrt(10.0 * self.rtol)), 0.04)
+
+    @property
+    def switch_correction(self) -> float:
+        """Change of ln V by inertia up to which the slow manifold, which is of first order in it,
+        may be used.
+
+        At a usual stiffness `switch_norm` comes first; this bound holds for stiff and strongly
+        weakening scenes.
+        """
+        return min(25.0 * math.sqrt(self.rtol), 0.03)
+
+    @property
+    def massless_norm(self) -> float:
+        """Slip rate norm below which leaving mass out altogether costs less than a tenth of
+        `rtol`.
+        """
+        return math.sqrt(0.1 * self.rtol / _MASS_ERROR)
+
+    @property
+    def landing(self) -> float:
+        """Slip in D_c that may remain when the inertial equations hand back to the slow
+        manifold.
+        """
+        return 0.1 * self.rtol

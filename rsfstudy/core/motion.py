@@ -1,0 +1,189 @@
+"""The motion of a scene after its step: quasi-static where mass does not act, inertial only where
+it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, replace
+
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Halt, Meter, Step, steps
+from rsfstudy.equations import (
+    LARGEST_EXPONENT,
+    Equations,
+    Point,
+    inertial,
+    quasi_static,
+    slow_manifold,
+)
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+
+def motion(
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+    *,
+    start: tuple[float, float] | None = None,
+    clock: bool = False,
+) -> Iterator[Step]:
+    """Integrate a scene from the instant after its step, for as long as the caller asks.
+
+    A scene without inertia is one quasi-static integration. With inertia, the slow manifold is
+    followed up to `Accuracy.switch_norm`, the full equations above it; each stretch has a clock of
+    its own that starts at zero, because a rupture is shorter than the spacing of floating-point
+    numbers around the time at which it happens.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : Meter
+        Charged with the work, by regime.
+    start : tuple of float, optional
+        Spring stress and state (f, Psi) to start from instead.
+    clock : bool
+        Carry time along in the quasi-static stretches (the inertial clock is time).
+
+    Yields
+    ------
+    Step
+
+    Raises
+    ------
+    Halt
+        With `normal_stress_lost` or `shear_stress_reversed` where the equations end, or as `steps`
+        does.
+    """
+    from_steady_sliding = start is None
+    if start is None:
+        check_start(scene)
+        start = (scene.spring_stress_step, 0.0)
+    if not scene.inertia:
+        equations, state = quasi_static(scene, clock=clock), _start(*start, clock)
+        yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
+        return
+    slow, fast = slow_manifold(scene, clock=clock), inertial(scene)
+    handover = _Handover(scene, slow, accuracy)
+    point = handover.slow_point(*start)
+    if handover.weight_of_mass(point) < 1.0:
+        point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
+    elif from_steady_sliding:
+        # a sudden step moves the spring alone; slip rate and friction follow within the inertial
+        # time
+        point = replace(point, log_rate=0.0, friction=0.0)
+    while True:
+        point = yield from _rupture(scene, fast, point, handover, accuracy, meter)
+        point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
+
+
+@dataclass(frozen=True)
+class _Handover:
+    """When to change between the slow manifold and the full equations."""
+
+    scene: Scene
+    slow: Equations
+    accuracy: Accuracy
+
+    def slow_point(self, spring: float, psi: float) -> Point:
+        """The point of the slow manifold with this spring stress and state."""
+        return self.slow.point((spring, psi), (0.0, 0.0))
+
+    def weight_of_mass(self, point: Point) -> float:
+        """How much mass matters: 1 where the slow manifold has to be left."""
+        norm = self._norm(point)
+        correction = abs(point.spring - point.friction) / self.scene.a
+        return max(norm / self.accuracy.switch_norm, correction / self.accuracy.switch_correction)
+
+    def _norm(self, point: Point) -> float:
+        return self.scene.inertial_time * math.exp(min(point.log_rate, LARGEST_EXPONENT))
+
+    def landed(self, point: Point) -> bool:
+        """Whether the full equations have done their work.
+
+        The slip rate still has to fall from ln V = x to the slow manifold's x_s, over a slip of
+        about (K/2a) w**2 min(1, |x - x_s|) D_c; the state may change that much unnoticed. And the
+        slow manifold must not hand straight back.
+        """
+        below = self.slow_point(point.spring, point.psi)
+        if point.growth > 0.0 and point.log_rate > below.log_rate + 1.0:
+            return False
+        norm = self._norm(point)
+        distance = min(1.0, abs(point.log_rate - below.log_rate))
+        remaining = 0.5 * self.scene.stiffness / self.scene.a * norm**2 * distance
+        settled = max(norm / self.accuracy.switch_norm, self.weight_of_mass(below)) < 0.5
+        return settled and remaining < self.accuracy.landing
+
+
+def check_start(scene: Scene) -> None:
+    """Refuse a displacement step that leaves no friction of forward slip to integrate."""
+    spring = scene.spring_stress_step
+    if 1.0 + scene.cot_phi * spring <= 0.0:
+        raise Halt(
+            Status.NORMAL_STRESS_LOST,
+            f"the step takes normal stress to {1.0 + scene.cot_phi * spring:.3g} sigma_*",
+        )
+    if scene.mu_star + spring <= 0.0:
+        raise Halt(
+            Status.SHEAR_STRESS_REVERSED,
+            f"the step takes shear stress to {scene.mu_star + spring:.3g} sigma_*",
+        )
+
+
+def _start(spring: float, psi: float, clock: bool) -> tuple[float, ...]:
+    return (spring, psi, 0.0) if clock else (spring, psi)
+
+
+def _climb(
+    scene: Scene,
+    slow: Equations,
+    start: Point,
+    handover: _Handover,
+    accuracy: Accuracy,
+    meter: Meter,
+    clock: bool,
+) -> Generator[Step, None, Point]:
+    """The slow manifold, until slip is fast enough for mass to act; returns the last point."""
+
+    def excess(point: Point) -> float:
+        return handover.weight_of_mass(point) - 1.0
+
+    state = _start(start.spring, start.psi, clock)
+    for step in _guarded(scene, steps(slow, state, accuracy.solver, meter)):
+        if excess(step.after) >= 0.0 > excess(step.before):
+            step = step.until(step.locate(excess))
+            yield step
+            return step.after
+        yield step
+    raise AssertionError("steps() never ends by itself")
+
+
+def _rupture(
+    scene: Scene,
+    fast: Equations,
+    start: Point,
+    handover: _Handover,
+    accuracy: Accuracy,
+    meter: Meter,
+) -> Generator[Step, None, Point]:
+    """The full equations, until mass no longer matters; returns the last point."""
+    state = (start.spring, start.log_rate, start.friction)
+    for step in _guarded(scene, steps(fast, state, accuracy.solver, meter)):
+        yield step
+        if handover.landed(step.after):
+            return step.after
+    raise AssertionError("steps() never ends by itself")
+
+
+def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
+    """Pass steps on until one ends without normal stress.
+
+    Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
+    """
+    for step in moving:
+        if 1.0 + scene.cot_phi * step.after.friction <= 1e-9:
+            raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+        yield step

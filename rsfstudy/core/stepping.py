@@ -1,0 +1,188 @@
+"""One system of equations stepped by SciPy: counted, bounded, and checked after every step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from rsfstudy.equations import Equations, Point
+from rsfstudy.status import Status
+
+Vector = np.ndarray
+
+
+class Halt(Exception):
+    """A motion that cannot go on, with the status that says why."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+@dataclass
+class Meter:
+    """Counts the right-hand sides of one measurement, by regime, and ends it when its budget is
+    spent.
+    """
+
+    budget: int
+    by_regime: dict[str, int] = field(default_factory=dict)
+    steps: int = 0
+
+    @property
+    def spent(self) -> int:
+        """Right-hand sides evaluated so far."""
+        return sum(self.by_regime.values())
+
+    def charge(self, regime: str, evaluations: int) -> None:
+        """Add evaluations; raises `Halt` once more than the budget is spent."""
+        self.by_regime[regime] = self.by_regime.get(regime, 0) + evaluations
+        if self.spent > self.budget:
+            raise Halt(
+                Status.WORK_BUDGET_SPENT,
+                f"more than {self.budget} right-hand sides without an answer",
+            )
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted step, from `start` to `end` of the clock of its equations."""
+
+    equations: Equations
+    start: float
+    end: float
+    before: Point
+    after: Point
+    state: Vector
+    interpolant: Callable[[], Callable[[float], Vector]]
+    meter: Meter
+
+    def state_at(self, clock: float) -> Vector:
+        """Unknowns at an instant within the step."""
+        return self.state if clock == self.end else self.interpolant()(clock)
+
+    def point_at(self, clock: float) -> Point:
+        """What the slider does at an instant within the step."""
+        state = self.state_at(clock).tolist()
+        self.meter.charge(self.equations.regime, 1)
+        return self.equations.point(state, self.equations.rate(clock, state))
+
+    def locate(self, what: Callable[[Point], float]) -> float:
+        """Clock at which ``what(point)`` changes sign; its sign must differ at the two ends."""
+        # end values from the points themselves: the interpolant may miss them by a rounding error
+        ends = {self.start: what(self.before), self.end: what(self.after)}
+
+        def value(clock: float) -> float:
+            return ends[clock] if clock in ends else what(self.point_at(clock))
+
+        width = abs(self.end - self.start)
+        return float(brentq(value, self.start, self.end, xtol=1e-13 * width, rtol=1e-14))
+
+    def until(self, clock: float) -> Step:
+        """The part of the step that ends at `clock`."""
+        return Step(
+            self.equations,
+            self.start,
+            clock,
+            self.before,
+            self.point_at(clock),
+            self.state_at(clock),
+            self.interpolant,
+            self.meter,
+        )
+
+
+def steps(
+    equations: Equations,
+    state: Sequence[float],
+    tolerance: float,
+    meter: Meter,
+    *,
+    backward: bool = False,
+) -> Iterator[Step]:
+    """Integrate from clock zero, step by step, for as long as the caller asks.
+
+    Parameters
+    ----------
+    equations : Equations
+        What to integrate.
+    state : sequence of float
+        Unknowns at clock zero.
+    tolerance : float
+        Local error allowed per step: relative, and absolute in the scales of the unknowns.
+    meter : Meter
+        Charged with every right-hand side.
+    backward : bool
+        Integrate against the clock.
+
+    Yields
+    ------
+    Step
+
+    Raises
+    ------
+    Halt
+        With `work_budget_spent`, or `integration_failed` when SciPy gives up, a step has no length,
+        or a number is not finite.
+    """
+    regime = equations.regime
+
+    def rate(clock: float, unknowns: Vector) -> list[float]:
+        return equations.rate(clock, unknowns.tolist())
+
+    solver = DOP853(
+        rate,
+        0.0,
+        np.asarray(state, dtype=float),
+        -math.inf if backward else math.inf,
+        rtol=tolerance,
+        atol=tolerance * np.asarray(equations.scales),
+    )
+    counted = 0
+    before = equations.point(solver.y.tolist(), solver.f.tolist())
+    while True:
+        failure = solver.step()
+        meter.charge(regime, solver.nfev - counted)
+        meter.steps += 1
+        counted = solver.nfev
+        if solver.status == "failed":
+            raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
+        unknowns = solver.y.tolist()
+        if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
+            raise Halt(
+                Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}"
+            )
+        after = equations.point(unknowns, solver.f.tolist())
+        yield Step(
+            equations,
+            float(solver.t_old),
+            float(solver.t),
+            before,
+            after,
+            solver.y,
+            _dense(solver, meter, regime),
+            meter,
+        )
+        counted = solver.nfev
+        before = after
+
+
+def _dense(solver: DOP853, meter: Meter, regime: str) -> Callable[[], Callable[[float], Vector]]:
+    """The step's interpolant, built once and only if asked for; it must be asked for before the
+    next step.
+    """
+    built: list[Callable[[float], Vector]] = []
+
+    def interpolant() -> Callable[[float], Vector]:
+        if not built:
+            already = solver.nfev
+            built.append(solver.dense_output())
+            meter.charge(regime, solver.nfev - already)
+        return built[0]
+
+    return interpolant

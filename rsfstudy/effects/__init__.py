@@ -1,0 +1,3 @@
+"""Optional effects, one file each: plain functions of floats that `equations` assembles for a
+scene.
+"""

@@ -1,0 +1,256 @@
+"""The equations of motion of a scene, assembled from the effects it calls for and from nothing
+else.
+
+Every form rests on one relation between frictional stress, slip rate and state. With g = (tau -
+tau_*)/sigma_*, the deviation of frictional resistance, and the state freed of normal stress, Psi =
+Theta + alpha ln(sigma/sigma_*),
+
+    a ln(V/V_*) + Psi = strength(g),
+
+where `strength` is g itself at constant normal stress and each effect changes it. Psi is continuous
+across any sudden change of stress, and dPsi/dt is the evolution law alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rsfstudy.effects import inclined_driving, inertia, linker_dieterich
+from rsfstudy.laws import evolution_of
+from rsfstudy.scene import Scene
+
+#: Exponents beyond this only occur in trial steps; the clamp keeps their squares finite.
+LARGEST_EXPONENT = 300.0
+
+#: Rates beyond this, per inertial time, only occur in trial steps; the integrator rejects those
+#: that meet it.
+LARGEST_RATE = 1e30
+
+#: g -> (strength, d strength/dg, Psi - Theta)
+Strength = Callable[[float], tuple[float, float, float]]
+State = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Point:
+    """What the slider does at one instant, whatever the unknowns it was computed with.
+
+    Attributes
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    growth : float
+        Its derivative with respect to the clock of the equations.
+    spring, friction : float
+        Deviations f and g of spring stress and frictional resistance from tau_*, over sigma_*.
+    psi : float
+        State freed of normal stress.
+    imbalance : float
+        Steadiness of the state, Theta + b ln(V/V_*): zero on the steady-state line.
+    """
+
+    log_rate: float
+    growth: float
+    spring: float
+    friction: float
+    psi: float
+    imbalance: float
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A system of ordinary differential equations in its own clock.
+
+    Attributes
+    ----------
+    regime : str
+        Name of the form.
+    unknowns : tuple of str
+        Names of the unknowns.
+    scales : tuple of float
+        The change of each unknown that weighs as much as a change of 1 in ln V.
+    rate : callable
+        ``rate(clock, state) -> list``: derivatives of the unknowns.
+    point : callable
+        ``point(state, derivatives) -> Point``.
+    """
+
+    regime: str
+    unknowns: tuple[str, ...]
+    scales: tuple[float, ...]
+    rate: Callable[[float, State], list[float]]
+    point: Callable[[State, State], Point]
+
+
+def strength_of(scene: Scene) -> Strength:
+    """Assemble ``strength`` from the effects on normal stress that the scene calls for."""
+    mu_star, cot_phi, alpha = scene.mu_star, scene.cot_phi, scene.alpha
+
+    if scene.normal_stress == "constant":
+
+        def constant(friction: float) -> tuple[float, float, float]:
+            return friction, 1.0, 0.0
+
+        return constant
+
+    def inclined(friction: float) -> tuple[float, float, float]:
+        ratio = inclined_driving.normal_stress_ratio(friction, cot_phi)
+        value, slope = inclined_driving.friction(friction, ratio, mu_star, cot_phi)
+        return value, slope, 0.0
+
+    if not alpha:
+        return inclined
+
+    def inclined_with_state_effect(friction: float) -> tuple[float, float, float]:
+        ratio = inclined_driving.normal_stress_ratio(friction, cot_phi)
+        value, slope = inclined_driving.friction(friction, ratio, mu_star, cot_phi)
+        shift, shift_slope = linker_dieterich.state_shift(ratio, alpha, cot_phi)
+        return value + shift, slope + shift_slope, shift
+
+    return inclined_with_state_effect
+
+
+def log_rate_at(scene: Scene, friction: float, psi: float) -> float:
+    """ln(V/V_*) for a frictional stress and state: the general relation of stress, state and slip
+    rate.
+    """
+    return (strength_of(scene)(friction)[0] - psi) / scene.a
+
+
+def quasi_static(scene: Scene, *, clock: bool) -> Equations:
+    """Without mass: two unknowns, f and Psi, and time as a passenger where a `clock` is wanted.
+
+    The independent variable is slip plus load point displacement, ds = (V + V_0) dt, in which every
+    rate is of order one from arrest to rupture:
+
+        df/ds = -K tanh[(x - x_0)/2],   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
+
+    with x = ln(V/V_*) and x_0 = ln(V_0/V_*).
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b, stiffness = scene.a, scene.b, scene.stiffness
+    load = scene.log_load_rate
+
+    def rate(_: float, state: State) -> list[float]:
+        spring, psi = state[0], state[1]
+        value, _slope, shift = strength(spring)
+        x = (value - psi) / a
+        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
+        rates = [-stiffness * math.tanh(0.5 * (x - load)), share * evolution(x, psi - shift, b)]
+        if clock:
+            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+        return rates
+
+    def point(state: State, rates: State) -> Point:
+        spring, psi = float(state[0]), float(state[1])
+        value, slope, shift = strength(spring)
+        x = (value - psi) / a
+        growth = (slope * float(rates[0]) - float(rates[1])) / a
+        return Point(x, growth, spring, spring, psi, psi - shift + b * x)
+
+    unknowns, scales = ("spring", "psi"), (a, a)
+    if clock:
+        unknowns, scales = (*unknowns, "time"), (*scales, 1.0)  # type: ignore[assignment]
+    return Equations("quasi_static", unknowns, scales, rate, point)
+
+
+def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
+    """With mass, as long as it hardly acts: the quasi-static form with inertia's first-order part
+    of the stress.
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b, stiffness = scene.a, scene.b, scene.stiffness
+    load = scene.log_load_rate
+    log_time = math.log(scene.inertial_time)
+
+    def shares(x: float) -> tuple[float, float, float]:
+        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
+        norm = math.exp(min(x + log_time, LARGEST_EXPONENT))
+        return share, -stiffness * math.tanh(0.5 * (x - load)), norm * norm / max(share, 1e-300)
+
+    def balance(spring: float, psi: float) -> tuple[float, float, float, float]:
+        """Slip rate on the slow manifold, friction, d strength/df, and the growth of ln V without
+        mass.
+        """
+        value, slope, shift = strength(spring)
+        x = (value - psi) / a
+        share, loading, norm_squared = shares(x)
+        growth = (slope * loading - share * evolution(x, psi - shift, b)) / a
+        friction = spring - inertia.inertial_resistance(growth, stiffness, norm_squared)
+        return (strength(friction)[0] - psi) / a, friction, slope, growth
+
+    def rate(_: float, state: State) -> list[float]:
+        spring, psi = state[0], state[1]
+        x, friction, _slope, _growth = balance(spring, psi)
+        share, loading, _norm = shares(x)
+        rates = [loading, share * evolution(x, psi - strength(friction)[2], b)]
+        if clock:
+            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+        return rates
+
+    def point(state: State, _rates: State) -> Point:
+        spring, psi = float(state[0]), float(state[1])
+        x, friction, _slope, growth = balance(spring, psi)
+        return Point(x, growth, spring, friction, psi, psi - strength(friction)[2] + b * x)
+
+    without_mass = quasi_static(scene, clock=clock)
+    return Equations("slow_manifold", without_mass.unknowns, without_mass.scales, rate, point)
+
+
+def inertial(scene: Scene) -> Equations:
+    """With mass, where it acts: three unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi).
+
+        df = K (w_0 - w),   dx = (f - g)/(K w),   strength'(g) dg = a dx + w dPsi/d(delta),
+
+    with w = V T/(2 pi D_c). Keeping g as an unknown needs no inverse of `strength`.
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b, stiffness = scene.a, scene.b, scene.stiffness
+    load_norm = scene.load_velocity * scene.inertial_time
+    log_time = math.log(scene.inertial_time)
+
+    def rate(_: float, state: State) -> list[float]:
+        spring, x, friction = state[0], state[1], state[2]
+        norm = math.exp(max(min(x + log_time, LARGEST_EXPONENT), -LARGEST_EXPONENT))
+        value, slope, shift = strength(friction)
+        growth = _bounded(inertia.acceleration(spring, friction, stiffness, norm))
+        weakening = norm * evolution(x, value - shift - a * x, b)
+        return [
+            _bounded(stiffness * (load_norm - norm)),
+            growth,
+            _bounded((a * growth + weakening) / slope),
+        ]
+
+    def point(state: State, rates: State) -> Point:
+        spring, x, friction = float(state[0]), float(state[1]), float(state[2])
+        value, _slope, shift = strength(friction)
+        psi = value - a * x
+        return Point(x, float(rates[1]), spring, friction, psi, psi - shift + b * x)
+
+    return Equations("inertial", ("spring", "log_rate", "friction"), (a, 1.0, a), rate, point)
+
+
+def _bounded(rate: float) -> float:
+    return max(min(rate, LARGEST_RATE), -LARGEST_RATE)
+
+
+def rigid(scene: Scene, log_rate: float) -> Equations:
+    """A rigid slider at prescribed ln(V/V_*): one unknown, g, against slip: ``strength'(g) dg =
+    dPsi/d(delta)``.
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b = scene.a, scene.b
+
+    def rate(_: float, state: State) -> list[float]:
+        value, slope, shift = strength(state[0])
+        return [evolution(log_rate, value - shift - a * log_rate, b) / slope]
+
+    def point(state: State, _rates: State) -> Point:
+        friction = float(state[0])
+        value, _slope, shift = strength(friction)
+        psi = value - a * log_rate
+        return Point(log_rate, 0.0, friction, friction, psi, psi - shift + b * log_rate)
+
+    return Equations("rigid", ("friction",), (a,), rate, point)

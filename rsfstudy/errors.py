@@ -1,0 +1,58 @@
+"""The errors a user meets: each says the value, the rule it breaks, the choices and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class RsfStudyError(Exception):
+    """Anything rsfstudy refuses or cannot finish; its text is meant for the user."""
+
+
+class InvalidValue(RsfStudyError, ValueError):
+    """A value that breaks a rule.
+
+    Parameters
+    ----------
+    name : str
+        The field, option or axis the value was given for.
+    value : object
+        What was given.
+    rule : str
+        The rule it breaks, as in "must be positive".
+    choices : iterable of str, optional
+        The accepted values; the ones that look like `value` are suggested.
+    remedy : str, optional
+        What to do instead.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        value: object,
+        rule: str,
+        *,
+        choices: Iterable[str] = (),
+        remedy: str = "",
+    ) -> None:
+        choices = list(choices)
+        text = f"{name} = {value!r}: {rule}."
+        close = difflib.get_close_matches(str(value), choices, n=3, cutoff=0.5)
+        if close:
+            text += f" Did you mean {' or '.join(map(repr, close))}?"
+        if choices:
+            text += f" Choices: {', '.join(choices)}."
+        if remedy:
+            text += f" {remedy}"
+        super().__init__(text)
+        self.name = name
+        self.value = value
+
+
+class DataError(RsfStudyError):
+    """A file that is missing, damaged, or not what it is taken for."""
+
+
+class RunError(RsfStudyError):
+    """A run that could not start or could not finish."""

@@ -1,0 +1,36 @@
+"""The slowness (ageing) law (Dieterich): the state variable also evolves in stationary contact."""
+
+from __future__ import annotations
+
+import math
+
+#: Exponents beyond this only occur in trial steps; the clamp keeps their squares finite.
+LARGEST_EXPONENT = 300.0
+
+
+def evolution(log_rate: float, state: float, b: float) -> float:
+    """Evolution of the state variable per unit slip at constant normal stress.
+
+    ``dtheta/dt = 1 - theta V/D_c`` with ``Theta = b ln(theta V_*/D_c)`` reads, per unit slip,
+    ``D_c dTheta/d(delta) = b [D_c/(theta V) - 1] = b expm1(-(Theta/b + ln(V/V_*)))``;
+    `expm1` keeps all digits close to the steady state theta = D_c/V.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    state : float
+        State variable Theta = b ln(theta/theta_*).
+    b : float
+        Evolution effect parameter.
+
+    Returns
+    -------
+    float
+        dTheta over slip in D_c.
+
+    References
+    ----------
+    Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
+    """
+    return b * math.expm1(min(-(state / b + log_rate), LARGEST_EXPONENT))

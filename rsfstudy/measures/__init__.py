@@ -1,0 +1,89 @@
+"""Measures: from a scene to named numbers with a status, an error estimate and a cost; one file
+each, found by name.
+
+A measure is a frozen dataclass derived from `Measure` that fills in the physics. It is picklable,
+so Dask can send it, and describes itself as plain data, so a NetCDF file can hold it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Halt, Meter
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+Value = float | np.ndarray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a measure found in one scene.
+
+    Attributes
+    ----------
+    status : Status
+    values : mapping of str to float or 1-d array
+        The named numbers; names that are missing become NaN in the lattice.
+    message : str
+        What there is to say of the status.
+    rhs_evaluations : int
+        Right-hand sides spent.
+    """
+
+    status: Status
+    values: Mapping[str, Value] = field(default_factory=dict)
+    message: str = ""
+    rhs_evaluations: int = 0
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status."""
+
+    #: File and registry name.
+    name: ClassVar[str]
+
+    @property
+    def headline(self) -> str:
+        """The number the measure is about."""
+        raise TypeError(f"{type(self).__name__} names no headline")
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        """Name of each number, and the inner dimensions it has within one cell (none for a plain
+        number).
+        """
+        raise TypeError(f"{type(self).__name__} names no variables")
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Coordinate values of the inner dimensions."""
+        return {}
+
+    @property
+    def typical_work(self) -> int:
+        """Right-hand sides one cell usually takes at the default accuracy."""
+        raise TypeError(f"{type(self).__name__} states no typical work")
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """The physics: measure one scene, charging `meter`."""
+        raise TypeError(f"{type(self).__name__} measures nothing")
+
+    def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
+        """Measure one scene; a motion that cannot go on becomes its status."""
+        meter = Meter(accuracy.budget)
+        try:
+            found = self.find(scene, accuracy, meter)
+        except Halt as halt:
+            found = Outcome(halt.status, message=str(halt))
+        return Outcome(found.status, found.values, found.message, meter.spent)
+
+    def describe(self) -> dict[str, Any]:
+        """The measure as plain data."""
+        return {"name": self.name, **asdict(self)}

@@ -1,0 +1,252 @@
+"""The critical step: the smallest step of load point velocity or displacement that triggers
+instability.
+
+A step is critical when the peak slip rate of the motion it sets off just touches the instability
+norm. Where mass does not act up to the norm, the touching path is known at its end: ln V is at the
+norm and at rest there. Followed against time, where it attracts its neighbours, it leads to the
+step that started it; see `touching`. Where mass acts below the norm, the peak is followed forward;
+see `peaks`. Either way the answer counts only once a motion on each side of it has confirmed it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from scipy.optimize import toms748
+
+from rsfstudy.core.accuracy import Accuracy, error_of_leaving_mass_out
+from rsfstudy.core.stepping import Meter
+from rsfstudy.equations import log_rate_at
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.sought import DisplacementSteps, RateSteps, Steps
+from rsfstudy.measures.swing import Swing, swing
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+KINDS: Mapping[str, type[Steps]] = {
+    "load_velocity_ratio": RateSteps,
+    "displacement_step": DisplacementSteps,
+}
+DIRECTIONS = ("up", "down")
+
+#: Relative error of a root that rounding alone explains.
+ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A boundary in step size with its numerical error, both before verification."""
+
+    size: float
+    relative_error: float
+
+
+@dataclass(frozen=True)
+class CriticalStep(Measure):
+    """Critical step of the load point.
+
+    Parameters
+    ----------
+    of : {"load_velocity_ratio", "displacement_step"}
+        What is stepped, whatever value the scene holds for it. A load point that is stepped in
+        displacement is held afterwards (V_0 = 0) unless the scene states its `load_velocity_ratio`.
+    direction : {"up", "down"}
+        Steps that increase, or decrease.
+    """
+
+    of: str = "load_velocity_ratio"
+    direction: str = "up"
+    name: ClassVar[str] = "critical_step"
+
+    def __post_init__(self) -> None:
+        if self.of not in KINDS:
+            raise InvalidValue("of", self.of, "cannot be stepped", choices=KINDS)
+        if self.direction not in DIRECTIONS:
+            raise InvalidValue("direction", self.direction, "is unknown", choices=DIRECTIONS)
+
+    @property
+    def headline(self) -> str:
+        return KINDS[self.of].quantity
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        of = self.headline
+        names = (of, f"{of}_error", f"{of}_stable", f"{of}_unstable")
+        return dict.fromkeys((*names, "slip_rate_after_step", "critical_stiffness"), ())
+
+    @property
+    def typical_work(self) -> int:
+        return 4_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Find the boundary, then confirm it with a motion on each side.
+
+        Without mass below the norm it is found from the `touching` path; where there is no such
+        path, or mass acts below the norm, from motions followed forward.
+        """
+        sign = 1 if self.direction == "up" else -1
+        left_out = 0.0
+        if scene.inertia and scene.instability_norm <= accuracy.massless_norm:
+            scene = scene.with_(inertia=False)
+            left_out = error_of_leaving_mass_out(scene.instability_norm)
+        steps = KINDS[self.of](scene, sign)
+        if steps.largest <= steps.smallest:
+            return Outcome(
+                Status.NORM_BELOW_LOADING_RATE,
+                message=f"norm {scene.instability_norm:g} is reached by the loading alone",
+            )
+        if not scene.inertia:
+            boundary = _from_touching_path(steps, accuracy, meter)
+            if boundary is not None:
+                boundary = replace(boundary, relative_error=boundary.relative_error + left_out)
+                outcome = self._verified(steps, boundary, accuracy, meter)
+                if outcome.status is Status.OK:
+                    return outcome
+            return self._surveyed(steps, accuracy, meter)
+        near = _without_mass(steps, accuracy, meter)
+        if near is not None:
+            bracket = _neighbours(steps, near, accuracy, meter)
+            if bracket is not None:
+                return self._closed_in(steps, bracket, accuracy, meter)
+        return self._surveyed(steps, accuracy, meter)
+
+    def _verified(
+        self, steps: Steps, boundary: Boundary, accuracy: Accuracy, meter: Meter
+    ) -> Outcome:
+        """Confirm a boundary by a motion on each side, as close to it as the motions can tell."""
+        width = max(3.0 * boundary.relative_error, accuracy.rtol)
+        while width < 0.02:
+            inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
+            below = swing(steps.scene_at(inner), accuracy, meter)
+            above = swing(steps.scene_at(outer), accuracy, meter)
+            if above.reached and not below.reached:
+                scene = steps.scene_at(boundary.size)
+                error = steps.error(boundary.size, boundary.relative_error)
+                found = self._values(
+                    steps, boundary.size, error, steps.value(inner), steps.value(outer)
+                )
+                found["slip_rate_after_step"] = math.exp(
+                    log_rate_at(scene, scene.spring_stress_step, 0.0)
+                )
+                return Outcome(Status.OK, found)
+            width *= 10.0
+        return Outcome(
+            Status.UNVERIFIED,
+            self._values(steps),
+            f"no bracket within 2 % confirms {self.headline} = {steps.value(boundary.size):.9g}",
+        )
+
+    def _values(
+        self,
+        steps: Steps,
+        size: float = math.nan,
+        error: float = math.nan,
+        stable: float = math.nan,
+        unstable: float = math.nan,
+    ) -> dict[str, float]:
+        of = self.headline
+        return {
+            of: steps.value(size),
+            f"{of}_error": error,
+            f"{of}_stable": stable,
+            f"{of}_unstable": unstable,
+            "critical_stiffness": steps.scene.critical_stiffness,
+        }
+
+    def _surveyed(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow motions forward, from small steps to large, until one is unstable; then close in
+        on the boundary.
+        """
+
+        def at(log_size: float) -> Swing:
+            return swing(steps.scene_at(math.exp(log_size)), accuracy, meter)
+
+        smallest, largest = math.log(steps.smallest), math.log(steps.largest)
+        spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
+        stable: float | None = None
+        unstable = smallest
+        while unstable <= largest + 1e-9:
+            if at(unstable).reached:
+                break
+            stable, unstable = unstable, unstable + spacing
+        else:
+            return self._never(steps, accuracy, meter)
+        if stable is None:
+            return Outcome(
+                Status.UNSTABLE_AT_ANY_STEP,
+                self._values(steps, unstable=steps.value(steps.smallest)),
+                f"already a step to {steps.value(steps.smallest):.6g} is unstable",
+            )
+        return self._closed_in(steps, (stable, unstable), accuracy, meter)
+
+    def _closed_in(
+        self, steps: Steps, bracket: tuple[float, float], accuracy: Accuracy, meter: Meter
+    ) -> Outcome:
+        """Boundary between a stable and an unstable log size, where the excess of the swings
+        changes sign.
+        """
+        tolerance = 0.5 * accuracy.rtol
+        log_size = toms748(
+            lambda p: swing(steps.scene_at(math.exp(p)), accuracy, meter).excess,
+            *bracket,
+            xtol=tolerance,
+            rtol=1e-15,
+        )
+        return self._verified(steps, Boundary(math.exp(log_size), accuracy.rtol), accuracy, meter)
+
+    def _never(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """No step reached the norm: because nothing is unstable, or because mass keeps slip below
+        it.
+        """
+        values = self._values(steps, stable=steps.value(steps.largest))
+        if steps.scene.inertia and _without_mass(steps, accuracy, meter) is not None:
+            return Outcome(
+                Status.NORM_UNREACHABLE,
+                values,
+                f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
+            )
+        return Outcome(
+            Status.STABLE_FOR_ALL_STEPS,
+            values,
+            f"stable for every step up to {steps.value(steps.largest):.6g}",
+        )
+
+
+def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
+    """Boundary from the critical path; the difference between two tolerances is its error."""
+    sizes = steps.sizes_on_path((10.0 * accuracy.solver, accuracy.solver), meter)
+    if sizes is None:
+        return None
+    coarse, fine = sizes
+    return Boundary(fine, abs(coarse - fine) / fine + ROUNDING)
+
+
+def _without_mass(steps: Steps, accuracy: Accuracy, meter: Meter) -> float | None:
+    """Size of the critical step for a norm low enough to leave mass out: close by, and cheap."""
+    norm = min(steps.scene.instability_norm, accuracy.massless_norm)
+    massless = type(steps)(steps.scene.with_(inertia=False, instability_norm=norm), steps.sign)
+    if massless.largest <= massless.smallest:
+        return None
+    sizes = massless.sizes_on_path((1e-6,), meter)
+    return None if sizes is None else sizes[0]
+
+
+def _neighbours(
+    steps: Steps, near: float, accuracy: Accuracy, meter: Meter
+) -> tuple[float, float] | None:
+    """A stable and an unstable log size around a guess; None where there are none within a factor
+    of four.
+    """
+    middle = math.log(near)
+    reached = swing(steps.scene_at(near), accuracy, meter).reached
+    inner, reach = middle, 1e-4
+    while reach < 1.5:
+        outer = middle - reach if reached else min(middle + reach, math.log(steps.largest))
+        if swing(steps.scene_at(math.exp(outer)), accuracy, meter).reached != reached:
+            return (outer, inner) if reached else (inner, outer)
+        inner, reach = outer, 5.0 * reach
+    return None

@@ -1,0 +1,238 @@
+"""The steps among which a critical one is sought: of load point velocity, or of load point
+displacement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from scipy.optimize import brentq
+
+from rsfstudy import steady_state
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Meter
+from rsfstudy.equations import strength_of
+from rsfstudy.measures.swing import swing
+from rsfstudy.measures.touching import displacement_on_path, rate_step_misfit
+from rsfstudy.scene import Scene
+
+#: Smallest step the search tries, and slowest load point velocity over V_* it goes down to.
+SMALLEST_STEP = 1e-3
+SLOWEST_LOAD = 1e-20
+_LOOSE = 1e-5
+#: Distance in log size over which the slope of the misfit is taken.
+_NEAR = 3e-3
+_MOST_CORRECTIONS = 8
+#: Longest stride, and end, of the search for a sign change in logit(size/largest).
+_LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
+#: Strides without a critical path on either side after which shooting is given up.
+_GIVE_UP = 3
+
+
+class Steps:
+    """Steps of one kind and direction on one scene, by size: a positive number that grows with the
+    step.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene the steps are imposed on.
+    sign : {1, -1}
+        Upward or downward.
+
+    Attributes
+    ----------
+    smallest, largest : float
+        Sizes the search covers; there is none to search where the loading alone reaches the norm.
+    """
+
+    #: Name of the critical value in results.
+    quantity: ClassVar[str]
+
+    def __init__(self, scene: Scene, sign: int) -> None:
+        self.scene, self.sign = scene, sign
+        self.smallest = SMALLEST_STEP
+        self.largest = self._largest() * (1.0 - 1e-9)
+
+    def scene_at(self, size: float) -> Scene:
+        """The scene with a step of this size."""
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def value(self, size: float) -> float:
+        """The number a user knows the step by."""
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def error(self, size: float, relative_error: float) -> float:
+        """Error of `value` where the size has this relative error."""
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Size of the step that starts the critical path, by each local tolerance; None where there
+        is no such path.
+        """
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def _largest(self) -> float:
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+
+class RateSteps(Steps):
+    """Steps of load point velocity; the size is |ln(V_0/V_*)|."""
+
+    quantity = "critical_velocity_ratio"
+
+    def scene_at(self, size: float) -> Scene:
+        return self.scene.with_(load_velocity_ratio=self.value(size))
+
+    def value(self, size: float) -> float:
+        return math.exp(self.sign * size)
+
+    def error(self, size: float, relative_error: float) -> float:
+        return math.exp(self.sign * size) * size * relative_error
+
+    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Shoot: find the V_0 whose critical path comes from the state before the step.
+
+        A loose root and its slope come first; the slope then serves Newton's method at the tighter
+        tolerances, which costs them one or two paths each.
+        """
+        loose = self._loose_root(meter)
+        if loose is None:
+            return None
+        log_size, slope = loose
+        sizes = []
+        for tolerance in tolerances:
+            for _ in range(_MOST_CORRECTIONS):
+                misfit = rate_step_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
+                if misfit is None:
+                    return None
+                correction = misfit / slope
+                log_size -= correction
+                if abs(correction) < 30.0 * tolerance:
+                    break
+            else:
+                return None
+            sizes.append(math.exp(log_size))
+        return sizes
+
+    def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
+        """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
+        there.
+        """
+
+        def misfit(log_size: float) -> float:
+            scene = self.scene_at(math.exp(log_size))
+            found = rate_step_misfit(scene, _LOOSE, meter)
+            if found is None and self.sign > 0:
+                # far from the boundary there may be no critical path, but an upward step still has
+                # a verdict
+                return -1.0 if swing(scene, Accuracy(_LOOSE), meter).reached else 1.0
+            return math.nan if found is None else found
+
+        bracket = self._bracket(misfit)
+        if bracket is None:
+            return None
+        root = float(brentq(misfit, *bracket, xtol=1e-4))
+        slope = (misfit(root + _NEAR) - misfit(root - _NEAR)) / (2.0 * _NEAR)
+        return (root, slope) if math.isfinite(slope) and slope != 0.0 else None
+
+    def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
+        """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
+        guess.
+
+        A misfit of NaN (no critical path) has no sign. The guess is of the size of the closed forms
+        for the slip law (Gu et al. 1984). The search runs in logit(size/largest), which resolves
+        both ends of the range.
+        """
+
+        def log_size(position: float) -> float:
+            return math.log(self.largest) - math.log1p(math.exp(-position))
+
+        def position(size: float) -> float:
+            share = min(max(size, self.smallest) / self.largest, 0.5)
+            return math.log(share / (1.0 - share))
+
+        lowest, highest = position(self.smallest), _HIGHEST
+        guess = math.log1p(math.exp(self.scene.stiffness_ratio - 1.0) / (self.scene.b_over_a - 1.0))
+        left = right = position(guess)
+        at_left = at_right = misfit(log_size(left))
+        stride, missing = 0.2, 0
+        while (left > lowest or right < highest) and missing < _GIVE_UP:
+            if right < highest:
+                further = min(right + stride, highest)
+                value = misfit(log_size(further))
+                if at_right * value <= 0.0:
+                    return log_size(right), log_size(further)
+                right, at_right = further, value
+            if left > lowest:
+                further = max(left - stride, lowest)
+                value = misfit(log_size(further))
+                if at_left * value <= 0.0:
+                    return log_size(further), log_size(left)
+                left, at_left = further, value
+            missing = missing + 1 if math.isnan(at_left) and math.isnan(at_right) else 0
+            stride = min(1.5 * stride, _LONGEST_STRIDE)
+        return None
+
+    def _largest(self) -> float:
+        """Up: V_0 at the norm itself. Down: the slowest V_0 that has a steady state."""
+        if self.sign > 0:
+            return self.scene.log_norm_rate
+        scene = self.scene
+        slowest = steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, scene.cot_phi)
+        return min(-math.log(SLOWEST_LOAD), -slowest) if scene.log_norm_rate > 0.0 else 0.0
+
+
+class DisplacementSteps(Steps):
+    """Steps of load point displacement; the size is |d| in D_c. The load point is then held, unless
+    the scene moves it.
+    """
+
+    quantity = "critical_displacement"
+
+    def __init__(self, scene: Scene, sign: int) -> None:
+        if scene.load_velocity_ratio is None:
+            scene = scene.with_(load_velocity_ratio=0.0)
+        super().__init__(scene, sign)
+
+    def scene_at(self, size: float) -> Scene:
+        return self.scene.with_(displacement_step=self.value(size))
+
+    def value(self, size: float) -> float:
+        return self.sign * size
+
+    def error(self, size: float, relative_error: float) -> float:
+        return size * relative_error
+
+    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """One integration each: a displacement step starts wherever the critical path has Psi =
+        0.
+        """
+        sizes = []
+        for tolerance in tolerances:
+            found = displacement_on_path(self.scene, tolerance, meter, self.sign)
+            if found is None:
+                return None
+            sizes.append(abs(found))
+        return sizes
+
+    def _largest(self) -> float:
+        """Up: the step that itself takes the slip rate to the norm. Down: the step that ends shear
+        stress.
+        """
+        scene = self.scene
+        if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
+            return 0.0
+        if self.sign < 0:
+            limit = scene.mu_star
+            return (min(limit, 1.0 / scene.cot_phi) if scene.cot_phi else limit) / scene.stiffness
+        strength, norm = strength_of(scene), scene.a * scene.log_norm_rate
+        reach = norm
+        while strength(reach)[0] < norm and reach < 1e6:
+            reach *= 2.0
+        if strength(reach)[0] < norm:
+            return reach / scene.stiffness
+        stress = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
+        return stress / scene.stiffness

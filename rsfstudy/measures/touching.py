@@ -1,0 +1,141 @@
+"""The critical path without mass, followed back from where it touches the instability norm.
+
+At the touching point ln V is at the norm and stationary, which leaves one scalar equation for the
+stress. From there the path is integrated against time. Its neighbours converge on it in that
+direction, so a few short integrations of moderate tolerance give many digits, where following
+motions forward would amplify every error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from scipy.optimize import brentq
+
+from rsfstudy.core.stepping import Halt, Meter, Step, steps
+from rsfstudy.equations import Point, log_rate_at, quasi_static, strength_of
+from rsfstudy.laws import evolution_of
+from rsfstudy.scene import Scene
+
+#: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is
+#: given up.
+_PATH_BUDGET = 1_500
+_SLOWEST = -230.0  # ln(V/V_*): 10^-100
+
+
+def touching_point(scene: Scene) -> tuple[float, float] | None:
+    """Spring stress and state (f, Psi) at which ln V rests at the instability norm; None where it
+    never can.
+
+    There, strength'(f) K (V_0/V - 1) equals the evolution of the state per unit slip.
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b, x = scene.a, scene.b, scene.log_norm_rate
+    pull = scene.stiffness * math.expm1(scene.log_load_rate - x)
+
+    def acceleration(spring: float) -> float:
+        value, slope, shift = strength(spring)
+        return slope * pull - evolution(x, value - shift - a * x, b)
+
+    reach = 2.0 * b * abs(x) + scene.stiffness
+    lowest = -reach
+    if scene.cot_phi > 0.0:
+        lowest = max(lowest, -(1.0 - 1e-6) / scene.cot_phi)
+    if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
+        return None
+    spring = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
+    return spring, strength(spring)[0] - a * x
+
+
+def start_of_path(
+    scene: Scene,
+    tolerance: float,
+    meter: Meter,
+    crosses: Callable[[Point], float],
+    accepts: Callable[[Point], bool],
+) -> Point | None:
+    """Follow the critical path back to where ``crosses`` vanishes.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without mass.
+    tolerance : float
+        Local error per step.
+    meter : Meter
+        Charged with the work.
+    crosses : callable
+        Function of the point that vanishes at the start.
+    accepts : callable
+        Whether a point where it vanishes is a start of the kind sought.
+
+    Returns
+    -------
+    Point or None
+        None where the path touches the norm from above or never comes by.
+    """
+    start = touching_point(scene)
+    if start is None:
+        return None
+    path = Meter(
+        round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125)
+    )  # work of an eighth-order method
+    try:
+        for step in steps(quasi_static(scene, clock=False), start, tolerance, path, backward=True):
+            if step.start == 0.0 and step.after.log_rate > step.before.log_rate:
+                return None
+            if step.after.log_rate < _SLOWEST:
+                return None
+            found = _crossing(step, crosses)
+            if found is not None and accepts(found):
+                return found
+    except Halt:
+        return None
+    finally:
+        meter.charge("quasi_static", path.spent)
+    raise AssertionError("steps() never ends by itself")
+
+
+def _crossing(step: Step, crosses: Callable[[Point], float]) -> Point | None:
+    if crosses(step.before) * crosses(step.after) > 0.0:
+        return None
+    return step.point_at(step.locate(crosses))
+
+
+def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
+    """State on the critical path where it passes the slip rate of the start, over a; zero for the
+    critical V_0.
+
+    None where the path never passes that slip rate as the motion of this scene would.
+    """
+    spring = scene.spring_stress_step
+    begin = log_rate_at(scene, spring, 0.0)
+    rates = quasi_static(scene, clock=False)
+    growth = rates.point((spring, 0.0), rates.rate(0.0, (spring, 0.0))).growth
+    if growth == 0.0:
+        return None
+    found = start_of_path(
+        scene,
+        tolerance,
+        meter,
+        lambda point: point.log_rate - begin,
+        lambda point: point.growth * growth > 0.0,
+    )
+    return None if found is None else found.psi / scene.a
+
+
+def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int) -> float | None:
+    """Displacement step of this sign, in D_c, that puts the slider on the critical path.
+
+    A displacement step leaves Psi = 0 and moves the spring stress alone, so the path's point with
+    Psi = 0 is its start.
+    """
+    found = start_of_path(
+        scene,
+        tolerance,
+        meter,
+        lambda point: point.psi,
+        lambda point: sign * point.spring > 0.0,
+    )
+    return None if found is None else found.spring / scene.stiffness

@@ -1,0 +1,44 @@
+"""What became of a cell: an answer, a failure, or not computed yet."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Outcome of one cell; the integer is what the NetCDF flag variable holds."""
+
+    meaning: str
+
+    def __new__(cls, code: int, meaning: str) -> Status:
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.meaning = meaning
+        return member
+
+    OK = 0, "the value stands, within its error estimate"
+    STABLE_FOR_ALL_STEPS = 1, "no step up to the limit of the search reaches the instability norm"
+    UNSTABLE_AT_ANY_STEP = 2, "the smallest step of the search already ends in instability"
+    NO_LIMIT_CYCLE = 3, "the motion settles to steady sliding: there is no stick-slip"
+    NO_STEADY_STATE = 4, "no steady state exists at this load point velocity"
+    LOCKED = 5, "normal stress grows faster than strength: the slider locks up"
+    NORMAL_STRESS_LOST = 6, "normal stress vanishes: the fault opens"
+    SHEAR_STRESS_REVERSED = 7, "shear stress reverses: friction of forward slip no longer applies"
+    NORM_BELOW_LOADING_RATE = 8, "the loading alone already reaches the instability norm"
+    NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
+    WORK_BUDGET_SPENT = 10, "the work budget was spent before an answer was reached"
+    INTEGRATION_FAILED = 11, "the integrator gave up or returned non-finite numbers"
+    UNVERIFIED = 12, "two formulations disagree: no bracket confirms the value"
+    CELL_RAISED = 13, "the measure raised an exception"
+    WORKER_LOST = 14, "the worker process died while computing this cell"
+    PENDING = 15, "not computed yet"
+
+    @property
+    def label(self) -> str:
+        """Name as the flag meaning of the NetCDF variable."""
+        return self.name.lower()
+
+    @property
+    def is_answer(self) -> bool:
+        """True where the status answers the question, even if no number can."""
+        return self <= Status.NORM_UNREACHABLE

@@ -1,0 +1,147 @@
+"""Every quantity once: name, symbol, units and long name, for datasets, axis labels and tables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One named quantity.
+
+    Attributes
+    ----------
+    name : str
+        Its name in datasets and Python.
+    symbol : str
+        Mathematical text for axis labels.
+    units : str
+        UDUNITS string; "1" where dimensionless, and "" where units have no meaning.
+    long_name : str
+        A phrase that stands alone.
+    scale : str
+        What a dimensionless quantity is measured in: multiply by this to return to SI.
+    """
+
+    name: str
+    symbol: str
+    units: str
+    long_name: str
+    scale: str = ""
+
+    @property
+    def axis_label(self) -> str:
+        """Label with units, for the axis of a figure."""
+        text = f"{self.long_name[0].upper()}{self.long_name[1:]}"
+        if self.symbol:
+            text += f", {self.symbol}"
+        if self.units not in ("", "1"):
+            text += f" ({self.units})"
+        return text
+
+
+_QUANTITIES = (
+    # the scene
+    Quantity("law", "", "", "state evolution law"),
+    Quantity("normal_stress", "", "", "normal stress condition"),
+    Quantity("inertia", "", "", "whether the slider has mass"),
+    Quantity("a", "$a$", "1", "direct effect parameter"),
+    Quantity("b_over_a", "$b/a$", "1", "ratio of evolution effect to direct effect"),
+    Quantity("a_over_b_minus_a", "$a/(b-a)$", "1", "direct effect over net rate weakening"),
+    Quantity("mu_star", r"$\mu_*$", "1", "steady-state friction coefficient at the reference rate"),
+    Quantity("alpha", r"$\alpha$", "1", "normal stress effect on the state variable"),
+    Quantity("phi", r"$\phi$", "degree", "angle between the driving stress and the fault normal"),
+    Quantity(
+        "stiffness_ratio", r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star"
+    ),
+    Quantity("load_velocity_ratio", "$V_0/V_*$", "1", "load point velocity after the step", "V_*"),
+    Quantity(
+        "displacement_step", r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
+    ),
+    Quantity("period", "$T$", "s", "period of free oscillation"),
+    Quantity("reference_rate", "$V_*/D_c$", "s-1", "reference slip rate over slip distance"),
+    Quantity("instability_norm", r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable"),
+    # what is measured
+    Quantity(
+        "critical_velocity_ratio",
+        "$V_0/V_*$",
+        "1",
+        "critical load point velocity for triggered instability",
+        "V_*",
+    ),
+    Quantity(
+        "critical_displacement",
+        r"$\Delta\delta_0/D_c$",
+        "1",
+        "critical load point displacement step for triggered instability",
+        "D_c",
+    ),
+    Quantity(
+        "slip_rate_after_step",
+        "$V(0^+)/V_*$",
+        "1",
+        "slip rate just after the step at the boundary",
+        "V_*",
+    ),
+    Quantity(
+        "critical_stiffness",
+        r"$k_{cr}D_c/\sigma_*$",
+        "1",
+        "critical stiffness at the reference rate",
+        "sigma_*/D_c",
+    ),
+    # along a motion
+    Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
+    Quantity("slip", r"$\delta/D_c$", "1", "slip since the step", "D_c"),
+    Quantity(
+        "log10_slip_rate", r"$\log_{10}(V/V_*)$", "1", "decimal logarithm of slip rate over V_star"
+    ),
+    Quantity(
+        "shear_stress", r"$\tau/\sigma_*$", "1", "shear stress carried by the spring", "sigma_*"
+    ),
+    Quantity("normal_stress_ratio", r"$\sigma/\sigma_*$", "1", "normal stress", "sigma_*"),
+    Quantity(
+        "state_variable", r"$\Theta$", "1", "state variable, as a part of the friction coefficient"
+    ),
+    Quantity("regime", "", "", "equations in use"),
+    # reductions
+    Quantity("zeta", r"$\zeta$", "1", "slope of V_0/V_star - 1 against a/(b-a)"),
+    # every lattice
+    Quantity("status", "", "", "outcome of the cell"),
+    Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),
+    Quantity("wall_time", "", "s", "wall time of the cell"),
+    Quantity("message", "", "", "what the cell says of its outcome"),
+)
+
+QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
+
+_SUFFIXES = {
+    "error": "numerical error estimate of",
+    "stable": "value verified as stable beside",
+    "unstable": "value verified as unstable beside",
+    "stderr": "standard error (misfit of the fitted law) of",
+    "misfit": "largest misfit of the law fitted for",
+    "points": "number of points fitted for",
+}
+
+#: Coordinates that follow from an axis: name -> (axis, formula).
+DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
+    "a_over_b_minus_a": ("b_over_a", lambda b_over_a: 1.0 / (b_over_a - 1.0)),
+}
+
+
+def quantity(name: str) -> Quantity:
+    """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
+
+    Names the vocabulary does not hold (a user's own) describe themselves.
+    """
+    if name in QUANTITIES:
+        return QUANTITIES[name]
+    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIXES)})", name)
+    if match:
+        of = quantity(match[1])
+        units = "1" if match[2] == "points" else of.units
+        return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", of.scale)
+    return Quantity(name, "", "1", name.replace("_", " "))
