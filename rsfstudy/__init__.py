@@ -1,0 +1,52 @@
+"""Parameter studies of a spring-slider with rate- and state-dependent friction.
+
+Named studies, and studies of your own, are declared as labelled dimensions over a scene, computed
+over a lattice by Dask workers, and land as self-describing NetCDF datasets that are reduced to
+boundaries and scaling slopes.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rsfstudy.api import check, critical_step, open, run, studies
+    from rsfstudy.scene import Scene
+    from rsfstudy.study import Axis, Study
+    from rsfstudy.trajectory import simulate
+
+# loaded on first use, so that a worker does not import what only its driver needs
+_HOMES = {
+    "Scene": "scene",
+    "Study": "study",
+    "Axis": "study",
+    "run": "api",
+    "open": "api",
+    "check": "api",
+    "studies": "api",
+    "simulate": "trajectory",
+    "critical_step": "api",
+}
+
+__all__ = [
+    "Axis",
+    "Scene",
+    "Study",
+    "check",
+    "critical_step",
+    "open",
+    "run",
+    "simulate",
+    "studies",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

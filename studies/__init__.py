@@ -1,1 +1,1 @@
-"""Named studies."""
+"""The named studies, one declaration a file; each holds a `Study` named `study`."""

@@ -1,0 +1,155 @@
+"""Claims: published values, held against what a dataset says.
+
+A claim is plain data, so that it travels in the NetCDF file, and checking a file needs nothing
+else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+
+REPRODUCED = "reproduced"
+DIFFERS = "differs"
+UNDECIDED = "undecided"
+NOT_APPLICABLE = "not applicable"
+
+RELATIONS = ("equals", "below", "above")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One published value and the verdict expected on it.
+
+    Parameters
+    ----------
+    id : str
+        Short name, as in "C7".
+    statement : str
+        What is claimed, in words.
+    source : str
+        Where it is published.
+    variable : str
+        Variable of the dataset it speaks of.
+    where : mapping
+        Coordinate values that single out one number.
+    minus : mapping, optional
+        A second place; the claim is then on the difference.
+    relation : {"equals", "below", "above"}
+        How ours should relate to the published value.
+    published : float
+        The published value.
+    tolerance : float
+        How far ours may be from it, and
+    reason : str
+        why that far.
+    expected : str
+        The verdict expected today.
+    because : str
+        Why, where that is not "reproduced".
+    """
+
+    id: str
+    statement: str
+    source: str
+    variable: str
+    where: Mapping[str, Any]
+    published: float
+    tolerance: float
+    reason: str
+    relation: str = "equals"
+    minus: Mapping[str, Any] = field(default_factory=dict)
+    expected: str = REPRODUCED
+    because: str = ""
+
+    def __post_init__(self) -> None:
+        if self.relation not in RELATIONS:
+            raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
+        if self.expected not in (REPRODUCED, DIFFERS):
+            raise InvalidValue(
+                "expected", self.expected, "is no verdict", choices=(REPRODUCED, DIFFERS)
+            )
+
+    def describe(self) -> dict[str, Any]:
+        """The claim as plain data."""
+        return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
+
+    def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
+        """Our value, and whether it reproduces the published one.
+
+        A place the lattice does not have makes the claim not applicable; a place without a number
+        leaves it undecided.
+        """
+        try:
+            ours = _pick(dataset, self.variable, self.where)
+            if self.minus:
+                ours -= _pick(dataset, self.variable, self.minus)
+        except KeyError:
+            return math.nan, NOT_APPLICABLE
+        if math.isnan(ours):
+            return ours, UNDECIDED
+        distance = ours - self.published
+        holds = {
+            "equals": abs(distance) <= self.tolerance,
+            "below": distance < self.tolerance,
+            "above": distance > -self.tolerance,
+        }[self.relation]
+        return ours, REPRODUCED if holds else DIFFERS
+
+
+def verdicts(
+    dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]
+) -> pd.DataFrame:
+    """A table of claims, one row each.
+
+    Claims hold for a study as declared: where a fixed value of the scene was changed (`overrides`
+    that are no dimension or coordinate along one), they are not applicable.
+    """
+    along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
+    moved_base = [name for name in overrides if name not in along]
+    rows = []
+    for claim in claims:
+        ours, verdict = claim.verdict(dataset)
+        if moved_base:
+            verdict = NOT_APPLICABLE
+        rows.append(
+            {
+                "id": claim.id,
+                "claim": claim.statement,
+                "source": claim.source,
+                "relation": claim.relation,
+                "published": claim.published,
+                "ours": ours,
+                "tolerance": claim.tolerance,
+                "reason": claim.reason,
+                "verdict": verdict,
+                "expected": claim.expected,
+                "because": claim.because,
+                "moved": verdict not in (claim.expected, NOT_APPLICABLE),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float:
+    """The one number at these coordinate values; KeyError where there is no such place."""
+    values = dataset[variable]
+    for name, wanted in where.items():
+        coordinate = dataset[name]
+        (dimension,) = coordinate.dims
+        if isinstance(wanted, str):
+            matches = np.flatnonzero(coordinate.values == wanted)
+        else:
+            matches = np.flatnonzero(np.isclose(coordinate.values, wanted, rtol=1e-9, atol=0.0))
+        if matches.size != 1:
+            raise KeyError(name)
+        values = values.isel({dimension: int(matches[0])})
+    return float(values)

@@ -1,0 +1,102 @@
+"""What decided the numbers of a run: versions, the code of the physics, the machine, the
+command.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from rsfstudy.study import Study
+
+_PACKAGE = Path(__file__).parent
+#: Code whose change may change a number.
+_PHYSICS = (
+    "laws",
+    "effects",
+    "core",
+    "measures",
+    "loading.py",
+    "scene.py",
+    "equations.py",
+    "steady_state.py",
+)
+
+
+def physics_digest() -> str:
+    """Digest of the source of everything that decides the number of a cell."""
+    digest = hashlib.sha256()
+    for part in _PHYSICS:
+        path = _PACKAGE / part
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(file.relative_to(_PACKAGE).as_posix().encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def fingerprint(study: Study) -> dict[str, Any]:
+    """All that decides the number of a cell but its scene."""
+    return {
+        "study": f"{study.name} version {study.version}",
+        "measure": study.measure.describe(),
+        "rtol": study.accuracy.rtol,
+        "budget": study.accuracy.budget,
+        "physics": physics_digest(),
+        "numpy": version("numpy"),
+        "scipy": version("scipy"),
+    }
+
+
+def provenance(command: str) -> dict[str, Any]:
+    """Where and when a run was made, and by which versions."""
+    return {
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": command,
+        "versions": {
+            "python": platform.python_version(),
+            **{name: _version(name) for name in _DEPENDENCIES},
+        },
+        "physics": physics_digest(),
+        "git": _git(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "byte_order": sys.byteorder,
+    }
+
+
+_DEPENDENCIES = ("rsfstudy", "numpy", "scipy", "xarray", "dask", "distributed", "netCDF4")
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _git() -> str:
+    """Commit of the checkout the package runs from, and whether it was clean; "none" for an
+    installed wheel.
+    """
+
+    def ask(*words: str) -> str:
+        return subprocess.run(
+            ["git", "-C", str(_PACKAGE), *words],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
+        ).stdout.strip()
+
+    try:
+        if Path(ask("rev-parse", "--show-toplevel")) != _PACKAGE.parent:
+            return "none"
+        state = "with uncommitted changes" if ask("status", "--porcelain") else "clean"
+        return f"{ask('rev-parse', 'HEAD')} {state}"
+    except (OSError, subprocess.SubprocessError):
+        return "none"

@@ -1,0 +1,312 @@
+"""The declaration of a study: labelled axes laid over a scene, a measure, and what is made of
+it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.claims import Claim
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure
+from rsfstudy.reduce import Reduction
+from rsfstudy.scene import FIELDS, Scene, unknown_field
+
+#: Fields that only scenes with variable normal stress have.
+_OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, init=False)
+class Axis:
+    """One labelled dimension of a lattice.
+
+    Parameters
+    ----------
+    dimension : str
+        Name of the dimension; for a plain axis the field of the scene it varies.
+    values : sequence, or mapping of str to mapping
+        The values of that field; or, for a zipped axis, a label for each point and the fields set
+        there, as in ``{"constant": {"normal_stress": "constant"}, ...}``.
+
+    Raises
+    ------
+    InvalidValue
+        For an axis that is empty, repeats a value, holds a non-finite one or names no field.
+    """
+
+    dimension: str
+    rows: tuple[Row, ...]
+    labels: tuple[str, ...] | None
+
+    def __init__(
+        self, dimension: str, values: Sequence[Any] | np.ndarray | Mapping[str, Row]
+    ) -> None:
+        if isinstance(values, Mapping):
+            labels: tuple[str, ...] | None = tuple(values)
+            rows = tuple(dict(row) for row in values.values())
+            if dimension in FIELDS:
+                raise InvalidValue(
+                    "axis", dimension, "is a field: a zipped axis needs a name of its own"
+                )
+        else:
+            if dimension not in FIELDS:
+                raise unknown_field(dimension)
+            if isinstance(values, str):
+                values = [values]
+            labels, rows = None, tuple({dimension: _plain(value)} for value in values)
+        object.__setattr__(self, "dimension", dimension)
+        object.__setattr__(self, "rows", rows)
+        object.__setattr__(self, "labels", labels)
+        self._check()
+
+    def _check(self) -> None:
+        if not self.rows:
+            raise InvalidValue("axis", self.dimension, "has no values")
+        for row in self.rows:
+            for name, value in row.items():
+                if name not in FIELDS:
+                    raise unknown_field(name)
+                if isinstance(value, float) and not math.isfinite(value):
+                    raise InvalidValue(self.dimension, value, "must be finite")
+        seen: list[Row] = []
+        for row in self.rows:
+            if row in seen:
+                raise InvalidValue(self.dimension, dict(row), "stands twice on its axis")
+            seen.append(row)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Fields of the scene that vary along the axis."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row))
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def describe(self) -> dict[str, Any]:
+        """The axis as plain data."""
+        if self.labels is None:
+            return {
+                "dimension": self.dimension,
+                "values": [row[self.dimension] for row in self.rows],
+            }
+        rows = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
+        return {"dimension": self.dimension, "values": rows}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A parameter study, declared.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study and of its files.
+    title, summary : str
+        One line, and a caption.
+    base : Scene
+        What all cells share.
+    axes : sequence of Axis
+        The dimensions of the lattice, outermost first.
+    measure : Measure
+        What is measured in each cell.
+    reductions : sequence of Reduction
+        What the lattice is reduced to.
+    claims : sequence of Claim
+        Published values the results are held against.
+    plot : str
+        Module of `rsfstudy.plots` that draws the study.
+    references : sequence of str
+        Sources of the study.
+    accuracy : Accuracy
+        Accuracy of each cell.
+    version : int
+        Raised when the meaning of the results changes.
+
+    Raises
+    ------
+    InvalidValue
+        For axes that repeat a dimension or vary the same field, and for any cell that makes no
+        meaningful scene.
+    """
+
+    name: str
+    title: str
+    base: Scene
+    axes: Sequence[Axis]
+    measure: Measure
+    summary: str = ""
+    reductions: Sequence[Reduction] = ()
+    claims: Sequence[Claim] = ()
+    plot: str = "lines"
+    references: Sequence[str] = ()
+    accuracy: Accuracy = field(default_factory=Accuracy)
+    version: int = 1
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+        taken: dict[str, str] = {}
+        for axis in self.axes:
+            for name in {axis.dimension, *axis.fields}:
+                if name in taken:
+                    raise InvalidValue(
+                        "axis", axis.dimension, f"varies {name!r}, as {taken[name]!r} does already"
+                    )
+                taken[name] = axis.dimension
+
+    # ---- the lattice ------------------------------------------------------------------------
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Dimensions, outermost first."""
+        return tuple(axis.dimension for axis in self.axes)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the dimensions."""
+        return tuple(len(axis) for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return math.prod(self.shape)
+
+    def scenes(self) -> Iterator[Scene]:
+        """The scene of each cell, in row-major order.
+
+        Raises
+        ------
+        InvalidValue
+            For a cell that makes no meaningful scene, naming its place on the axes.
+        """
+        for rows in itertools.product(*(axis.rows for axis in self.axes)):
+            try:
+                yield self._scene(rows)
+            except InvalidValue as error:
+                place = ", ".join(
+                    f"{name}={value!r}" for row in rows for name, value in row.items()
+                )
+                raise InvalidValue(
+                    error.name, error.value, f"cell ({place}) makes no scene: {error}"
+                ) from error
+
+    def _scene(self, rows: Sequence[Row]) -> Scene:
+        fields = self.base.as_dict()
+        for row in rows:
+            fields.update(row)
+        stated = next((row for row in rows if "normal_stress" in row), {})
+        for name in _OF_VARIABLE_NORMAL_STRESS:
+            # one row that states both is contradictory, and Scene says so
+            if fields["normal_stress"] == "constant" and stated.get(name) is None:
+                fields[name] = None
+        return Scene(**fields)
+
+    # ---- other axes ---------------------------------------------------------------------------
+
+    def with_(self, **overrides: Any) -> Study:
+        """The study with other axis values or other fixed values.
+
+        A list for a field that is fixed makes it an axis; a field along a zipped axis changes only
+        in the points that use it, where each new value makes a point of its own; labels select
+        points of a zipped axis.
+
+        Raises
+        ------
+        InvalidValue
+            For a name that is neither an axis nor a field, and for values that make no axis.
+        """
+        study = self
+        for name, value in overrides.items():
+            study = study._override(name, value)
+        return replace(study, overrides={**self.overrides, **_plain_data(overrides)})
+
+    def _override(self, name: str, value: Any) -> Study:
+        values = list(value) if _is_list(value) else [value]
+        for index, axis in enumerate(self.axes):
+            if name == axis.dimension:
+                changed = _select(axis, values) if axis.labels is not None else Axis(name, values)
+            elif name in axis.fields:
+                changed = _spread(axis, name, values)
+            else:
+                continue
+            return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
+        if name not in FIELDS:
+            raise InvalidValue(
+                "override",
+                name,
+                "is neither an axis nor a field of the scene",
+                choices=(*self.dimensions, *FIELDS),
+            )
+        if _is_list(value):
+            return replace(self, axes=(Axis(name, values), *self.axes))
+        return replace(self, base=self.base.with_(**{name: _plain(value)}))
+
+    def describe(self) -> dict[str, Any]:
+        """The whole declaration as plain data."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "summary": self.summary,
+            "version": self.version,
+            "base": self.base.as_dict(),
+            "axes": [axis.describe() for axis in self.axes],
+            "measure": self.measure.describe(),
+            "accuracy": {"rtol": self.accuracy.rtol, "budget": self.accuracy.budget},
+            "reductions": [reduction.describe() for reduction in self.reductions],
+            "claims": [claim.describe() for claim in self.claims],
+            "plot": self.plot,
+            "references": list(self.references),
+            "overrides": dict(self.overrides),
+        }
+
+
+def _select(axis: Axis, labels: Sequence[str]) -> Axis:
+    """The points of a zipped axis that bear these labels."""
+    assert axis.labels is not None
+    rows = dict(zip(axis.labels, axis.rows, strict=True))
+    for label in labels:
+        if label not in rows:
+            raise InvalidValue(axis.dimension, label, "is no point of the axis", choices=rows)
+    return Axis(axis.dimension, {label: rows[label] for label in labels})
+
+
+def _spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+    """A zipped axis whose points that use a field take new values of it; the others stay."""
+    assert axis.labels is not None
+    spread: dict[str, Row] = {}
+    for label, row in zip(axis.labels, axis.rows, strict=True):
+        if name not in row:
+            spread[label] = row
+            continue
+        for value in values:
+            changed = {**row, name: _plain(value)}
+            if changed not in spread.values():
+                spread[", ".join(f"{k} = {v}" for k, v in changed.items())] = changed
+    return Axis(axis.dimension, spread)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+
+
+def _plain(value: Any) -> Any:
+    """A value as Python's own number, flag or text; whole numbers as float."""
+    value = value.item() if isinstance(value, np.generic) else value
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: [_plain(v) for v in value] if _is_list(value) else _plain(value)
+        for name, value in overrides.items()
+    }

@@ -1,0 +1,165 @@
+"""One motion of one scene, as a labelled trajectory."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import brentq
+
+from rsfstudy.core.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
+from rsfstudy.core.motion import motion
+from rsfstudy.core.stepping import Halt, Meter, Step
+from rsfstudy.errors import InvalidValue
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import quantity
+
+REGIMES = ("quasi_static", "slow_manifold", "inertial")
+#: Points stored per integration step: enough for a smooth curve.
+_POINTS_PER_STEP = 4
+
+
+def simulate(
+    scene: Scene,
+    *,
+    duration: float = 50.0,
+    rtol: float = DEFAULT_RTOL,
+    budget: int = DEFAULT_BUDGET,
+) -> xr.Dataset:
+    """Follow the motion of a scene from the instant after its step.
+
+    Parameters
+    ----------
+    scene : Scene
+        The slider, its effects and its loading.
+    duration : float
+        Time to follow it for, in D_c/V_*.
+    rtol : float
+        Accuracy of the motion.
+    budget : int
+        Right-hand sides it may cost.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``time``, ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring),
+        ``normal_stress_ratio``, ``state_variable`` and ``regime`` along ``sample``. A motion that
+        cannot go on ends early, with its ``status`` and ``message`` in the attributes.
+
+    Raises
+    ------
+    InvalidValue
+        For a duration that is not positive and finite.
+    """
+    if not 0.0 < duration < math.inf:
+        raise InvalidValue("duration", duration, "must be positive and finite")
+    meter = Meter(budget)
+    rows: list[tuple[float, ...]] = []
+    status, message = Status.OK, ""
+    try:
+        _follow(scene, duration, Accuracy(rtol, budget), meter, rows)
+    except Halt as halt:
+        status, message = halt.status, str(halt)
+    return _dataset(scene, np.array(rows).reshape(-1, 7), status, message, rtol, meter)
+
+
+def _follow(
+    scene: Scene,
+    duration: float,
+    accuracy: Accuracy,
+    meter: Meter,
+    rows: list[tuple[float, ...]],
+) -> None:
+    """Append samples up to `duration`; stretches of one regime have clocks of their own."""
+    begin = latest = 0.0
+    equations = None
+    for step in motion(scene, accuracy, meter, clock=True):
+        if step.equations is not equations:
+            equations, begin = step.equations, latest
+            rows.append(_sample(scene, step, step.start, begin))
+        latest = begin + _elapsed(scene, step, step.end)
+        last = latest >= duration
+        if last:
+            step = _until(scene, step, duration - begin)
+        clocks = np.linspace(step.start, step.end, _POINTS_PER_STEP + 1)[1:].tolist()
+        rows += [_sample(scene, step, clock, begin) for clock in clocks]
+        if last:
+            return
+
+
+def _elapsed(scene: Scene, step: Step, clock: float) -> float:
+    """Time in D_c/V_* since the regime began."""
+    if step.equations.regime == "inertial":
+        return clock * scene.inertial_time
+    return float(step.state_at(clock)[2])
+
+
+def _until(scene: Scene, step: Step, elapsed: float) -> Step:
+    """The part of a step that ends after this time."""
+    if _elapsed(scene, step, step.end) <= elapsed:
+        return step
+    clock = brentq(lambda c: _elapsed(scene, step, c) - elapsed, step.start, step.end)
+    return step.until(float(clock))
+
+
+def _sample(scene: Scene, step: Step, clock: float, begin: float) -> tuple[float, ...]:
+    point = step.before if clock == step.start else step.point_at(clock)
+    time = begin + (_elapsed(scene, step, clock) if clock > 0.0 else 0.0)
+    loaded = scene.displacement_step + scene.load_velocity * time
+    return (
+        time,
+        loaded - point.spring / scene.stiffness,
+        point.log_rate / math.log(10.0),
+        scene.mu_star + point.spring,
+        1.0 + scene.cot_phi * point.friction,
+        point.imbalance - scene.b * point.log_rate,
+        REGIMES.index(step.equations.regime),
+    )
+
+
+def _dataset(
+    scene: Scene,
+    samples: np.ndarray,
+    status: Status,
+    message: str,
+    rtol: float,
+    meter: Meter,
+) -> xr.Dataset:
+    names = (
+        "time",
+        "slip",
+        "log10_slip_rate",
+        "shear_stress",
+        "normal_stress_ratio",
+        "state_variable",
+    )
+    dataset = xr.Dataset()
+    for column, name in enumerate(names):
+        about = quantity(name)
+        attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
+        dataset[name] = ("sample", samples[:, column], {k: v for k, v in attrs.items() if v})
+    dataset["regime"] = (
+        "sample",
+        samples[:, -1].astype(np.int8),
+        {
+            "long_name": quantity("regime").long_name,
+            "flag_values": np.arange(len(REGIMES), dtype=np.int8),
+            "flag_meanings": " ".join(REGIMES),
+        },
+    )
+    dataset = dataset.set_coords(["time", "slip"])
+    dataset.attrs = {
+        "title": f"Motion of a spring-slider, {scene.law} law",
+        "Conventions": "CF-1.11",
+        "scene": json.dumps(scene.as_dict()),
+        "effects": " ".join(scene.effects) or "none",
+        "status": status.label,
+        "message": message,
+        "rtol": rtol,
+        "rhs_evaluations": meter.spent,
+        "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
+    }
+    return dataset

@@ -1,0 +1,169 @@
+"""Where cells are computed: in this process, or on the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import RunError
+from rsfstudy.journal import Finished
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+_START_TIMEOUT = 60
+
+Batch = Sequence[Scene]
+#: Takes batches of scenes and yields, in any order, the number of a batch and its finished cells.
+Mapper = Callable[[Measure, Accuracy, Sequence[Batch]], Iterator[tuple[int, list[Finished]]]]
+
+
+def compute(measure: Measure, accuracy: Accuracy, scenes: Batch) -> list[Finished]:
+    """Measure scenes one after the other; an exception becomes the outcome of its cell."""
+    finished = []
+    for scene in scenes:
+        begin = time.perf_counter()
+        try:
+            outcome = measure(scene, accuracy)
+        except Exception as error:
+            outcome = Outcome(Status.CELL_RAISED, message=f"{type(error).__name__}: {error}")
+        finished.append((outcome, time.perf_counter() - begin))
+    return finished
+
+
+def serial(
+    measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
+) -> Iterator[tuple[int, list[Finished]]]:
+    """In this process, one cell after the other."""
+    for number, batch in enumerate(batches):
+        yield number, compute(measure, accuracy, batch)
+
+
+def on_client(client: Any) -> Mapper:
+    """On the workers of a Dask client.
+
+    A worker that dies takes its whole batch with it. The cells of such a batch are sent again one
+    by one, so that only the cell that kills its worker is blamed.
+    """
+    from distributed import as_completed
+
+    def mapper(
+        measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
+    ) -> Iterator[tuple[int, list[Finished]]]:
+        futures = {
+            client.submit(compute, measure, accuracy, batch, pure=False): number
+            for number, batch in enumerate(batches)
+        }
+        try:
+            for future in as_completed(list(futures)):
+                number = futures.pop(future)
+                if future.status == "finished":
+                    yield number, future.result()
+                else:
+                    _raise_unless_lost(future)
+                    yield number, _one_by_one(client, measure, accuracy, batches[number])
+        finally:
+            client.cancel(list(futures))
+
+    return mapper
+
+
+def _one_by_one(client: Any, measure: Measure, accuracy: Accuracy, batch: Batch) -> list[Finished]:
+    finished = []
+    for scene in batch:
+        future = client.submit(compute, measure, accuracy, [scene], pure=False)
+        error = future.exception()
+        if error is None:
+            finished += future.result()
+        else:
+            _raise_unless_lost(future)
+            lost = Outcome(Status.WORKER_LOST, message=f"{type(error).__name__}: {error}")
+            finished.append((lost, math.nan))
+    return finished
+
+
+def _raise_unless_lost(future: Any) -> None:
+    """A worker's death is a cell's failure; anything else is a failure of the cluster."""
+    from distributed.scheduler import KilledWorker
+
+    error = future.exception() if future.status == "error" else None
+    if not isinstance(error, KilledWorker):
+        raise RunError(f"the Dask cluster gave up: {error or future.status}")
+
+
+def on_local_cluster(processes: int) -> Mapper:
+    """On worker processes of this machine, started when there is something to compute."""
+
+    def mapper(
+        measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
+    ) -> Iterator[tuple[int, list[Finished]]]:
+        with local_cluster(processes) as client:
+            yield from on_client(client)(measure, accuracy, batches)
+
+    return mapper
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int) -> Iterator[Any]:
+    """A Dask client of worker processes on this machine, with one thread each.
+
+    Raises
+    ------
+    RunError
+        In a script that starts workers on import: they import it again.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise RunError(
+            "rsfstudy.run was called while a worker process was importing your script. Put "
+            "the call under `if __name__ == '__main__':`, or pass workers=0."
+        )
+    import dask
+    from distributed import Client, LocalCluster
+
+    quiet = {
+        "distributed.scheduler.allowed-failures": 1,
+        "distributed.comm.timeouts.connect": f"{_START_TIMEOUT}s",
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(
+            ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
+        ),
+    }
+    with (
+        dask.config.set(quiet),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+@contextlib.contextmanager
+def existing_cluster(address: str) -> Iterator[Any]:
+    """A client of a Dask scheduler that is already running.
+
+    Raises
+    ------
+    RunError
+        If none answers at the address.
+    """
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise RunError(
+            f"no Dask scheduler answers at {address}: {error}. "
+            "Start one with `dask scheduler`, or leave --scheduler out."
+        ) from error
+    with client:
+        yield client
