@@ -25,7 +25,7 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
         zeta, error = float(row["zeta"]), float(row["zeta_stderr"])
         digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
         slope = rf"$\zeta$ = {zeta:.{digits}f} $\pm$ {error:.{digits}f}"
-        text = f"{str(case).replace('alpha', '$\\alpha$')}: {slope}"
+        text = str(case).replace("alpha", r"$\alpha$") + f": {slope}"
         points = axes.errorbar(
             x,
             row["critical_velocity_ratio"],
