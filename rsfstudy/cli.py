@@ -343,3 +343,7 @@ def _failures(dataset: xr.Dataset) -> int:
 
 def _short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+
+
+if __name__ == "__main__":
+    main()

@@ -139,7 +139,8 @@ def local_cluster(workers: int) -> Iterator[Any]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address=":0",
+            scheduler_kwargs={"dashboard": False},
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster) as client,
@@ -148,7 +149,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def existing_cluster(address: str) -> Iterator[Any]:
+def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
     """A client of a Dask scheduler that is already running.
 
     Raises
@@ -159,7 +160,7 @@ def existing_cluster(address: str) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=timeout)
     except (OSError, ValueError) as error:
         raise RunError(
             f"no Dask scheduler answers at {address}: {error}. "

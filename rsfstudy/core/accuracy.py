@@ -11,15 +11,6 @@ DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
 
-#: Relative error of leaving mass out up to a slip rate norm of 1; it goes with the square (measured
-#: in the tests).
-_MASS_ERROR = 1e-3
-
-
-def error_of_leaving_mass_out(norm: float) -> float:
-    """Relative error of a boundary computed without mass up to this slip rate norm."""
-    return _MASS_ERROR * norm**2
-
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -78,13 +69,6 @@ class Accuracy:
         weakening scenes.
         """
         return min(25.0 * math.sqrt(self.rtol), 0.03)
-
-    @property
-    def massless_norm(self) -> float:
-        """Slip rate norm below which leaving mass out altogether costs less than a tenth of
-        `rtol`.
-        """
-        return math.sqrt(0.1 * self.rtol / _MASS_ERROR)
 
     @property
     def landing(self) -> float:

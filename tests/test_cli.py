@@ -1,0 +1,145 @@
+"""The command line: what it prints, what it writes, and its exit statuses."""
+
+import subprocess
+import sys
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import rsfstudy
+from rsfstudy import cli
+
+NAME = "rate_step_boundary"
+SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
+
+
+def call(*words: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "rsfstudy.cli", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    output = tmp_path_factory.mktemp("outputs")
+    ran = call("run", NAME, *SMALL, "--output", output)
+    assert ran.returncode == 0, ran.stderr
+    return output, ran.stdout
+
+
+def test_run_writes_the_dataset_and_the_figure_and_prints_what_it_found(results):
+    output, said = results
+    assert {file.name for file in output.iterdir()} == {
+        f"{NAME}.nc",
+        f"{NAME}.png",
+        f"{NAME}.cells.sqlite",
+    }
+    assert (output / f"{NAME}.png").read_bytes().startswith(b"\x89PNG")
+    for words in ("zeta", "0.9999", "C6", "C7", "reproduced", "9 ok", "right-hand sides"):
+        assert words in said
+
+
+def test_run_again_computes_nothing(results):
+    output, _said = results
+    before = xr.load_dataset(output / f"{NAME}.nc")
+    assert call("run", NAME, *SMALL, "--output", output).returncode == 0
+    xr.testing.assert_equal(before, xr.load_dataset(output / f"{NAME}.nc"))  # wall times too
+
+
+def test_check_a_name_and_a_file(results):
+    output, _said = results
+    assert call("check", NAME, "--output", output).returncode == 0
+    assert call("check", output / f"{NAME}.nc").returncode == 0
+    assert call("check", "--all", "--output", output).returncode == 0
+
+
+def test_check_fails_when_a_verdict_moves(results, tmp_path):
+    output, _said = results
+    moved = xr.load_dataset(output / f"{NAME}.nc")
+    moved["zeta"] = moved["zeta"] + 0.5
+    moved.to_netcdf(tmp_path / "moved.nc")
+    checked = call("check", tmp_path / "moved.nc")
+    assert checked.returncode == 1
+    assert "differs, expected reproduced" in checked.stdout
+
+
+def test_a_failed_cell_is_listed_and_fails(tmp_path, monkeypatch):
+    study = rsfstudy.studies()[NAME]
+    dataset = rsfstudy.run(study, workers=0, output=None, progress=False, b_over_a=[2, 3])
+    dataset.status[1, 0] = 11
+    dataset.message[1, 0] = "step without length"
+    dataset.to_netcdf(tmp_path / "failed.nc")
+    checked = call("check", tmp_path / "failed.nc")
+    assert checked.returncode == 1
+    assert "1 cells failed" in checked.stdout
+    assert "integration_failed" in checked.stdout
+
+
+def test_plot_draws_beside_a_file(results):
+    output, _said = results
+    (output / f"{NAME}.png").unlink()
+    assert call("plot", output / f"{NAME}.nc").returncode == 0
+    assert (output / f"{NAME}.png").exists()
+
+
+def test_list_and_show():
+    listed = call("list")
+    assert listed.returncode == 0
+    for name in rsfstudy.studies():
+        assert name in listed.stdout
+    shown = call("show", NAME, "--set", "b_over_a=2,3")
+    assert shown.returncode == 0
+    assert "6, of which 6 differ" in shown.stdout
+    assert "right-hand sides" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run"], "name one study, or say --all"),
+        (["run", NAME, "--all"], "name one study, or say --all"),
+        (["run", "rate_step"], "Did you mean 'rate_step_boundary'"),
+        (["run", NAME, "--serial", "--scheduler", "x"], "exclude each other"),
+        (["run", NAME, "--workers", "0"], "0 is not in the range"),
+        (["run", NAME, "--rtol", "1"], "rtol = 1.0: must lie between"),
+        (["run", NAME, "--set", "b_over_a"], "must read AXIS=VALUES"),
+        (["run", NAME, "--set", "b_over_a="], "must read AXIS=VALUES"),
+        (["run", NAME, "--set", "b_over_a=2:3:x"], "must read start:stop:count"),
+        (["run", NAME, "--set", "b_over_a=two"], "b_over_a = 'two': must be a number"),
+        (["run", NAME, "--set", "b_over_a=0.5"], "must exceed 1"),
+        (["run", NAME, "--set", "b_ovr_a=2"], "Did you mean 'b_over_a'"),
+        (["run", NAME, "--set", "law=slipp"], "Did you mean 'slip'"),
+        (["show", "nothing"], "study = 'nothing': is unknown"),
+        (["frobnicate"], "No such command"),
+    ],
+)
+def test_wrong_usage_is_status_2_with_a_remedy(words, message, tmp_path):
+    ran = call(*words, *(["--output", tmp_path / "o"] if words[0] == "run" else []))
+    assert ran.returncode == 2
+    assert message in " ".join(ran.stderr.split())
+    assert "Traceback" not in ran.stderr
+    assert not (tmp_path / "o").exists()
+
+
+def test_results_that_are_not_there_are_status_1(tmp_path):
+    checked = call("check", NAME, "--output", tmp_path)
+    assert checked.returncode == 1
+    assert "does not exist" in checked.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("b_over_a=2", 2.0),
+        ("b_over_a=2,3.5", [2.0, 3.5]),
+        ("b_over_a=1:2:3", [1.0, 1.5, 2.0]),
+        ("law=slip,slowness", ["slip", "slowness"]),
+        ("inertia=true,false", [True, False]),
+    ],
+)
+def test_settings(text, values):
+    assert cli._setting(text)[1] == values
+
+
+def test_help_needs_no_results():
+    assert CliRunner().invoke(cli.cli, ["--help"]).exit_code == 0

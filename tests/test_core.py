@@ -1,0 +1,296 @@
+"""The integrator against exact invariants, references in extended precision, and a second
+formulation.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from conftest import follow
+from scipy.integrate import solve_ivp
+
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.motion import motion
+from rsfstudy.core.stepping import Halt, Meter, steps
+from rsfstudy.equations import Equations, Point, log_rate_at
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
+
+
+@pytest.mark.parametrize("load_velocity_ratio", [1.5, 20.0])
+def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio):
+    """H = Omega - ln Omega + lambda (w - ln w) is conserved at constant normal stress, k = k_cr."""
+    scene = Scene(
+        law="slowness",
+        normal_stress="constant",
+        b_over_a=1.7,
+        load_velocity_ratio=load_velocity_ratio,
+    )
+    weakening, held = 0.7, []
+
+    def invariant(point):
+        steadiness = point.imbalance / scene.b  # ln(V theta/D_c)
+        load = scene.log_load_rate - point.log_rate + steadiness
+        return math.exp(steadiness) - steadiness + weakening * (math.exp(load) - load)
+
+    def until(step):
+        held.append(invariant(step.after))
+        if len(held) == 1:
+            held.insert(0, invariant(step.before))
+        return step.end > 300.0  # some ten periods
+
+    follow(scene, 1e-9, until)
+    # H is of order 10; its drift is what local errors of 2e-11 add up to
+    assert np.ptp(held) < 1e-8
+
+
+@pytest.mark.parametrize("b_over_a", [1.5, 2.0, math.e])
+def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
+    """z = kappa v0/v - kappa + f/a + lambda x stays 1 on the path from V_0/V_* = 1 + 1/lambda."""
+    weakening = b_over_a - 1.0
+    load = 1.0 + 1.0 / weakening
+    scene = Scene(normal_stress="constant", b_over_a=b_over_a, load_velocity_ratio=load)
+
+    def invariant(point):
+        return (
+            weakening * load * math.exp(-point.log_rate)
+            - weakening
+            + point.spring / scene.a
+            + weakening * point.log_rate
+        )
+
+    def until(step):
+        # the separatrix repels: what is left of 2e-12 grows with v**lambda
+        amplified = math.exp(max(1.0, weakening) * step.after.log_rate)
+        assert invariant(step.after) == pytest.approx(1.0, abs=1e-10 * amplified)
+        return step.after.log_rate > 6.0
+
+    follow(scene, 1e-10, until)
+
+
+def cycle(scene: Scene, rtol: float, number: int, accuracy: Accuracy | None = None):
+    """Recurrence interval, spring stress drop in a sigma_*, and right-hand sides of one stick-slip
+    cycle.
+    """
+    meter = Meter(10**7)
+    times, work = [], []
+    begin, equations, latest, trough = 0.0, None, 0.0, math.inf
+
+    def slower(point):
+        return point.log_rate - scene.log_load_rate
+
+    for step in motion(scene, accuracy or Accuracy(rtol, 10**7), meter, clock=True):
+        if step.equations is not equations:
+            begin, equations = latest, step.equations
+        inertial = equations.regime == "inertial"
+        latest = begin + (step.end * scene.inertial_time if inertial else step.state[2])
+        # spring stress turns where V = V_0; an arrest may pass that between two regimes
+        trough = min(trough, step.before.spring, step.after.spring)
+        if slower(step.before) * slower(step.after) >= 0.0:
+            continue
+        clock = step.locate(slower)
+        turning = step.point_at(clock).spring
+        if slower(step.before) > 0.0:
+            trough = min(trough, turning)
+            continue
+        times.append(begin + float(step.state_at(clock)[2]))
+        if len(times) == number + 1:
+            return times[-1] - times[-2], (turning - trough) / scene.a, meter.spent - work[-1]
+        trough = math.inf
+        work.append(meter.spent)
+    raise AssertionError
+
+
+#: Constant normal stress, b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*: recurrence interval and stress drop
+#: in a sigma_* from an integration in extended precision; which cycle.
+REFERENCES = {
+    "slip": (27.3903182296427, 40.16070456254199, 3),
+    "slowness": (23.9399987067, 37.127939244, 10),
+}
+
+
+@pytest.mark.parametrize("law", sorted(REFERENCES))
+@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
+    scene = Scene(
+        law=law,
+        normal_stress="constant",
+        stiffness_ratio=0.8,
+        load_velocity_ratio=2.0,
+        inertia=True,
+    )
+    recurrence, drop, number = REFERENCES[law]
+    ours = cycle(scene, rtol, number)
+    # the references are given to 12 digits
+    assert ours[0] == pytest.approx(recurrence, rel=rtol + 1e-12)
+    assert ours[1] == pytest.approx(drop, rel=rtol + 1e-11)
+
+
+def test_error_of_the_slow_manifold_goes_with_the_fourth_power_of_the_norm():
+    """What `Accuracy.switch_norm` rests on: 0.03 w**4."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Switched(Accuracy):
+        norm: float = 0.01
+
+        switch_norm = property(lambda self: self.norm)
+        switch_correction = property(lambda _self: math.inf)
+        landing = property(lambda _self: 1e-9)
+        solver = property(lambda _self: 1e-11)
+
+    scene = Scene(
+        normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
+    )
+    exact, _drop, number = REFERENCES["slip"]
+    errors = {
+        norm: abs(cycle(scene, 1e-9, number, Switched(1e-9, 10**7, norm))[0] / exact - 1.0)
+        for norm in (0.02, 0.04)
+    }
+    for norm, error in errors.items():
+        assert error < 0.06 * norm**4
+    assert 8.0 < errors[0.04] / errors[0.02] < 32.0
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
+def test_rupture_agrees_with_a_second_formulation(law, effects):
+    """One rupture in the variables (f, ln V, Theta), integrated implicitly, against ours in (f, ln
+    V, g).
+
+    K eps**2 v dx/dt = f - (a x + Theta)/(1 - F c), dTheta/dt = (G - A a dx/dt)/(1 + A), A = alpha
+    c/(1 - F c).
+    """
+    scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True, **effects)
+    a, b, mu, c, alpha = scene.a, scene.b, scene.mu_star, scene.cot_phi, scene.alpha or 0.0
+    stiffness, eps = scene.stiffness, scene.inertial_time
+    stretch = []
+
+    def until(step):
+        if step.equations.regime == "inertial":
+            stretch.append(step)
+        return bool(stretch) and step.equations.regime != "inertial"
+
+    follow(scene, 1e-9, until)
+    first, last = stretch[0].before, stretch[-1].after
+
+    def rate(_tau, y):
+        f, x, theta = y
+        friction = a * x + theta
+        weight = 1.0 - (mu + friction) * c
+        growth = (f - friction / weight) / (stiffness * math.exp(x) * eps)
+        slip = math.exp(x)
+        if law == "slip":
+            evolution = -slip * (theta + b * x)
+        else:
+            evolution = b * (math.exp(-theta / b) - slip)
+        share = alpha * c / weight
+        return [
+            stiffness * eps * (2.0 - slip),
+            growth,
+            (eps * evolution - share * a * growth) / (1.0 + share),
+        ]
+
+    theta = first.imbalance - b * first.log_rate
+    duration = stretch[-1].end
+    theirs = solve_ivp(
+        rate,
+        (0.0, duration),
+        [first.spring, first.log_rate, theta],
+        method="Radau",
+        rtol=1e-10,
+        atol=1e-13,
+    )
+    assert theirs.success
+    f, x, theta = theirs.y[:, -1]
+    # Radau at 1e-10 over a thousand steps; ln V at arrest falls so fast that a time off by 1e-8
+    # shows
+    assert f == pytest.approx(last.spring, abs=3e-9)
+    assert x == pytest.approx(last.log_rate, abs=1e-8 * duration * abs(last.growth))
+    ratio = 1.0 + c * (a * x + theta) / (1.0 - (mu + a * x + theta) * c)
+    assert theta + alpha * math.log(ratio) == pytest.approx(last.psi, abs=1e-6 * a)
+
+
+def test_inertia_is_integrated_only_where_it_acts():
+    """Between slips the full equations are never used, and a motion that stays slow never builds up
+    their cost.
+    """
+    slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
+    meter = follow(slow, 1e-7, lambda step: step.end > 100.0)
+    assert set(meter.by_regime) == {"slow_manifold"}
+    fast = slow.with_(stiffness_ratio=0.8)
+    regimes = []
+
+    def until(step):
+        regimes.append((step.equations.regime, step.after.log_rate + math.log(fast.inertial_time)))
+        return len(regimes) > 1500
+
+    follow(fast, 1e-7, until)
+    switch = math.log(Accuracy(1e-7).switch_norm)
+    assert all(norm <= switch + 1e-9 for regime, norm in regimes if regime == "slow_manifold")
+    assert {regime for regime, _norm in regimes} == {"slow_manifold", "inertial"}
+
+
+@pytest.mark.parametrize("displacement", [0.5, -0.5])
+def test_psi_is_continuous_across_a_displacement_step(displacement):
+    """Quasi-statically the step moves the spring alone; the state jumps by -alpha
+    ln(sigma/sigma_*), eq. 2.
+    """
+    scene = Scene(displacement_step=displacement)
+    first = next(motion(scene, Accuracy(), Meter(10**4))).before
+    assert first.psi == 0.0
+    assert first.spring == pytest.approx(scene.stiffness * displacement, rel=1e-15)
+    ratio = 1.0 + scene.cot_phi * first.spring
+    state = first.imbalance - scene.b * first.log_rate
+    assert state == pytest.approx(-scene.alpha * math.log(ratio), abs=1e-15)
+
+
+def test_mass_follows_a_displacement_step_within_the_inertial_time():
+    """With mass, a step too fast for the slow manifold moves the spring alone; slip rate
+    follows.
+    """
+    scene = Scene(normal_stress="constant", displacement_step=20.0, inertia=True)
+    fast = scene.inertial_time * math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
+    assert fast > 1.0
+    step = next(motion(scene, Accuracy(), Meter(10**5)))
+    assert step.equations.regime == "inertial"
+    assert (step.before.log_rate, step.before.friction) == (0.0, 0.0)
+    assert step.before.spring == scene.spring_stress_step
+
+
+def test_work_budget_ends_a_motion():
+    with pytest.raises(Halt, match="more than 500 right-hand sides") as halted:
+        follow(Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _s: False, 500)
+    assert halted.value.status is Status.WORK_BUDGET_SPENT
+
+
+@pytest.mark.parametrize(
+    ("displacement", "status"),
+    [(-47.0, Status.SHEAR_STRESS_REVERSED), (-106.0, Status.NORMAL_STRESS_LOST)],
+)
+def test_displacement_steps_that_end_friction_are_named(displacement, status):
+    with pytest.raises(Halt) as halted:
+        next(motion(Scene(displacement_step=displacement), Accuracy(), Meter(10**4)))
+    assert halted.value.status is status
+
+
+def test_equations_that_fail_end_in_a_status_and_not_in_nan():
+    def rate(clock, _state):
+        return [math.nan if clock > 1.0 else 1.0]
+
+    system = Equations("broken", ("y",), (1.0,), rate, lambda s, _r: _point(s))
+    with np.errstate(invalid="ignore"), pytest.raises(Halt) as halted:
+        for _step in steps(system, [0.0], 1e-8, Meter(10**5)):
+            pass
+    assert halted.value.status in (Status.INTEGRATION_FAILED, Status.WORK_BUDGET_SPENT)
+
+
+def _point(state):
+    return Point(float(state[0]), 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("rtol", [0.0, -1.0, 1e-13, 0.1, math.nan])
+def test_accuracy_out_of_reach_is_refused(rtol):
+    with pytest.raises(InvalidValue, match="must lie between 1e-11 and 0.01"):
+        Accuracy(rtol)

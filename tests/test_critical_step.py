@@ -1,0 +1,366 @@
+"""Critical steps: closed forms, limits, a much tighter run, a second formulation, published
+numbers, statuses.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep, error_of_leaving_mass_out
+from rsfstudy.status import Status
+
+RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
+CONSTANT = {"normal_stress": "constant"}
+
+
+def found(scene: Scene, of: str = RATE, direction: str = "up", rtol: float = 1e-7):
+    """Value, error estimate and outcome; the search must succeed."""
+    measure = CriticalStep(of=of, direction=direction)
+    outcome = measure(scene, Accuracy(rtol))
+    assert outcome.status is Status.OK, outcome
+    name = measure.headline
+    return outcome.values[name], outcome.values[f"{name}_error"], outcome
+
+
+# ---- closed forms and limits
+# ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("weakening", [1.0, math.e - 1.0, 2.0, 5.0, 10.0])
+def test_eq_10_at_a_large_norm(weakening):
+    """V_0/V_* = 1 + a/(b-a); at norm 1e3 what is left is below norm**(-lambda**2/kappa)."""
+    scene = Scene(b_over_a=1.0 + weakening, instability_norm=1e3, **CONSTANT)
+    value, error, _outcome = found(scene)
+    left = (scene.instability_norm / scene.inertial_time) ** -weakening
+    assert value - 1.0 == pytest.approx(1.0 / weakening, abs=5 * left + error + 1e-7 / weakening)
+
+
+def test_eq_10_is_approached_from_below_as_the_norm_grows():
+    """At a/(b-a) = 4 the norm of the paper gives 4.66 instead of 5."""
+    values = [
+        found(Scene(b_over_a=1.25, instability_norm=norm, **CONSTANT))[0]
+        for norm in (5e-4, 1.0, 1e6, 1e12)
+    ]
+    assert values[0] == pytest.approx(4.66, abs=0.005)
+    assert values == sorted(values)
+    distance = [5.0 - value for value in values]
+    # the bias goes like norm**-(lambda**2/kappa) = norm**-0.25
+    assert math.log(distance[-2] / distance[-1]) / math.log(1e6) == pytest.approx(0.25, abs=0.01)
+
+
+@pytest.mark.parametrize("stiffness_ratio", [1.0, 1.1, 1.5, 3.0])
+@pytest.mark.parametrize("b_over_a", [1.5, 2.0, 4.0])
+def test_eq_14_displacement_step_at_a_large_norm(stiffness_ratio, b_over_a):
+    """D_c/lambda for every stiffness k >= k_cr, load point held, constant normal stress."""
+    scene = Scene(
+        b_over_a=b_over_a, stiffness_ratio=stiffness_ratio, instability_norm=1e12, **CONSTANT
+    )
+    value, error, _outcome = found(scene, DISPLACEMENT)
+    left = (scene.instability_norm / scene.inertial_time) ** (-(b_over_a - 1.0) / stiffness_ratio)
+    assert value == pytest.approx(1.0 / (b_over_a - 1.0), abs=20 * left + error + 1e-8)
+
+
+@pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
+def test_phi_to_90_degrees_is_constant_normal_stress(of):
+    vanishing, error, _outcome = found(Scene(phi=90.0 - 1e-8), of)
+    absent, _error, _outcome = found(Scene(**CONSTANT), of)
+    assert vanishing == pytest.approx(absent, abs=2 * error + 1e-8)
+
+
+@pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
+def test_alpha_to_zero_is_the_effect_absent(of):
+    vanishing, error, _outcome = found(Scene(alpha=1e-9), of)
+    absent, _error, _outcome = found(Scene(alpha=0.0), of)
+    assert vanishing == pytest.approx(absent, abs=2 * error + 1e-8)
+
+
+def test_alpha_zero_is_not_constant_normal_stress():
+    assert found(Scene(alpha=0.0))[0] == pytest.approx(2.0584, abs=1e-4)
+
+
+# ---- the requested accuracy
+# -----------------------------------------------------------------------
+
+ACCURACY_SCENES = [
+    ({}, RATE),
+    ({"alpha": 0.25}, RATE),
+    (CONSTANT, RATE),
+    ({"b_over_a": 5.0}, RATE),
+    ({"b_over_a": 1.25}, RATE),
+    ({"law": "slowness"}, RATE),
+    ({"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}, RATE),
+    ({"law": "slowness", **CONSTANT}, RATE),
+    ({}, DISPLACEMENT),
+    ({"stiffness_ratio": 1.5, "load_velocity_ratio": 1.0}, DISPLACEMENT),
+    ({"law": "slowness"}, DISPLACEMENT),
+    (CONSTANT, DISPLACEMENT),
+]
+
+
+@pytest.mark.parametrize(("fields", "of"), ACCURACY_SCENES)
+def test_default_accuracy_and_work(fields, of):
+    """Right to 1e-7 of V_0/V_* - 1 (or of the displacement) against rtol 1e-11, within 8,000
+    right-hand sides.
+    """
+    scene = Scene(**fields)
+    value, error, outcome = found(scene, of)
+    exact, _error, _outcome = found(scene, of, rtol=1e-11)
+    size = exact - 1.0 if of == RATE else exact
+    assert abs(value - exact) < 1e-7 * size
+    assert abs(value - exact) <= error
+    assert error < 1e-6 * size
+    assert outcome.rhs_evaluations <= 8_000
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-8, 1e-9, 1e-10])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_requested_tolerance_is_met(law, rtol):
+    scene = Scene(law=law, b_over_a=math.e)
+    value, error, _outcome = found(scene, rtol=rtol)
+    exact, finest, _outcome = found(scene, rtol=1e-11)
+    assert abs(value - exact) < rtol * (exact - 1.0) + finest
+    assert abs(value - exact) <= error + finest
+
+
+@settings(max_examples=30)
+@given(
+    law=st.sampled_from(["slip", "slowness"]),
+    weakening=st.floats(0.2, 6.0),
+    stiffness_ratio=st.floats(1.0, 2.0),
+    alpha=st.floats(0.0, 0.7),
+    phi=st.floats(50.0, 85.0),
+    of=st.sampled_from([RATE, DISPLACEMENT]),
+)
+def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_ratio, alpha, phi, of):
+    scene = Scene(
+        law=law, b_over_a=1.0 + weakening, stiffness_ratio=stiffness_ratio, alpha=alpha, phi=phi
+    )
+    measure = CriticalStep(of=of)
+    loose, tight = measure(scene, Accuracy(1e-6)), measure(scene, Accuracy(1e-10))
+    assert loose.status is tight.status
+    if loose.status is Status.OK:
+        name = measure.headline
+        value, exact = loose.values[name], tight.values[name]
+        allowed = loose.values[f"{name}_error"] + tight.values[f"{name}_error"]
+        assert abs(value - exact) <= allowed
+        assert loose.values[f"{name}_stable"] < value < loose.values[f"{name}_unstable"]
+
+
+# ---- a second formulation
+# ---------------------------------------------------------------------------
+
+
+def peak_in_time(scene: Scene, load: float, displacement: float = 0.0) -> float:
+    """Highest ln V after a step, from the paper's own equations in time: eqs. 1 or 4, 5 and 15.
+
+    Unknowns are slip and the state variable Theta (or ln theta); nothing is shared with the
+    package.
+    """
+    a, b, mu, c, alpha = scene.a, scene.b, scene.mu_star, scene.cot_phi, scene.alpha or 0.0
+    k, norm = scene.stiffness, scene.log_norm_rate
+
+    def stresses(t, slip):
+        tau = mu + k * (load * t + displacement - slip)
+        return tau, 1.0 + c * (tau - mu)
+
+    def slip_rate(t, y):
+        tau, sigma = stresses(t, y[0])
+        return math.exp(min((tau / sigma - mu - y[1]) / a, 60.0)), sigma
+
+    def rate(t, y):
+        v, sigma = slip_rate(t, y)
+        if scene.law == "slip":
+            evolution = -v * (y[1] + b * math.log(v))
+        else:
+            evolution = b * (math.exp(-y[1] / b) - v)
+        return [v, evolution - alpha * c * k * (load - v) / sigma]
+
+    def at_norm(t, y):
+        return math.log(slip_rate(t, y)[0]) - norm
+
+    def slowing(t, y):
+        v, sigma = slip_rate(t, y)
+        tau, _sigma = stresses(t, y[0])
+        friction_rate = k * (load - v) / sigma * (1.0 - tau / sigma * c)
+        return friction_rate - rate(t, y)[1]
+
+    at_norm.terminal = slowing.terminal = True
+    slowing.direction = -1.0
+    start_sigma = 1.0 + c * k * displacement
+    motion = solve_ivp(
+        rate,
+        (0.0, 1e3),
+        [0.0, -alpha * math.log(start_sigma)],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-15,
+        events=(at_norm, slowing),
+    )
+    assert motion.status == 1
+    return math.log(slip_rate(motion.t[-1], motion.y[:, -1])[0])
+
+
+@pytest.mark.parametrize(
+    ("fields", "of"), [case for case in ACCURACY_SCENES if case[0] != CONSTANT]
+)
+def test_a_second_formulation_agrees_on_both_sides(fields, of):
+    """Steps 2e-7 smaller do not reach the norm, steps 2e-7 larger do, by equations written anew."""
+    scene = Scene(**fields)
+    value, _error, _outcome = found(scene, of, rtol=1e-9)
+    held = scene.load_velocity_ratio or 0.0
+    for side, reaches in ((-2e-7, False), (2e-7, True)):
+        if of == RATE:
+            peak = peak_in_time(scene, 1.0 + (value - 1.0) * (1.0 + side))
+        else:
+            peak = peak_in_time(scene, held, value * (1.0 + side))
+        # where it reaches the norm it stops there, to rounding
+        assert (peak >= scene.log_norm_rate - 1e-9) is reaches
+
+
+# ---- published numbers
+# ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "value", "digits"),
+    [
+        (CONSTANT, 1.99995, 5),
+        ({"b_over_a": math.e, **CONSTANT}, 1.581977, 6),
+        ({}, 1.66025, 5),
+        ({"alpha": 0.25}, 1.83416, 5),
+        ({"law": "slowness", "b_over_a": math.e}, 11.8, 1),
+        ({"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}, 2361, 0),
+    ],
+)
+def test_known_rate_steps(fields, value, digits):
+    assert found(Scene(**fields))[0] == pytest.approx(value, abs=0.51 * 10.0**-digits)
+
+
+def test_variable_normal_stress_hardly_moves_the_displacement_boundary():
+    """C10: within a few per cent of D_c/lambda."""
+    for alpha in (0.25, 0.56):
+        for b_over_a in (1.5, 2.0, 3.0):
+            value = found(Scene(alpha=alpha, b_over_a=b_over_a), DISPLACEMENT)[0]
+            assert value * (b_over_a - 1.0) == pytest.approx(1.0, abs=0.03)
+
+
+# ---- mass
+# -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
+def test_mass_below_the_norm_of_the_paper_makes_no_difference(law, of):
+    """Why a boundary at norm 5e-4 is computed without mass even where the scene has it."""
+    without = found(Scene(law=law), of)
+    with_mass = found(Scene(law=law, inertia=True), of)
+    assert with_mass[0] == without[0]
+    assert with_mass[1] >= without[1]
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize(("of", "b_over_a"), [(RATE, 2.0), (RATE, 5.0), (DISPLACEMENT, 2.0)])
+def test_error_of_leaving_mass_out(law, of, b_over_a):
+    """The estimate 0.05 (K/a) w**2 covers what mass does to the boundary at norm w, and is no idle
+    bound.
+    """
+    scene = Scene(law=law, b_over_a=b_over_a, instability_norm=0.01)
+    without = found(scene, of, rtol=1e-9)[0]
+    with_mass = found(scene.with_(inertia=True), of, rtol=1e-8)[0]
+    moved = (
+        abs(math.log(with_mass / without) / math.log(without))
+        if of == RATE
+        else abs(with_mass / without - 1.0)
+    )
+    assert moved < error_of_leaving_mass_out(scene) + 3e-8
+    if law == "slowness" and of == RATE:
+        assert moved > 0.02 * error_of_leaving_mass_out(scene)
+
+
+def test_mass_moves_the_boundary_where_it_acts():
+    """At a norm that mass can resist, the slowness law takes a larger step with mass than
+    without.
+    """
+    norm = 1.0
+    light = found(Scene(law="slowness", instability_norm=norm))[0]
+    heavy = found(Scene(law="slowness", instability_norm=norm, inertia=True))[0]
+    assert heavy > 1.01 * light
+
+
+# ---- statuses
+# -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "of", "direction", "status"),
+    [
+        ({"instability_norm": 5e-9}, RATE, "up", Status.NORM_BELOW_LOADING_RATE),
+        ({"stiffness_ratio": 0.8}, RATE, "up", Status.UNSTABLE_AT_ANY_STEP),
+        ({"inertia": True, "instability_norm": 1e3}, RATE, "up", Status.NORM_UNREACHABLE),
+        (
+            {"law": "slowness", "stiffness_ratio": 5.0},
+            DISPLACEMENT,
+            "up",
+            Status.STABLE_FOR_ALL_STEPS,
+        ),
+        ({}, DISPLACEMENT, "down", Status.STABLE_FOR_ALL_STEPS),
+        ({"law": "slowness", **CONSTANT}, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
+    ],
+)
+def test_answers_without_a_number(fields, of, direction, status):
+    outcome = CriticalStep(of=of, direction=direction)(Scene(**fields), Accuracy())
+    assert outcome.status is status
+    assert outcome.message
+    assert math.isnan(outcome.values.get(KIND[of], math.nan))
+
+
+KIND = {RATE: "critical_velocity_ratio", DISPLACEMENT: "critical_displacement"}
+
+
+def test_a_spent_budget_is_a_failure_with_a_name():
+    outcome = CriticalStep()(Scene(), Accuracy(budget=300))
+    assert outcome.status is Status.WORK_BUDGET_SPENT
+    assert outcome.values == {}
+    assert 300 < outcome.rhs_evaluations < 400
+
+
+def test_downward_steps_can_trigger_too():
+    """Slowing the load point weakens stability (k_cr grows as V falls): a large enough drop of V_0
+    triggers.
+    """
+    scene = Scene(stiffness_ratio=1.1)
+    value, error, outcome = found(scene, direction="down", rtol=1e-5)
+    assert 0.0 < value < 1.0
+    assert outcome.values["critical_velocity_ratio_unstable"] < value
+    tight = found(scene, direction="down", rtol=1e-6)[0]
+    assert abs(value - tight) <= error + 1e-6
+
+
+@pytest.mark.parametrize("fields", [{"of": "stifness"}, {"direction": "sideways"}])
+def test_wrong_questions_are_refused(fields):
+    with pytest.raises(InvalidValue, match="Choices"):
+        rsfstudy.critical_step(Scene(), **fields)
+
+
+def test_public_call_returns_a_small_dataset():
+    """The value the scene holds for the quantity sought is ignored; the rest of the scene is
+    not.
+    """
+    dataset = rsfstudy.critical_step(Scene(load_velocity_ratio=7.0))
+    assert float(dataset.critical_velocity_ratio) == pytest.approx(1.66025, abs=1e-5)
+    assert dataset.attrs["status"] == "ok"
+    assert dataset.critical_velocity_ratio.attrs["scale"] == "V_*"
+    step = rsfstudy.critical_step(Scene(displacement_step=9.0), of=DISPLACEMENT)
+    held = rsfstudy.critical_step(Scene(load_velocity_ratio=0.0), of=DISPLACEMENT)
+    moving = rsfstudy.critical_step(Scene(load_velocity_ratio=1.0), of=DISPLACEMENT)
+    assert float(step.critical_displacement) == float(held.critical_displacement)
+    assert float(moving.critical_displacement) < float(held.critical_displacement)
+    assert np.isfinite(float(step.slip_rate_after_step))

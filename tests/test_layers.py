@@ -1,0 +1,88 @@
+"""A lower floor never imports a higher one; Dask and matplotlib stay where they belong."""
+
+import ast
+from pathlib import Path
+
+import rsfstudy
+
+ROOT = Path(rsfstudy.__file__).parent
+
+FLOORS = {
+    "errors": 0,
+    "status": 0,
+    "vocabulary": 0,
+    "laws": 1,
+    "effects": 1,
+    "loading": 1,
+    "steady_state": 1,
+    "scene": 2,
+    "equations": 2,
+    "core": 3,
+    "measures": 4,
+    "trajectory": 5,
+    "claims": 5,
+    "reduce": 5,
+    "study": 5,
+    "lattice": 5,
+    "store": 5,
+    "journal": 5,
+    "provenance": 5,
+    "workers": 6,
+    "runner": 6,
+    "catalogue": 6,
+    "plots": 7,
+    "api": 7,
+    "cli": 7,
+    "__init__": 7,
+}
+#: Only these may import a library that would weigh on all others.
+HOMES = {
+    "dask": {"workers"},
+    "distributed": {"workers"},
+    "matplotlib": {"plots"},
+    "click": {"cli"},
+    "rich": {"api", "cli"},
+    "sqlite3": {"journal"},
+}
+
+
+def imports(file: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def room(file: Path) -> str:
+    return file.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def test_every_module_has_a_floor():
+    assert {room(file) for file in ROOT.rglob("*.py")} == set(FLOORS)
+
+
+def test_imports_point_down():
+    for file in ROOT.rglob("*.py"):
+        for name in imports(file):
+            parts = name.split(".")
+            if parts[0] == "rsfstudy" and len(parts) > 1 and parts[1] in FLOORS:
+                assert FLOORS[parts[1]] <= FLOORS[room(file)], f"{file} imports {name}"
+
+
+def test_heavy_libraries_stay_in_their_rooms():
+    for file in ROOT.rglob("*.py"):
+        for name in imports(file):
+            home = HOMES.get(name.split(".")[0])
+            assert home is None or room(file) in home, f"{file} imports {name}"
+
+
+def test_physics_is_plain_python():
+    """Laws and effects are functions of floats that need nothing but `math`."""
+    allowed = ("math", "__future__", "rsfstudy", "importlib", "pkgutil", "collections")
+    for folder in ("laws", "effects"):
+        for file in (ROOT / folder).glob("*.py"):
+            for name in imports(file):
+                assert name.split(".")[0] in allowed, f"{file} imports {name}"

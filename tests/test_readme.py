@@ -1,0 +1,71 @@
+"""The README tells the truth: its Python runs as it stands, its commands exist, its numbers are
+ours.
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rsfstudy
+from rsfstudy.cli import cli
+
+README = (Path(__file__).parent.parent / "README.md").read_text()
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+def test_there_are_examples():
+    assert len(BLOCKS) >= 4
+
+
+@pytest.mark.parametrize("number", range(len(BLOCKS)))
+def test_python_runs_as_it_stands(number, tmp_path):
+    """In an empty directory, in this order where one uses another's results."""
+    code = BLOCKS[number]
+    if "outputs/rate_step_boundary.nc" in code:
+        rsfstudy.run("rate_step_boundary", workers=0, output=tmp_path / "outputs", progress=False)
+        (tmp_path / "test_block.py").write_text(code)
+        command = [sys.executable, "-m", "pytest", "-q", "test_block.py"]
+    else:
+        (tmp_path / "block.py").write_text(code)
+        command = [sys.executable, "block.py"]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def test_commands_and_options_exist():
+    for command in re.findall(r"^rsfstudy (\w+)", README, re.MULTILINE):
+        assert command in cli.commands
+    options = {
+        option for command in cli.commands.values() for o in command.params for option in o.opts
+    }
+    for option in re.findall(r"`(--[a-z]+)", README):
+        assert option in options
+
+
+def test_every_study_is_listed():
+    for name in rsfstudy.studies():
+        assert f"| `{name}` |" in README
+
+
+def test_the_table_of_zeta_is_ours():
+    dataset = rsfstudy.run("rate_step_boundary", workers=0, output=None, progress=False)
+    rows = re.findall(
+        r"^\| (constant normal stress|alpha = [\d.]+) \| ([\d.]+) \| ([\d.]+) \|", README, re.M
+    )
+    assert len(rows) == dataset.sizes["case"]
+    for case, zeta, error in rows:
+        row = dataset.sel(case=case)
+        digits = len(zeta.split(".")[1])
+        assert float(row.zeta) == pytest.approx(float(zeta), abs=0.51 * 10.0**-digits)
+        digits = len(error.split(".")[1])
+        assert float(row.zeta_stderr) == pytest.approx(float(error), abs=0.51 * 10.0**-digits)
+
+
+def test_every_room_of_the_tree_is_there():
+    root = Path(rsfstudy.__file__).parent
+    for name in re.findall(r"^  ((?:[a-z_]+/?,? +)*[a-z_]+/?) {2,}", README, re.MULTILINE):
+        for room in re.split(r"[ ,]+", name):
+            assert (root / room).is_dir() or (root / f"{room}.py").is_file(), room

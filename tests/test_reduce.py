@@ -1,0 +1,153 @@
+"""Reductions and claims on made-up datasets, where the right answer is known."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsfstudy.claims import Claim, verdicts
+from rsfstudy.errors import InvalidValue
+from rsfstudy.reduce import ProportionalFit, RelativeDifference, reduced
+from rsfstudy.status import Status
+
+X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
+FIT = ProportionalFit(
+    name="zeta", of="critical_velocity_ratio", on="a_over_b_minus_a", minus=1.0, within=(0.25, 1.0)
+)
+
+
+def lattice(values, status=None) -> xr.Dataset:
+    values = np.asarray(values, dtype=float)
+    codes = np.zeros(values.shape, dtype=np.int8) if status is None else np.asarray(status, np.int8)
+    dims = ("case", "b_over_a")[-values.ndim :]
+    return xr.Dataset(
+        {"critical_velocity_ratio": (dims, values), "status": (dims, codes)},
+        coords={
+            "b_over_a": 1.0 + 1.0 / X,
+            "a_over_b_minus_a": ("b_over_a", X),
+            **({"case": ["reference", "other"]} if values.ndim == 2 else {}),
+        },
+    )
+
+
+@given(st.floats(0.1, 3.0))
+def test_an_exact_law_is_fitted_exactly(slope):
+    result = reduced(lattice(1.0 + slope * X), (FIT,))
+    assert float(result.zeta) == pytest.approx(slope, rel=1e-13)
+    assert float(result.zeta_misfit) < 1e-14 * (1 + slope)
+    assert int(result.zeta_points) == 3
+
+
+@given(st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
+def test_fit_agrees_with_numpy(noise):
+    """Slope and standard error against numpy's least squares with one column."""
+    values = 1.0 + 0.7 * X + np.array(noise)
+    result = reduced(lattice(values), (FIT,))
+    x, y = X[:3], values[:3] - 1.0
+    (slope,), (residual,), _rank, _s = np.linalg.lstsq(x[:, None], y, rcond=None)
+    assert float(result.zeta) == pytest.approx(slope, rel=1e-12)
+    assert float(result.zeta_stderr) == pytest.approx(
+        np.sqrt(residual / 2 / (x @ x)), rel=1e-9, abs=1e-15
+    )
+    assert float(result.zeta_misfit) == pytest.approx(np.abs(y - slope * x).max(), abs=1e-14)
+
+
+@pytest.mark.parametrize("status", [Status.WORK_BUDGET_SPENT, Status.PENDING, Status.WORKER_LOST])
+def test_failed_cells_within_the_support_are_refused(status):
+    codes = np.zeros((2, 5))
+    codes[0, 1] = status
+    values = np.tile(1.0 + 0.5 * X, (2, 1))
+    values[0, 1] = np.nan
+    result = reduced(lattice(values, codes), (FIT,))
+    assert np.isnan(result.zeta.sel(case="reference"))
+    assert float(result.zeta.sel(case="other")) == pytest.approx(0.5)
+    assert "failed or are missing" in result.zeta.attrs["refused"]
+
+
+def test_failed_cells_outside_of_the_support_do_not_matter():
+    codes = np.zeros(5)
+    codes[4] = Status.INTEGRATION_FAILED
+    result = reduced(lattice(1.0 + 0.5 * X, codes), (FIT,))
+    assert float(result.zeta) == pytest.approx(0.5)
+    assert "refused" not in result.zeta.attrs
+
+
+def test_answers_without_a_number_are_left_out_and_counted():
+    codes, values = np.zeros(5), 1.0 + 0.5 * X
+    codes[0], values[0] = Status.STABLE_FOR_ALL_STEPS, np.nan
+    result = reduced(lattice(values, codes), (FIT,))
+    assert float(result.zeta) == pytest.approx(0.5)
+    assert int(result.zeta_points) == 2
+
+
+def test_a_fit_needs_a_coordinate():
+    with pytest.raises(InvalidValue, match="must be a coordinate along one dimension"):
+        reduced(lattice(X), (ProportionalFit(name="zeta", of="critical_velocity_ratio", on="z"),))
+
+
+def test_relative_difference():
+    compare = RelativeDifference(
+        name="lowering", of="critical_velocity_ratio", along="case", reference="reference"
+    )
+    result = reduced(lattice([2.0 * X, 1.5 * X]), (compare,))
+    np.testing.assert_allclose(result.lowering.sel(case="other"), 0.25, rtol=1e-15)
+    without = reduced(lattice([2.0 * X, 1.5 * X]).isel(case=[1]), (compare,))
+    assert without.lowering.isnull().all()
+
+
+def claim(**fields) -> Claim:
+    defaults = {
+        "id": "C0",
+        "statement": "a claim",
+        "source": "nowhere",
+        "variable": "critical_velocity_ratio",
+        "where": {"a_over_b_minus_a": 1.0},
+        "published": 2.0,
+        "tolerance": 0.1,
+        "reason": "none",
+    }
+    return Claim(**{**defaults, **fields})
+
+
+@pytest.mark.parametrize(
+    ("relation", "value", "verdict"),
+    [
+        ("equals", 2.09, "reproduced"),
+        ("equals", 2.11, "differs"),
+        ("equals", 1.89, "differs"),
+        ("below", 2.09, "reproduced"),
+        ("below", 2.11, "differs"),
+        ("above", 1.91, "reproduced"),
+        ("above", 1.89, "differs"),
+        ("equals", np.nan, "undecided"),
+    ],
+)
+def test_verdicts(relation, value, verdict):
+    table = verdicts(lattice(np.full(5, value)), [claim(relation=relation)], {})
+    assert table.verdict[0] == verdict
+    assert table.moved[0] == (verdict != "reproduced")
+
+
+def test_an_expected_difference_does_not_move():
+    off = [claim(published=3.0, expected="differs", because="a misprint")]
+    assert not verdicts(lattice(np.full(5, 2.0)), off, {}).moved[0]
+    assert verdicts(lattice(np.full(5, 3.0)), off, {}).moved[0]
+
+
+def test_claims_on_places_that_are_not_there_do_not_apply():
+    table = verdicts(lattice(np.full(5, 9.0)), [claim(where={"a_over_b_minus_a": 0.7})], {})
+    assert (table.verdict[0], table.moved[0]) == ("not applicable", False)
+
+
+def test_claims_do_not_apply_to_another_scene():
+    table = verdicts(lattice(np.full(5, 9.0)), [claim()], {"stiffness_ratio": 1.1})
+    assert table.verdict[0] == "not applicable"
+    other_axis = verdicts(lattice(np.full(5, 9.0)), [claim()], {"b_over_a": [2.0]})
+    assert other_axis.verdict[0] == "differs"
+
+
+@pytest.mark.parametrize("fields", [{"relation": "near"}, {"expected": "maybe"}])
+def test_claims_are_checked(fields):
+    with pytest.raises(InvalidValue):
+        claim(**fields)

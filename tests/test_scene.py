@@ -1,0 +1,93 @@
+"""A scene that exists is meaningful: everything else is refused with value, rule, choices and
+remedy.
+"""
+
+import dataclasses
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsfstudy import Scene
+from rsfstudy.errors import InvalidValue
+
+WRONG = [
+    ({"law": "slipp"}, r"law = 'slipp'.*Did you mean 'slip'.*slowness"),
+    ({"normal_stress": "fixed"}, r"normal_stress = 'fixed'.*constant, variable"),
+    ({"b_over_a": 0.0}, r"b_over_a = 0.0: must be greater than 0"),
+    ({"b_over_a": -1.0}, r"b_over_a = -1.0"),
+    ({"b_over_a": 1.0}, r"b_over_a = 1.0: must exceed 1.*rate weakening"),
+    ({"a": 0.0}, r"a = 0.0: must be greater than 0"),
+    ({"a": math.nan}, r"a = nan: must be finite"),
+    ({"a": "0.01"}, r"a = '0.01': must be a number"),
+    ({"a": True}, r"a = True: must be a number"),
+    ({"mu_star": 0.0}, r"mu_star = 0.0"),
+    ({"stiffness_ratio": 0.0}, r"stiffness_ratio = 0.0: must be greater than 0"),
+    ({"stiffness_ratio": -1.0}, r"stiffness_ratio = -1.0"),
+    ({"phi": 0.0}, r"phi = 0.0"),
+    ({"phi": 90.0}, r"phi = 90.0: must lie between 0 and 90.*normal_stress='constant'"),
+    ({"phi": 37.0}, r"phi = 37.0: must exceed atan\(mu_star\) = 37.2.* sigma_3"),
+    ({"alpha": -0.1}, r"alpha = -0.1: must be 0 or greater"),
+    ({"alpha": math.inf}, r"alpha = inf: must be finite"),
+    ({"normal_stress": "constant", "alpha": 0.5}, r"alpha = 0.5: has no meaning.*Leave alpha out"),
+    ({"normal_stress": "constant", "phi": 60.0}, r"phi = 60.0: has no meaning"),
+    ({"load_velocity_ratio": -1.0}, r"load_velocity_ratio = -1.0.*0 holds the load point"),
+    ({"load_velocity_ratio": math.nan}, r"load_velocity_ratio = nan: must be finite"),
+    ({"displacement_step": math.inf}, r"displacement_step = inf: must be finite"),
+    ({"inertia": "yes"}, r"inertia = 'yes': must be true or false"),
+    ({"period": 0.0}, r"period = 0.0"),
+    ({"reference_rate": -1.0}, r"reference_rate = -1.0"),
+    ({"instability_norm": 0.0}, r"instability_norm = 0.0"),
+]
+
+
+@pytest.mark.parametrize(("fields", "message"), WRONG)
+def test_wrong_values_are_refused_with_the_rule(fields, message):
+    with pytest.raises(InvalidValue, match=message):
+        Scene(**fields)
+
+
+def test_a_scene_cannot_be_changed(variable):
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        variable.a = 0.01
+
+
+def test_unknown_field_suggests(variable):
+    with pytest.raises(InvalidValue, match="'stifness_ratio'.*Did you mean 'stiffness_ratio'"):
+        variable.with_(stifness_ratio=2.0)
+
+
+def test_table_1_is_the_default():
+    scene = Scene()
+    assert (scene.a, scene.mu_star, scene.phi, scene.alpha) == (0.0145, 0.76, 60.0, 0.56)
+    assert (scene.period, scene.reference_rate) == (5.0, 1.17e-8)
+    # T V_*/(2 pi D_c) of Table 1
+    assert scene.inertial_time == pytest.approx(9.31e-9, rel=1e-3)
+
+
+def test_load_point_is_held_after_a_displacement_step_unless_said_otherwise():
+    assert Scene().load_velocity == 1.0
+    assert Scene(displacement_step=1.0).load_velocity == 0.0
+    assert Scene(displacement_step=1.0, load_velocity_ratio=3.0).load_velocity == 3.0
+
+
+def test_effects_are_those_the_scene_calls_for():
+    assert Scene(normal_stress="constant").effects == ()
+    assert Scene(alpha=0.0).effects == ("inclined_driving",)
+    assert Scene(inertia=True).effects == ("inclined_driving", "linker_dieterich", "inertia")
+
+
+@given(
+    a=st.floats(1e-4, 0.1),
+    b_over_a=st.floats(1.01, 21.0),
+    mu_star=st.floats(0.1, 1.0),
+    alpha=st.floats(0.0, 1.2),
+    tilt=st.floats(0.01, 0.99),
+)
+def test_stiffness_is_positive_for_every_scene(a, b_over_a, mu_star, alpha, tilt):
+    lowest = math.degrees(math.atan(mu_star))
+    scene = Scene(
+        a=a, b_over_a=b_over_a, mu_star=mu_star, alpha=alpha, phi=lowest + tilt * (90.0 - lowest)
+    )
+    assert 0.0 < scene.stiffness < math.inf

@@ -1,0 +1,165 @@
+"""Contract of every named study found: it runs, its file stands alone, its figure is drawn, its
+claims are sound.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import rsfstudy
+from rsfstudy import catalogue, plots, vocabulary
+from rsfstudy.status import Status
+
+FLAGS = {"status", "regime", "inertia"}
+
+
+@pytest.fixture(scope="module", params=catalogue.names())
+def result(request, tmp_path_factory):
+    """The default lattice of each study, on two workers, and where its file is."""
+    output = tmp_path_factory.mktemp(request.param)
+    dataset = rsfstudy.run(request.param, output=output, progress=False)
+    return dataset, output / f"{request.param}.nc"
+
+
+def test_the_study_is_named_as_its_file(result):
+    dataset, path = result
+    assert catalogue.load(path.stem).name == path.stem == dataset.attrs["id"]
+
+
+def test_every_cell_is_answered(result):
+    dataset, _path = result
+    assert (dataset.status <= int(Status.NORM_UNREACHABLE)).all()
+    assert dataset.attrs["completeness"] == "complete"
+
+
+def test_every_verdict_is_the_expected_one(result):
+    table = rsfstudy.check(result[0])
+    assert len(table) == len(catalogue.load(result[1].stem).claims)
+    assert not table.moved.any(), table.to_string()
+    assert not (table.verdict == "not applicable").any()
+
+
+def test_the_file_stands_alone(result):
+    """Opened without rsfstudy, it shows units and long names on every variable, and where it comes
+    from.
+    """
+    script = (
+        "import sys, json, xarray; d = xarray.open_dataset(sys.argv[1]); "
+        "assert 'rsfstudy' not in sys.modules; "
+        "print(json.dumps({n: dict(long_name=v.attrs.get('long_name'), units=v.attrs.get('units'), "
+        "kind=v.dtype.kind) for n, v in d.variables.items()}))"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", script, str(result[1])],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONWARNINGS": "ignore"},
+    )
+    for name, about in json.loads(found.stdout).items():
+        assert about["long_name"], name
+        text = about["kind"] in "OUST" or name in FLAGS
+        assert bool(about["units"]) is not text, name
+
+
+def test_the_compliance_checker_reports_no_error(result):
+    checked = subprocess.run(
+        [
+            os.path.join(os.path.dirname(sys.executable), "compliance-checker"),
+            "-t",
+            "cf:1.11",
+            "-f",
+            "json",
+            "-o",
+            "-",
+            str(result[1]),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    report = json.loads(checked.stdout[checked.stdout.index("{") :])
+    found = next(iter(report.values())) if "cf:1.11" not in report else report["cf:1.11"]
+    errors = [priority["msgs"] for priority in found["high_priorities"] if priority["msgs"]]
+    assert errors == []
+
+
+def test_the_declaration_in_the_file_is_the_study(result):
+    declared = json.loads(result[0].attrs["declaration"])
+    described = catalogue.load(result[1].stem).describe()
+    assert declared == json.loads(json.dumps(described))
+
+
+def test_every_number_carries_status_error_and_work(result):
+    dataset, _path = result
+    headline = catalogue.load(result[1].stem).measure.headline
+    for name in (headline, f"{headline}_error", "status", "rhs_evaluations", "wall_time"):
+        assert name in dataset
+    ok = dataset.status == int(Status.OK)
+    assert dataset[f"{headline}_error"].where(ok, 0.0).notnull().all()
+    assert "status" in dataset[headline].attrs["ancillary_variables"]
+
+
+def test_the_figure_is_drawn(result, tmp_path):
+    dataset, _path = result
+    figure = plots.figure(dataset)
+    for axes in figure.axes:
+        assert axes.get_xlabel()
+        assert axes.get_ylabel()
+    plots.save(dataset, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+def test_a_partial_figure_says_so(result):
+    dataset = result[0].assign_attrs(completeness="partial: 1 of 2 cells")
+    assert "partial: 1 of 2" in plots.figure(dataset).axes[0].get_title()
+
+
+def test_a_plot_outside_of_the_package_is_never_imported(result):
+    declared = json.loads(result[0].attrs["declaration"])
+    declared["plot"] = "os"
+    foreign = result[0].assign_attrs(declaration=json.dumps(declared))
+    with pytest.raises(rsfstudy.errors.InvalidValue, match="plot = 'os': is unknown"):
+        plots.figure(foreign)
+
+
+def test_the_plain_plot_draws_any_lattice(result):
+    declared = json.loads(result[0].attrs["declaration"])
+    declared["plot"] = "lines"
+    figure = plots.figure(result[0].assign_attrs(declaration=json.dumps(declared)))
+    assert figure.axes[0].lines
+
+
+def test_vocabulary_describes_itself():
+    for name, quantity in vocabulary.QUANTITIES.items():
+        assert quantity.name == name
+        assert quantity.long_name
+        assert quantity.axis_label
+    error = vocabulary.quantity("critical_displacement_error")
+    assert error.long_name.startswith("numerical error estimate of critical load point")
+    assert error.scale == "D_c"
+
+
+def rate_step_boundary() -> xr.Dataset:
+    return rsfstudy.run("rate_step_boundary", workers=0, output=None, progress=False)
+
+
+def test_rate_step_boundary_is_figure_5():
+    dataset = rate_step_boundary()
+    assert set(dataset.critical_velocity_ratio.dims) == {"case", "b_over_a"}
+    held = {0.25, 0.5, 1.0, 2.0, 4.0}
+    assert all(np.isclose(dataset.a_over_b_minus_a, x, rtol=1e-12).any() for x in held)
+    zeta = {str(case): float(dataset.zeta.sel(case=case)) for case in dataset.case.values}
+    assert zeta["constant normal stress"] == pytest.approx(1.0, abs=1e-4)
+    assert zeta["alpha = 0.25"] == pytest.approx(0.84, abs=0.01)
+    assert zeta["alpha = 0.56"] == pytest.approx(0.664, abs=0.01)
+    assert (dataset.zeta_stderr < 0.003).all()
+    # at a/(b-a) = 4 the finite norm bends even the constant-stress curve: 4.66 instead of 5
+    bent = dataset.critical_velocity_ratio.sel(case="constant normal stress").isel(b_over_a=-1)
+    assert float(bent) == pytest.approx(4.66, abs=0.005)
+    assert int(dataset.rhs_evaluations.max()) <= 8_000

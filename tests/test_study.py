@@ -1,0 +1,124 @@
+"""Declarations: axes, zipped axes, overrides, and everything that is refused before any work
+starts.
+"""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+
+CASES = {
+    "constant": {"normal_stress": "constant"},
+    "weak": {"normal_stress": "variable", "alpha": 0.25},
+    "strong": {"normal_stress": "variable", "alpha": 0.56},
+}
+
+
+def study(*axes: Axis, **fields) -> Study:
+    return Study(
+        name="trial", title="Trial", base=Scene(), axes=axes, measure=CriticalStep(), **fields
+    )
+
+
+@pytest.mark.parametrize(
+    ("dimension", "values", "message"),
+    [
+        ("b_over_a", [], "b_over_a.*has no values"),
+        ("b_over_a", [2.0, 2.0], "stands twice"),
+        ("b_over_a", [2.0, math.nan], "must be finite"),
+        ("b_ovr_a", [2.0], "Did you mean 'b_over_a'"),
+        ("case", [2.0], "is not a field"),
+        ("law", {"x": {"law": "slip"}}, "needs a name of its own"),
+        ("case", {"x": {"alfa": 0.1}}, "Did you mean 'alpha'"),
+    ],
+)
+def test_meaningless_axes_are_refused(dimension, values, message):
+    with pytest.raises(InvalidValue, match=message):
+        Axis(dimension, values)
+
+
+def test_axes_must_not_vary_the_same_field():
+    with pytest.raises(InvalidValue, match="varies 'alpha', as 'case' does already"):
+        study(Axis("case", CASES), Axis("alpha", [0.1, 0.2]))
+
+
+def test_cells_run_over_the_last_axis_first():
+    declared = study(Axis("case", CASES), Axis("b_over_a", [2.0, 3.0]))
+    assert (declared.dimensions, declared.shape, declared.size) == (("case", "b_over_a"), (3, 2), 6)
+    cells = [(s.normal_stress, s.alpha, s.b_over_a) for s in declared.scenes()]
+    assert cells[:3] == [
+        ("constant", None, 2.0),
+        ("constant", None, 3.0),
+        ("variable", 0.25, 2.0),
+    ]
+
+
+def test_values_that_do_not_apply_are_left_out_of_constant_normal_stress():
+    declared = study(Axis("normal_stress", ["constant", "variable"]), Axis("phi", [50.0, 60.0]))
+    assert [s.phi for s in declared.scenes()] == [None, None, 50.0, 60.0]
+
+
+def test_a_cell_that_makes_no_scene_names_its_place():
+    declared = study(Axis("b_over_a", [2.0, 3.0]), Axis("phi", [30.0, 60.0]))
+    with pytest.raises(InvalidValue, match="b_over_a=2.0, phi=30.0.*must exceed atan"):
+        list(declared.scenes())
+
+
+def test_contradictory_points_are_refused():
+    declared = study(Axis("case", {"x": {"normal_stress": "constant", "alpha": 0.5}}))
+    with pytest.raises(InvalidValue, match="alpha = 0.5: has no meaning"):
+        list(declared.scenes())
+
+
+def test_override_of_an_axis_replaces_its_values():
+    changed = study(Axis("b_over_a", [2.0, 3.0])).with_(b_over_a=[4, np.float64(5.0)])
+    assert [s.b_over_a for s in changed.scenes()] == [4.0, 5.0]
+    assert study(Axis("b_over_a", [2.0, 3.0])).with_(b_over_a=7).shape == (1,)
+
+
+def test_override_of_a_fixed_value():
+    assert {s.stiffness_ratio for s in study().with_(stiffness_ratio=1.5).scenes()} == {1.5}
+
+
+def test_a_list_for_a_fixed_value_makes_an_axis():
+    changed = study(Axis("b_over_a", [2.0, 3.0])).with_(phi=[50, 60, 70])
+    assert changed.dimensions == ("phi", "b_over_a")
+    assert changed.shape == (3, 2)
+
+
+def test_override_along_a_zipped_axis_touches_only_the_points_that_use_it():
+    changed = study(Axis("case", CASES)).with_(alpha=[0.1, 0.4])
+    assert [s.alpha for s in changed.scenes()] == [None, 0.1, 0.4]
+    assert study(Axis("case", CASES)).with_(alpha=0.3).shape == (2,)
+
+
+def test_labels_select_points():
+    assert [s.alpha for s in study(Axis("case", CASES)).with_(case=["strong"]).scenes()] == [0.56]
+    with pytest.raises(InvalidValue, match="Did you mean 'strong'"):
+        study(Axis("case", CASES)).with_(case="strongg")
+
+
+def test_unknown_overrides_suggest():
+    with pytest.raises(InvalidValue, match="Did you mean 'stiffness_ratio'"):
+        study().with_(stifness_ratio=1.0)
+
+
+@given(st.lists(st.floats(1.01, 50.0), min_size=1, max_size=5, unique=True), st.booleans())
+def test_declarations_are_plain_data(values, zipped):
+    axes = [Axis("b_over_a", values), *([Axis("case", CASES)] if zipped else [])]
+    declared = study(*axes).with_(stiffness_ratio=1.2)
+    text = json.dumps(declared.describe(), allow_nan=False)
+    assert json.loads(text)["axes"][0]["values"] == values
+
+
+@pytest.mark.parametrize("name", ["", "two words", "a/b", "../x"])
+def test_names_that_are_no_file_names_are_refused(name):
+    with pytest.raises(InvalidValue, match="identifier"):
+        Study(name=name, title="", base=Scene(), axes=[], measure=CriticalStep())

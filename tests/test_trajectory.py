@@ -1,0 +1,84 @@
+"""One motion as a labelled trajectory."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.errors import InvalidValue
+
+
+def test_steady_sliding_stays_steady():
+    """Without a step, slip is load point displacement and everything else rests."""
+    motion = rsfstudy.simulate(Scene(), duration=20.0)
+    np.testing.assert_allclose(motion.slip, motion.time, atol=1e-12)
+    np.testing.assert_allclose(motion.log10_slip_rate, 0.0, atol=1e-12)
+    np.testing.assert_allclose(motion.shear_stress, 0.76, atol=1e-12)
+    np.testing.assert_allclose(motion.normal_stress_ratio, 1.0, atol=1e-12)
+    assert float(motion.time[-1]) == pytest.approx(20.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+def test_a_stable_step_ends_in_the_new_steady_state(inertia):
+    """tau_ss and sigma_ss at V_0, from the steady-state friction and the inclined geometry."""
+    scene = Scene(load_velocity_ratio=1.5, stiffness_ratio=2.0, inertia=inertia)
+    motion = rsfstudy.simulate(scene, duration=300.0, rtol=1e-9)
+    mu_ss = scene.mu_star - (scene.b - scene.a) * math.log(1.5)
+    sigma = (1 - scene.mu_star * scene.cot_phi) / (1 - mu_ss * scene.cot_phi)
+    end = motion.isel(sample=-1)
+    assert float(end.log10_slip_rate) == pytest.approx(math.log10(1.5), abs=1e-8)
+    assert float(end.normal_stress_ratio) == pytest.approx(sigma, abs=1e-9)
+    assert float(end.shear_stress) == pytest.approx(mu_ss * sigma, abs=1e-9)
+    assert float(end.state_variable) == pytest.approx(-scene.b * math.log(1.5), abs=1e-9)
+
+
+def test_slip_is_the_integral_of_slip_rate():
+    motion = rsfstudy.simulate(Scene(load_velocity_ratio=1.5, law="slowness"), duration=30.0)
+    rate = 10.0**motion.log10_slip_rate
+    slip = np.concatenate(
+        [[0.0], np.cumsum(np.diff(motion.time) * (rate[1:] + rate[:-1]).values / 2)]
+    )
+    # trapezoids between samples
+    np.testing.assert_allclose(motion.slip, slip, rtol=1e-3, atol=1e-3)
+
+
+def test_friction_law_holds_along_the_way():
+    """tau/sigma = mu_* + a ln V + Theta wherever mass does not act: eq. 1a."""
+    scene = Scene(load_velocity_ratio=1.5, displacement_step=0.2)
+    motion = rsfstudy.simulate(scene, duration=30.0)
+    friction = motion.shear_stress / motion.normal_stress_ratio
+    law = scene.mu_star + scene.a * math.log(10.0) * motion.log10_slip_rate + motion.state_variable
+    np.testing.assert_allclose(friction, law, atol=1e-13)
+
+
+def test_stick_slip_runs_through_its_regimes_in_one_time():
+    scene = Scene(
+        normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
+    )
+    motion = rsfstudy.simulate(scene, duration=100.0)
+    assert motion.attrs["status"] == "ok"
+    assert (np.diff(motion.time) >= 0.0).all()
+    assert (np.diff(motion.slip) > -1e-9).all()
+    assert set(np.unique(motion.regime)) == {1, 2}
+    assert float(motion.log10_slip_rate.max()) == pytest.approx(9.39, abs=0.01)
+    assert float(motion.log10_slip_rate.min()) == pytest.approx(-1.397, abs=0.002)
+    work = json.loads(motion.attrs["rhs_evaluations_by_regime"])
+    assert sum(work.values()) == motion.attrs["rhs_evaluations"]
+
+
+def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
+    cut = rsfstudy.simulate(Scene(load_velocity_ratio=2.0), duration=1e3, budget=500)
+    assert cut.attrs["status"] == "work_budget_spent"
+    assert cut.sizes["sample"] > 10
+    opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
+    assert opened.attrs["status"] == "normal_stress_lost"
+    assert opened.sizes["sample"] == 0
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf])
+def test_meaningless_durations_are_refused(duration):
+    with pytest.raises(InvalidValue, match="duration"):
+        rsfstudy.simulate(Scene(), duration=duration)
