@@ -275,6 +275,22 @@ def test_displacement_steps_that_end_friction_are_named(displacement, status):
     assert halted.value.status is status
 
 
+def test_a_slider_that_locks_is_named():
+    """phi = 33 degrees is just above atan(0.6): slowed down, normal stress grows without bound."""
+    scene = Scene(
+        law="slowness",
+        b_over_a=8.1,
+        a=0.066,
+        mu_star=0.6,
+        phi=33.0,
+        alpha=0.0,
+        load_velocity_ratio=0.3,
+    )
+    with pytest.raises(Halt, match="normal stress grew") as halted:
+        follow(scene, 1e-6, lambda step: step.after.log_rate > 30.0)
+    assert halted.value.status is Status.LOCKED
+
+
 def test_equations_that_fail_end_in_a_status_and_not_in_nan():
     def rate(clock, _state):
         return [math.nan if clock > 1.0 else 1.0]

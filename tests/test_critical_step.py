@@ -13,8 +13,11 @@ from scipy.integrate import solve_ivp
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Meter
+from rsfstudy.equations import log_rate_at
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep, error_of_leaving_mass_out
+from rsfstudy.measures.swing import swing
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -305,13 +308,31 @@ def test_mass_moves_the_boundary_where_it_acts():
         ({"instability_norm": 5e-9}, RATE, "up", Status.NORM_BELOW_LOADING_RATE),
         ({"stiffness_ratio": 0.8}, RATE, "up", Status.UNSTABLE_AT_ANY_STEP),
         ({"inertia": True, "instability_norm": 1e3}, RATE, "up", Status.NORM_UNREACHABLE),
-        (
-            {"law": "slowness", "stiffness_ratio": 5.0},
-            DISPLACEMENT,
-            "up",
-            Status.STABLE_FOR_ALL_STEPS,
-        ),
         ({}, DISPLACEMENT, "down", Status.STABLE_FOR_ALL_STEPS),
+        # a critical path exists for a large step, but steady sliding is unstable already
+        (
+            {"law": "slowness", "b_over_a": 5.0, "stiffness_ratio": 0.8},
+            RATE,
+            "up",
+            Status.UNSTABLE_AT_ANY_STEP,
+        ),
+        # every orbit closes at k = k_cr: what rounding makes of a deep down-swing does not count
+        (CONSTANT, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
+        # phi close to atan(mu_*): normal stress outgrows strength
+        (
+            {
+                "law": "slowness",
+                "a": 0.066,
+                "b_over_a": 8.1,
+                "mu_star": 0.6,
+                "phi": 33.0,
+                "alpha": 0.0,
+                "stiffness_ratio": 0.37,
+            },
+            RATE,
+            "up",
+            Status.LOCKED,
+        ),
         ({"law": "slowness", **CONSTANT}, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
     ],
 )
@@ -323,6 +344,41 @@ def test_answers_without_a_number(fields, of, direction, status):
 
 
 KIND = {RATE: "critical_velocity_ratio", DISPLACEMENT: "critical_displacement"}
+
+
+def test_a_displacement_step_may_jump_to_the_norm_at_once():
+    """A slider that slows down from the start is critical where the step itself takes it to the
+    norm: eq. 13 inverted.
+    """
+    scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
+    value, _error, outcome = found(scene, DISPLACEMENT)
+    jump = log_rate_at(scene, scene.stiffness * value, 0.0)
+    assert jump == pytest.approx(scene.log_norm_rate, rel=1e-8)
+    assert "jump" in outcome.message
+    with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
+    assert with_mass == pytest.approx(value, rel=1e-3)
+
+
+def test_the_survey_says_how_far_it_came():
+    """Load point velocities so low that the clock of the motion runs out of digits end the survey,
+    not the answer.
+    """
+    scene = Scene(law="slowness", normal_stress="constant", stiffness_ratio=1.5, b_over_a=5.0)
+    outcome = CriticalStep(direction="down")(scene, Accuracy())
+    assert outcome.status is Status.STABLE_FOR_ALL_STEPS
+    assert 1e-20 < outcome.values["critical_velocity_ratio_stable"] < 1e-6
+
+
+def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
+    """After these drops of V_0 the motion ends in limit cycles with peaks of 9.57 and 8.49 in ln V,
+    below the norm at 10.89.
+    """
+    for load, peak in ((0.25, 9.57), (0.3, 8.49)):
+        scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
+        assert peak < scene.log_norm_rate
+        assert not swing(scene, Accuracy(1e-6), Meter(500_000)).reached
+    low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
+    assert swing(low, Accuracy(1e-6), Meter(500_000)).reached
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():

@@ -21,6 +21,9 @@ from rsfstudy.equations import (
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
+#: Normal stress over sigma_* at which the fault counts as open, and as locked.
+LOST, LOCKED = 1e-9, 1e6
+
 
 def motion(
     scene: Scene,
@@ -55,8 +58,8 @@ def motion(
     Raises
     ------
     Halt
-        With `normal_stress_lost` or `shear_stress_reversed` where the equations end, or as `steps`
-        does.
+        With `normal_stress_lost`, `shear_stress_reversed` or `locked` where the equations end, or
+        as `steps` does.
     """
     from_steady_sliding = start is None
     if start is None:
@@ -88,6 +91,12 @@ class _Handover:
     slow: Equations
     accuracy: Accuracy
 
+    @property
+    def switch_norm(self) -> float:
+        """Slip rate norm at which to leave the slow manifold, which is a series in (K/a) w**2."""
+        softness = min(1.0, self.scene.stiffness / self.scene.a)
+        return self.accuracy.switch_norm / math.sqrt(softness)
+
     def slow_point(self, spring: float, psi: float) -> Point:
         """The point of the slow manifold with this spring stress and state."""
         return self.slow.point((spring, psi), (0.0, 0.0))
@@ -96,7 +105,7 @@ class _Handover:
         """How much mass matters: 1 where the slow manifold has to be left."""
         norm = self._norm(point)
         correction = abs(point.spring - point.friction) / self.scene.a
-        return max(norm / self.accuracy.switch_norm, correction / self.accuracy.switch_correction)
+        return max(norm / self.switch_norm, correction / self.accuracy.switch_correction)
 
     def _norm(self, point: Point) -> float:
         return self.scene.inertial_time * math.exp(min(point.log_rate, LARGEST_EXPONENT))
@@ -114,7 +123,7 @@ class _Handover:
         norm = self._norm(point)
         distance = min(1.0, abs(point.log_rate - below.log_rate))
         remaining = 0.5 * self.scene.stiffness / self.scene.a * norm**2 * distance
-        settled = max(norm / self.accuracy.switch_norm, self.weight_of_mass(below)) < 0.5
+        settled = max(norm / self.switch_norm, self.weight_of_mass(below)) < 0.5
         return settled and remaining < self.accuracy.landing
 
 
@@ -179,11 +188,14 @@ def _rupture(
 
 
 def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
-    """Pass steps on until one ends without normal stress.
+    """Pass steps on until normal stress vanishes or grows without bound.
 
     Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
     """
     for step in moving:
-        if 1.0 + scene.cot_phi * step.after.friction <= 1e-9:
+        ratio = 1.0 + scene.cot_phi * step.after.friction
+        if ratio <= LOST:
             raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+        if ratio >= LOCKED:
+            raise Halt(Status.LOCKED, f"normal stress grew to {ratio:.3g} sigma_* and goes on")
         yield step

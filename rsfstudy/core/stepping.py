@@ -146,7 +146,10 @@ def steps(
     counted = 0
     before = equations.point(solver.y.tolist(), solver.f.tolist())
     while True:
-        failure = solver.step()
+        # trial steps may leave the domain, and the solver then rejects them; what it accepts is
+        # checked
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            failure = solver.step()
         meter.charge(regime, solver.nfev - counted)
         meter.steps += 1
         counted = solver.nfev

@@ -17,13 +17,13 @@ from typing import ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
+from rsfstudy.core.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.core.stepping import Halt, Meter
 from rsfstudy.equations import log_rate_at
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.sought import DisplacementSteps, RateSteps, Steps
-from rsfstudy.measures.swing import Swing, swing
+from rsfstudy.measures.swing import Swing, settles, swing
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
@@ -36,6 +36,9 @@ DIRECTIONS = ("up", "down")
 #: Relative error of a root that rounding alone explains.
 ROUNDING = 1e-13
 
+#: Local tolerance below which rounding decides.
+_TIGHTEST_PATH = 5e-14
+
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
 
@@ -46,6 +49,7 @@ class Boundary:
 
     size: float
     relative_error: float
+    by_motions: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,14 +108,14 @@ class CriticalStep(Measure):
             )
         if not scene.inertia:
             boundary = _from_touching_path(steps, accuracy, meter)
-            if boundary is not None:
+            if boundary is not None and _smaller_steps_decay(steps, boundary.size):
                 boundary = replace(boundary, relative_error=boundary.relative_error + left_out)
                 outcome = self._verified(steps, boundary, accuracy, meter)
                 if outcome.status is Status.OK:
                     return outcome
             return self._surveyed(steps, accuracy, meter)
         near = _without_mass(steps, meter)
-        if near is not None:
+        if near is not None and _smaller_steps_decay(steps, near):
             bracket = _neighbours(steps, near, accuracy, meter)
             if bracket is not None:
                 return self._closed_in(steps, bracket, accuracy, meter)
@@ -120,15 +124,20 @@ class CriticalStep(Measure):
     def _verified(
         self, steps: Steps, boundary: Boundary, accuracy: Accuracy, meter: Meter
     ) -> Outcome:
-        """Confirm a boundary by a motion on each side, as close to it as the motions can tell."""
-        width = max(3.0 * boundary.relative_error, accuracy.rtol)
+        """Confirm a boundary by a motion on each side, as close to it as the motions can tell.
+
+        Where motions found the boundary in the first place, the width they confirm is its error.
+        """
+        width = boundary.relative_error if boundary.by_motions else 3.0 * boundary.relative_error
+        width = max(width, accuracy.rtol)
         while width < 0.02:
             inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
             below = swing(steps.scene_at(inner), accuracy, meter)
             above = swing(steps.scene_at(outer), accuracy, meter)
             if above.reached and not below.reached:
                 scene = steps.scene_at(boundary.size)
-                error = steps.error(boundary.size, boundary.relative_error)
+                relative = width if boundary.by_motions else boundary.relative_error
+                error = steps.error(boundary.size, relative)
                 found = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
@@ -173,11 +182,16 @@ class CriticalStep(Measure):
         stable: float | None = None
         unstable = smallest
         while unstable <= largest + 1e-9:
-            if at(unstable).reached:
-                break
+            try:
+                if at(unstable).reached:
+                    break
+            except Halt as halt:
+                if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
+                    raise
+                return self._never(steps, math.exp(stable), meter, f", where {halt}")
             stable, unstable = unstable, unstable + spacing
         else:
-            return self._never(steps, accuracy, meter)
+            return self._never(steps, steps.largest, meter)
         if stable is None:
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
@@ -199,23 +213,31 @@ class CriticalStep(Measure):
             xtol=tolerance,
             rtol=1e-15,
         )
-        return self._verified(steps, Boundary(math.exp(log_size), accuracy.rtol), accuracy, meter)
+        # the swings that found it would confirm their own errors: the verdicts come from tighter
+        # ones
+        tighter = replace(accuracy, rtol=max(0.03 * accuracy.rtol, TIGHTEST_RTOL))
+        boundary = Boundary(math.exp(log_size), accuracy.rtol, by_motions=True)
+        return self._verified(steps, boundary, tighter, meter)
 
-    def _never(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """No step reached the norm: because nothing is unstable, or because mass keeps slip below
-        it.
+    def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
+        """No step up to the largest reached the norm: because nothing is unstable, or because of
+        mass.
         """
-        values = self._values(steps, stable=steps.value(steps.largest))
         if steps.scene.inertia and _without_mass(steps, meter) is not None:
             return Outcome(
                 Status.NORM_UNREACHABLE,
-                values,
+                self._values(steps, stable=steps.value(largest)),
                 f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
             )
+        if steps.jumps_to_norm and not steps.scene.inertia:
+            value = steps.value(largest)
+            found = self._values(steps, largest, largest * ROUNDING, value, value)
+            found["slip_rate_after_step"] = math.exp(steps.scene.log_norm_rate)
+            return Outcome(Status.OK, found, "the jump of slip rate at the step itself is critical")
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
-            values,
-            f"stable for every step up to {steps.value(steps.largest):.6g}",
+            self._values(steps, stable=steps.value(largest)),
+            f"stable for every step up to {steps.value(largest):.6g}{why}",
         )
 
 
@@ -231,12 +253,23 @@ def error_of_leaving_mass_out(scene: Scene) -> float:
 
 def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
     """Boundary from the critical path; the difference between two tolerances is its error."""
-    sizes = steps.sizes_on_path((10.0 * accuracy.solver, accuracy.solver), meter)
+    tolerances = accuracy.solver, max(0.1 * accuracy.solver, _TIGHTEST_PATH)
+    sizes = steps.sizes_on_path(tolerances, meter)
     if sizes is None:
         return None
     coarse, fine = sizes
-    # two tolerances may agree by chance, so the local tolerance itself is added
-    return Boundary(fine, abs(coarse - fine) / fine + accuracy.solver + ROUNDING)
+    # the difference is the error of the coarser; two tolerances may agree by chance, hence the
+    # floor
+    return Boundary(fine, 2.0 * abs(coarse - fine) / fine + 0.05 * accuracy.rtol + ROUNDING)
+
+
+def _smaller_steps_decay(steps: Steps, size: float) -> bool:
+    """Whether steady sliding is linearly stable after every smaller step.
+
+    Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
+    stiffness falls with the load point velocity, so the ends of the range decide.
+    """
+    return all(settles(steps.scene_at(end)) for end in (steps.smallest, size))
 
 
 def _without_mass(steps: Steps, meter: Meter) -> float | None:

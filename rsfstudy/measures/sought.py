@@ -50,6 +50,8 @@ class Steps:
 
     #: Name of the critical value in results.
     quantity: ClassVar[str]
+    #: Whether the largest step takes the slip rate to the norm by itself, at once.
+    jumps_to_norm = False
 
     def __init__(self, scene: Scene, sign: int) -> None:
         self.scene, self.sign = scene, sign
@@ -234,5 +236,6 @@ class DisplacementSteps(Steps):
             reach *= 2.0
         if strength(reach)[0] < norm:
             return reach / scene.stiffness
+        self.jumps_to_norm = True
         stress = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
         return stress / scene.stiffness
