@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-import multiprocessing
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -110,19 +110,27 @@ def on_local_cluster(processes: int) -> Mapper:
 
 
 @contextlib.contextmanager
-def local_cluster(workers: int) -> Iterator[Any]:
-    """A Dask client of worker processes on this machine, with one thread each.
+def _script_not_imported() -> Iterator[None]:
+    """Keep worker processes from importing the user's script again, which would start workers of
+    its own.
 
-    Raises
-    ------
-    RunError
-        In a script that starts workers on import: they import it again.
+    Multiprocessing finds the script by these two names; what a script defines reaches the workers
+    by value all the same.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise RunError(
-            "rsfstudy.run was called while a worker process was importing your script. Put "
-            "the call under `if __name__ == '__main__':`, or pass workers=0."
-        )
+    main = sys.modules["__main__"]
+    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+    for name in hidden:
+        setattr(main, name, None)
+    try:
+        yield
+    finally:
+        for name, value in hidden.items():
+            setattr(main, name, value)
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int) -> Iterator[Any]:
+    """A Dask client of worker processes on this machine, with one thread each."""
     import dask
     from distributed import Client, LocalCluster
 
@@ -134,6 +142,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
         ),
     }
     with (
+        _script_not_imported(),
         dask.config.set(quiet),
         LocalCluster(
             n_workers=workers,

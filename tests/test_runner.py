@@ -236,19 +236,41 @@ def test_ctrl_c_ends_in_a_message_and_the_same_command_goes_on(tmp_path):
     same_numbers(resumed, fresh)
 
 
-def test_an_unguarded_script_is_told_what_to_do(tmp_path):
+def test_a_script_needs_no_guard(tmp_path):
+    """Workers do not import the script that starts them, and a measure defined in it reaches them
+    all the same.
+    """
     script = tmp_path / "script.py"
     script.write_text(
         textwrap.dedent("""
+            print("imported")
+            from dataclasses import dataclass
             import rsfstudy
-            rsfstudy.run("rate_step_boundary", b_over_a=[2, 3], output=None, progress=False)
+            from rsfstudy.measures import Measure, Outcome
+            from rsfstudy.status import Status
+
+            @dataclass(frozen=True)
+            class Own(Measure):
+                name = "own"
+                headline = "total"
+                variables = {"total": ()}
+                typical_work = 1
+
+                def find(self, scene, accuracy, meter):
+                    return Outcome(Status.OK, {"total": scene.b_over_a})
+
+            study = rsfstudy.Study(
+                name="own", title="Own", base=rsfstudy.Scene(), measure=Own(),
+                axes=[rsfstudy.Axis("b_over_a", [2, 3])],
+            )
+            print(rsfstudy.run(study, output=None, progress=False).total.values)
         """)
     )
     ran = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120
     )
-    assert ran.returncode != 0
-    assert "if __name__ == '__main__':" in ran.stderr
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.split("\n")[:2] == ["imported", "[2. 3.]"]
 
 
 def test_a_scheduler_that_does_not_answer_is_named():
