@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import check, critical_step, open, run, studies
+    from rsfstudy.api import check, critical_step, limit_cycle, open, run, studies, to_si
     from rsfstudy.scene import Scene
     from rsfstudy.study import Axis, Study
     from rsfstudy.trajectory import simulate
@@ -27,6 +27,8 @@ _HOMES = {
     "studies": "api",
     "simulate": "trajectory",
     "critical_step": "api",
+    "limit_cycle": "api",
+    "to_si": "api",
 }
 
 __all__ = [
@@ -35,10 +37,12 @@ __all__ = [
     "Study",
     "check",
     "critical_step",
+    "limit_cycle",
     "open",
     "run",
     "simulate",
     "studies",
+    "to_si",
 ]
 
 

@@ -160,7 +160,12 @@ def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
     status = OK
     for what in _results(name, every):
+        if every and not (output / f"{what}.nc").exists():
+            _console.print(f"{what}: not run yet", style="red")
+            status = FAILED
+            continue
         dataset = api.open(what, output)
+        _console.print(f"[bold]{dataset.attrs['id']}[/bold] ({dataset.attrs['completeness']})")
         status = max(status, _claims(dataset), _failures(dataset))
     return status
 

@@ -150,7 +150,8 @@ def _dataset(
             "flag_meanings": " ".join(REGIMES),
         },
     )
-    dataset = dataset.set_coords(["time", "slip"])
+    dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
+    dataset = dataset.set_coords(["time", "slip", "reference_rate"])
     dataset.attrs = {
         "title": f"Motion of a spring-slider, {scene.law} law",
         "Conventions": "CF-1.11",

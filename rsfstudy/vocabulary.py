@@ -86,12 +86,58 @@ _QUANTITIES = (
         "V_*",
     ),
     Quantity(
+        "slip_rate_after_closed_form_step",
+        "$V(0^+)/V_*$",
+        "1",
+        "slip rate just after a step of D_c a/(b-a)",
+        "V_*",
+    ),
+    Quantity(
+        "displacement_slope", "", "1", "slope of critical displacement against a/(b-a)", "D_c"
+    ),
+    Quantity(
+        "lowering", "", "1", "fraction by which the boundary lies below that of the reference"
+    ),
+    Quantity(
         "critical_stiffness",
         r"$k_{cr}D_c/\sigma_*$",
         "1",
         "critical stiffness at the reference rate",
         "sigma_*/D_c",
     ),
+    Quantity(
+        "recurrence_interval", "$t_r V_*/D_c$", "1", "recurrence interval of stick-slip", "D_c/V_*"
+    ),
+    Quantity(
+        "static_stress_drop",
+        r"$\Delta\tau_s/\sigma_*$",
+        "1",
+        "static stress drop: highest less lowest spring stress of a cycle",
+        "sigma_*",
+    ),
+    Quantity(
+        "dynamic_stress_drop",
+        r"$\Delta\tau_d/\sigma_*$",
+        "1",
+        "dynamic stress drop: highest spring stress less that at peak slip rate",
+        "sigma_*",
+    ),
+    Quantity(
+        "min_log10_slip_rate", "", "1", "decimal logarithm of the slowest slip rate over V_star"
+    ),
+    Quantity(
+        "max_log10_slip_rate", "", "1", "decimal logarithm of the fastest slip rate over V_star"
+    ),
+    Quantity("slip_per_event", r"$\delta/D_c$", "1", "slip per stick-slip cycle", "D_c"),
+    Quantity(
+        "healing_exponent",
+        "",
+        "1",
+        "exponent of the state variable theta in slip rate, from arrest to the slowest slip rate",
+    ),
+    Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
+    Quantity("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
+    Quantity("phase", "", "1", "fraction of the path along a cycle"),
     # along a motion
     Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
     Quantity("slip", r"$\delta/D_c$", "1", "slip since the step", "D_c"),

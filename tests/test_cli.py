@@ -50,7 +50,16 @@ def test_check_a_name_and_a_file(results):
     output, _said = results
     assert call("check", NAME, "--output", output).returncode == 0
     assert call("check", output / f"{NAME}.nc").returncode == 0
-    assert call("check", "--all", "--output", output).returncode == 0
+
+
+def test_check_all_checks_what_is_there_and_names_what_is_not(results):
+    output, _said = results
+    checked = call("check", "--all", "--output", output)
+    others = [name for name in rsfstudy.studies() if name != NAME]
+    assert checked.returncode == (1 if others else 0)
+    assert "C7" in checked.stdout
+    for name in others:
+        assert f"{name}: not run yet" in checked.stdout
 
 
 def test_check_fails_when_a_verdict_moves(results, tmp_path):

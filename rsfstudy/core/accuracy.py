@@ -49,16 +49,16 @@ class Accuracy:
         """Local tolerance for the integrator: local errors add up over a motion, so a part of
         `rtol`.
         """
-        return 0.02 * self.rtol
+        return 0.04 * self.rtol
 
     @property
     def switch_norm(self) -> float:
         """Slip rate norm w up to which the slow manifold stands in for the full equations.
 
-        The error of leaving it at w is about 0.03 w**4 (the tests measure it); a third of `rtol` is
-        given to it.
+        The error of leaving it at w is about 0.03 w**4 (the tests measure it); two thirds of
+        `rtol` are given to it.
         """
-        return min(math.sqrt(math.sqrt(10.0 * self.rtol)), 0.04)
+        return min(math.sqrt(math.sqrt(20.0 * self.rtol)), 0.05)
 
     @property
     def switch_correction(self) -> float:

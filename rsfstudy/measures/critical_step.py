@@ -19,7 +19,6 @@ from scipy.optimize import toms748
 
 from rsfstudy.core.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.core.stepping import Halt, Meter
-from rsfstudy.equations import log_rate_at
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.sought import DisplacementSteps, RateSteps, Steps
@@ -83,7 +82,7 @@ class CriticalStep(Measure):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         of = self.headline
         names = (of, f"{of}_error", f"{of}_stable", f"{of}_unstable")
-        return dict.fromkeys((*names, "slip_rate_after_step", "critical_stiffness"), ())
+        return dict.fromkeys((*names, *KINDS[self.of].beside, "critical_stiffness"), ())
 
     @property
     def typical_work(self) -> int:
@@ -135,14 +134,10 @@ class CriticalStep(Measure):
             below = swing(steps.scene_at(inner), accuracy, meter)
             above = swing(steps.scene_at(outer), accuracy, meter)
             if above.reached and not below.reached:
-                scene = steps.scene_at(boundary.size)
                 relative = width if boundary.by_motions else boundary.relative_error
                 error = steps.error(boundary.size, relative)
                 found = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
-                )
-                found["slip_rate_after_step"] = math.exp(
-                    log_rate_at(scene, scene.spring_stress_step, 0.0)
                 )
                 return Outcome(Status.OK, found)
             width *= 10.0
@@ -167,6 +162,7 @@ class CriticalStep(Measure):
             f"{of}_stable": stable,
             f"{of}_unstable": unstable,
             "critical_stiffness": steps.scene.critical_stiffness,
+            **steps.values_beside(size),
         }
 
     def _surveyed(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
@@ -232,7 +228,6 @@ class CriticalStep(Measure):
         if steps.jumps_to_norm and not steps.scene.inertia:
             value = steps.value(largest)
             found = self._values(steps, largest, largest * ROUNDING, value, value)
-            found["slip_rate_after_step"] = math.exp(steps.scene.log_norm_rate)
             return Outcome(Status.OK, found, "the jump of slip rate at the step itself is critical")
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,

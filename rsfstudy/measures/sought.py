@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import strength_of
+from rsfstudy.equations import log_rate_at, strength_of
 from rsfstudy.measures.swing import swing
 from rsfstudy.measures.touching import displacement_on_path, rate_step_misfit
 from rsfstudy.scene import Scene
@@ -50,6 +50,8 @@ class Steps:
 
     #: Name of the critical value in results.
     quantity: ClassVar[str]
+    #: What else is told of a critical step.
+    beside: ClassVar[tuple[str, ...]] = ()
     #: Whether the largest step takes the slip rate to the norm by itself, at once.
     jumps_to_norm = False
 
@@ -69,6 +71,12 @@ class Steps:
     def error(self, size: float, relative_error: float) -> float:
         """Error of `value` where the size has this relative error."""
         raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def values_beside(self, size: float) -> dict[str, float]:
+        """The numbers named in `beside`, for a critical step of this size (NaN where there is
+        none).
+        """
+        return {}
 
     def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
         """Size of the step that starts the critical path, by each local tolerance; None where there
@@ -193,6 +201,7 @@ class DisplacementSteps(Steps):
     """
 
     quantity = "critical_displacement"
+    beside = ("slip_rate_after_step", "slip_rate_after_closed_form_step")
 
     def __init__(self, scene: Scene, sign: int) -> None:
         if scene.load_velocity_ratio is None:
@@ -207,6 +216,16 @@ class DisplacementSteps(Steps):
 
     def error(self, size: float, relative_error: float) -> float:
         return size * relative_error
+
+    def values_beside(self, size: float) -> dict[str, float]:
+        """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13)."""
+
+        def after(step: float) -> float:
+            return math.exp(log_rate_at(self.scene, self.scene.stiffness * step, 0.0))
+
+        closed_form = after(self.sign / (self.scene.b_over_a - 1.0))
+        critical = math.nan if math.isnan(size) else after(self.value(size))
+        return dict(zip(self.beside, (critical, closed_form), strict=True))
 
     def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
         """One integration each: a displacement step starts wherever the critical path has Psi =

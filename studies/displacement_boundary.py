@@ -1,0 +1,95 @@
+"""Displacement boundary: how large a step of load point displacement triggers instability (Fig.
+7).
+"""
+
+import numpy as np
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import ProportionalFit, RelativeDifference
+from rsfstudy.scene import Scene
+from rsfstudy.study import Axis, Study
+
+PAPER = "doi:10.1007/s11589-014-0098-4"
+CONSTANT, WEAK, STRONG = "constant normal stress", "alpha = 0.25", "alpha = 0.56"
+CLOSE = "'very close'; 'maximum difference of a few percents'"
+
+a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 9) / 4])
+
+
+def near(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Claim:
+    """C10: the boundary close to D_c/lambda."""
+    return Claim(
+        id="C10",
+        statement=f"{case}, k = {stiffness_ratio:g} k_cr: step = D_c a/(b-a)",
+        source=f"{PAPER}, eq. 14, Fig. 7",
+        variable="displacement_slope",
+        where={"case": case, "stiffness_ratio": stiffness_ratio},
+        published=1.0,
+        tolerance=tolerance,
+        reason=reason,
+    )
+
+
+study = Study(
+    name="displacement_boundary",
+    title="Critical load point displacement step against a/(b-a), slip law, load point held",
+    summary=(
+        "A slider in steady state at V_* has its load point displaced at once and then held. "
+        "The boundary is the smallest step that takes the slip rate to the instability norm. At "
+        "constant normal stress it is D_c a/(b-a) for every stiffness, in the limit of a large "
+        "norm; variable normal stress moves it little."
+    ),
+    base=Scene(law="slip"),
+    axes=[
+        Axis(
+            "case",
+            {
+                CONSTANT: {"normal_stress": "constant"},
+                WEAK: {"normal_stress": "variable", "alpha": 0.25},
+                STRONG: {"normal_stress": "variable", "alpha": 0.56},
+            },
+        ),
+        Axis("stiffness_ratio", [1.0, 1.5, 2.0]),
+        Axis("b_over_a", 1.0 + 1.0 / a_over_b_minus_a),
+    ],
+    measure=CriticalStep(of="displacement_step", direction="up"),
+    reductions=[
+        ProportionalFit(
+            name="displacement_slope",
+            of="critical_displacement",
+            on="a_over_b_minus_a",
+            within=(0.25, 1.0),
+        ),
+        RelativeDifference(
+            name="lowering", of="critical_displacement", along="case", reference=CONSTANT
+        ),
+    ],
+    claims=[
+        near(CONSTANT, 1.0, 1e-3, "eq. 14 holds for an infinite norm"),
+        near(
+            CONSTANT,
+            2.0,
+            0.03,
+            "an infinite norm is approached more slowly when stiff",
+        ),
+        near(WEAK, 1.0, 0.03, CLOSE),
+        near(STRONG, 1.0, 0.03, CLOSE),
+        Claim(
+            id="C9",
+            statement="alpha = 0.56, b/a = 2: V just after a step of D_c is 2.697 V_*",
+            source=f"{PAPER}, eq. 13",
+            variable="slip_rate_after_closed_form_step",
+            where={"case": STRONG, "stiffness_ratio": 1.0, "b_over_a": 2.0},
+            published=2.697,
+            tolerance=6e-4,
+            reason="printed to three decimals; ours is 2.6975, and theirs cut rather than rounded",
+        ),
+    ],
+    plot="displacement_boundary",
+    references=[
+        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
+        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
+    ],
+)

@@ -1,0 +1,163 @@
+"""Stick-slip limit cycles: references in extended precision, the requested accuracy, balances, and
+published numbers.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.status import Status
+
+CASES = [
+    {"law": law, "normal_stress": stress}
+    for law in ("slip", "slowness")
+    for stress in ("constant", "variable")
+]
+HEADLINES = (
+    "recurrence_interval",
+    "static_stress_drop",
+    "dynamic_stress_drop",
+    "min_log10_slip_rate",
+    "max_log10_slip_rate",
+)
+
+
+def scene(**fields) -> Scene:
+    return Scene(**{"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True, **fields})
+
+
+def measured(of: Scene, rtol: float = 1e-7) -> dict:
+    outcome = LimitCycle()(of, Accuracy(rtol, 3_000_000))
+    assert outcome.status is Status.OK, outcome.message
+    return dict(outcome.values)
+
+
+@pytest.mark.parametrize(
+    ("law", "recurrence", "drop"),
+    [
+        ("slip", 27.3903182296427, 40.16070456254199),
+        ("slowness", 23.9399987067, 37.127939244),
+    ],
+)
+def test_references_in_extended_precision(law, recurrence, drop):
+    """Constant normal stress, stress drop in a sigma_*."""
+    found = measured(scene(law=law, normal_stress="constant"), 1e-9)
+    assert found["recurrence_interval"] == pytest.approx(recurrence, rel=1e-9)
+    assert found["static_stress_drop"] / 0.0145 == pytest.approx(drop, rel=1e-9)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_default_accuracy_and_work(case):
+    """Converged to a relative 1e-6 against a tolerance 100 times tighter, each within its error
+    estimate.
+    """
+    found, tight = measured(scene(**case)), measured(scene(**case), 1e-9)
+    for name in HEADLINES:
+        assert found[name] == pytest.approx(tight[name], rel=1e-6)
+        allowed = found[f"{name}_error"] + tight[f"{name}_error"]
+        assert abs(found[name] - tight[name]) <= allowed
+        assert found[f"{name}_error"] < 1e-5 * abs(found[name])
+
+
+def test_work_per_cycle():
+    """At the default tolerance no more than 3,000 right-hand sides a cycle, in the mean over the
+    paper's cases.
+    """
+    assert np.mean([measured(scene(**case))["work_per_cycle"] for case in CASES]) <= 3_000
+
+
+def test_slowest_slip_rates_of_figure_9():
+    slowest = [measured(scene(**case))["min_log10_slip_rate"] for case in CASES[:2]]
+    assert slowest == pytest.approx([-1.397, -11.468], abs=1e-3)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_balances_of_the_orbit(case):
+    """Slip per cycle is V_0 times the interval, the orbit closes, and the drops are those of its
+    stress.
+    """
+    found = measured(scene(**case))
+    assert found["slip_per_event"] == pytest.approx(2.0 * found["recurrence_interval"], rel=1e-14)
+    assert found["time"][-1] == pytest.approx(found["recurrence_interval"], rel=1e-6)
+    assert found["slip"][-1] == pytest.approx(found["slip_per_event"], rel=1e-6)
+    for name in ("log10_slip_rate", "shear_stress", "normal_stress_ratio", "state_variable"):
+        assert found[name][-1] == pytest.approx(found[name][0], abs=1e-5)
+    assert (np.diff(found["time"]) >= 0.0).all()
+    assert np.ptp(found["shear_stress"]) == pytest.approx(found["static_stress_drop"], rel=1e-3)
+    assert found["log10_slip_rate"].max() == pytest.approx(found["max_log10_slip_rate"], abs=0.05)
+    assert found["log10_slip_rate"].min() == pytest.approx(found["min_log10_slip_rate"], abs=0.3)
+    # both the slow part and the rupture are resolved: no stride longer than a few per cent of the
+    # range
+    assert np.abs(np.diff(found["log10_slip_rate"])).max() < 0.05 * np.ptp(found["log10_slip_rate"])
+
+
+def test_a_cycle_does_not_depend_on_how_it_was_started():
+    """A displacement step on top sets off another first event and ends in the same cycle."""
+    one = measured(scene(law="slowness"))
+    other = measured(scene(law="slowness", displacement_step=2.0))
+    for name in HEADLINES:
+        assert other[name] == pytest.approx(one[name], rel=1e-6)
+
+
+def test_the_first_event_is_not_taken_for_the_cycle():
+    outcome = measured(scene(law="slowness", normal_stress="constant"))
+    assert outcome["events_until_repeat"] > 5
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"stiffness_ratio": 1.2}, "settles to steady sliding"),
+        # k_cr falls with V_0: what is soft at V_* is stiff at 1000 V_*
+        ({"load_velocity_ratio": 1000.0, "phi": 50.0}, "settles to steady sliding"),
+        ({"load_velocity_ratio": 0.0}, "held"),
+    ],
+)
+def test_where_there_is_no_stick_slip(fields, message):
+    outcome = LimitCycle()(scene(**fields), Accuracy())
+    assert outcome.status is Status.NO_LIMIT_CYCLE
+    assert message in outcome.message
+
+
+def test_public_call_and_si_units():
+    """sigma_* = 100 MPa, D_c = 10 micrometres: the interval in seconds, the drop in pascals."""
+    cycle = rsfstudy.limit_cycle(scene(law="slowness"))
+    si = rsfstudy.to_si(cycle, normal_stress=100e6, slip_distance=1e-5)
+    assert si.recurrence_interval.attrs["units"] == "s"
+    assert float(si.recurrence_interval) == pytest.approx(
+        float(cycle.recurrence_interval) / 1.17e-8, rel=1e-12
+    )
+    assert si.static_stress_drop.attrs["units"] == "Pa"
+    assert float(si.static_stress_drop) == pytest.approx(100e6 * float(cycle.static_stress_drop))
+    assert float(si.slip_per_event) == pytest.approx(1e-5 * float(cycle.slip_per_event))
+    assert "scale" not in si.slip_per_event.attrs
+    np.testing.assert_allclose(si.shear_stress, 100e6 * cycle.shear_stress)
+    # what has no scale stays as it is
+    assert float(si.max_log10_slip_rate) == float(cycle.max_log10_slip_rate)
+    with pytest.raises(InvalidValue, match="must be positive"):
+        rsfstudy.to_si(cycle, normal_stress=-1.0, slip_distance=1e-5)
+    with pytest.raises(InvalidValue, match="State it"):
+        rsfstudy.to_si(cycle.drop_vars("reference_rate"), normal_stress=1.0, slip_distance=1.0)
+
+
+@pytest.mark.parametrize("phases", [0, 1])
+def test_an_orbit_needs_points(phases):
+    with pytest.raises(InvalidValue, match="at least 2"):
+        LimitCycle(phases=phases)
+
+
+def test_stiffer_cycles_are_smaller():
+    drops = [
+        measured(scene(law="slowness", normal_stress="constant", stiffness_ratio=ratio))[
+            "static_stress_drop"
+        ]
+        for ratio in (0.3, 0.6, 0.9)
+    ]
+    assert drops == sorted(drops, reverse=True)
+    assert math.isfinite(drops[0])
