@@ -152,4 +152,6 @@ def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float
         if matches.size != 1:
             raise KeyError(name)
         values = values.isel({dimension: int(matches[0])})
+    if values.ndim:
+        raise KeyError(variable)  # the lattice has more dimensions than the claim speaks of
     return float(values)

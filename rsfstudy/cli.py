@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Column, Table
 
-from rsfstudy import api, catalogue, runner
+from rsfstudy import api, catalogue, runner, store
+from rsfstudy.claims import NOT_APPLICABLE
 from rsfstudy.core.accuracy import DEFAULT_RTOL
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.status import Status
@@ -165,7 +166,6 @@ def check(name: str | None, every: bool, output: Path) -> int:
             status = FAILED
             continue
         dataset = api.open(what, output)
-        _console.print(f"[bold]{dataset.attrs['id']}[/bold] ({dataset.attrs['completeness']})")
         status = max(status, _claims(dataset), _failures(dataset))
     return status
 
@@ -223,6 +223,8 @@ def _setting(text: str) -> tuple[str, Any]:
                 "--set", text, "must read start:stop:count, two numbers and a count"
             ) from error
         return name.strip(), spaced.tolist()
+    if ":" in values:
+        raise InvalidValue("--set", text, "must read start:stop:count, two numbers and a count")
     return name.strip(), _value(parts[0])
 
 
@@ -292,7 +294,12 @@ def _reductions(dataset: xr.Dataset) -> None:
 def _claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
     table_of = api.check(dataset)
-    if table_of.empty:
+    overrides = store.declaration(dataset)["overrides"]
+    _console.print(f"[bold]{dataset.attrs['id']}[/bold] ({dataset.attrs['completeness']})")
+    if overrides:
+        _console.print(f"not as declared: {_settings(overrides)}", highlight=False, markup=False)
+    if (table_of.empty or table_of["verdict"].eq(NOT_APPLICABLE).all()) and not _undone(dataset):
+        _console.print("no claim applies")
         return OK
     table = Table(
         "",
@@ -315,6 +322,19 @@ def _claims(dataset: xr.Dataset) -> int:
     return FAILED if len(moved) else OK
 
 
+def _settings(overrides: Mapping[str, Any]) -> str:
+    texts = {
+        name: ",".join(map(_short, value)) if isinstance(value, list) else _short(value)
+        for name, value in overrides.items()
+    }
+    return ", ".join(f"{name}={text}" for name, text in texts.items())
+
+
+def _undone(dataset: xr.Dataset) -> int:
+    """Number of cells that are not computed yet."""
+    return int((dataset["status"] == int(Status.PENDING)).sum())
+
+
 def _claim_row(row: Any) -> tuple[str, ...]:
     sign = {"equals": "", "below": "< ", "above": "> "}[row.relation]
     reason = f"{row.tolerance:g}: {row.reason}"
@@ -333,9 +353,15 @@ def _claim_row(row: Any) -> tuple[str, ...]:
 
 def _failures(dataset: xr.Dataset) -> int:
     """Print the cells that failed; FAILED if there are any."""
+    if _undone(dataset):
+        size = dataset["status"].size
+        _console.print(f"{_undone(dataset)} of {size} cells are not computed yet", style="red")
     failed = dataset["status"] > int(Status.NORM_UNREACHABLE)
     if not bool(failed.any()):
         return OK
+    failed = failed & (dataset["status"] != int(Status.PENDING))
+    if not bool(failed.any()):
+        return FAILED
     table = Table("cell", "status", "message", title=f"{int(failed.sum())} cells failed")
     labels = {int(s): s.label for s in Status}
     for index in np.argwhere(failed.values)[:20]:

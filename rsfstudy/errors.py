@@ -49,6 +49,13 @@ class InvalidValue(RsfStudyError, ValueError):
         self.name = name
         self.value = value
 
+    def at(self, place: str) -> InvalidValue:
+        """The same error, with the place it was met at."""
+        found = InvalidValue.__new__(InvalidValue)
+        Exception.__init__(found, f"{place}: {self}")
+        found.name, found.value = self.name, self.value
+        return found
+
 
 class DataError(RsfStudyError):
     """A file that is missing, damaged, or not what it is taken for."""

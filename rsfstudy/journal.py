@@ -78,8 +78,9 @@ class Journal:
         if row is not None and row[0] != wanted:
             self._db.close()
             raise DataError(
-                f"{path} holds cells computed differently ({_differences(row[0], fingerprint)}). "
-                "Mixing them would be wrong: start over with --fresh, or choose another --output."
+                f"{path} holds cells computed differently: {_differences(row[0], fingerprint)}. "
+                "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
+                "another --output (output=)."
             )
 
     def __enter__(self) -> Journal:

@@ -68,7 +68,9 @@ def _coordinates(study: Study, scenes: Sequence[Scene]) -> dict[str, Any]:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
         for name in axis.fields:
-            varied = _array([getattr(scene, name) for scene in along])
+            # a plain axis bears its own values, even where a first cell has no use for them
+            own = [row[name] for row in axis.rows] if axis.labels is None else None
+            varied = _array(own or [getattr(scene, name) for scene in along])
             coords[name] = (axis.dimension, varied, _about(name))
     for name in FIELDS:
         present = {getattr(scene, name) for scene in scenes} - {None}

@@ -28,6 +28,9 @@ class Reduction:
     #: Name of the kind in declarations.
     kind: ClassVar[str]
 
+    name: str
+    of: str
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """The new variables."""
         raise TypeError(f"{type(self).__name__} reduces nothing")
@@ -38,8 +41,8 @@ class Reduction:
 
 
 @dataclass(frozen=True)
-class ProportionalFit(Reduction):
-    """Least squares of ``of - minus = name * on``, without intercept and unweighted.
+class _Fit(Reduction):
+    """Unweighted least squares along one coordinate; members say of which law.
 
     Parameters
     ----------
@@ -51,21 +54,26 @@ class ProportionalFit(Reduction):
         Variable to fit.
     on : str
         Coordinate along one dimension.
-    minus : float
-        Value of `of` at the origin.
     within : tuple of float
         Range of `on` that is fitted, both ends included; all of it by default.
     """
 
-    name: str
-    of: str
-    on: str
-    minus: float = 0.0
+    on: str = ""
     within: tuple[float, float] | None = None
-    kind: ClassVar[str] = "proportional_fit"
+    #: Parameters of the law.
+    unknowns: ClassVar[int] = 1
+
+    def law(self) -> str:
+        """The law in words."""
+        raise TypeError(f"{type(self).__name__} fits no law")
+
+    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
+        """Values as they enter a fit through the origin."""
+        raise TypeError(f"{type(self).__name__} fits no law")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Fit along the dimension of `on`, for each point of the others.
+        """Fit along the dimension of `on`, for each point of the others; nothing where no point is
+        in range.
 
         Raises
         ------
@@ -77,41 +85,86 @@ class ProportionalFit(Reduction):
                 "on",
                 self.on,
                 "must be a coordinate along one dimension",
-                choices=map(str, dataset.coords),
+                choices=[str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != self.on],
             )
         dimension = str(dataset[self.on].dims[0])
         lowest, highest = self.within or (-np.inf, np.inf)
-        inside = (dataset[self.on] >= lowest * (1.0 - _ROUNDING)) & (
-            dataset[self.on] <= highest * (1.0 + _ROUNDING)
+        inside = (dataset[self.on] >= lowest - _ROUNDING * abs(lowest)) & (
+            dataset[self.on] <= highest + _ROUNDING * abs(highest)
         )
         support = dataset.isel({dimension: np.flatnonzero(inside.values)})
-        x, y = support[self.on].astype(float), support[self.of] - self.minus
-        used = y.notnull()
-        x, y = x.where(used), y.where(used)
+        if support.sizes[dimension] == 0:
+            return xr.Dataset()
+        used = support[self.of].notnull()
+        x = self.centred(support[self.on].astype(float).where(used), dimension)
+        y = self.centred(self.offset(support[self.of]), dimension)
         count = used.sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
-        spread = (misfit**2).sum(dimension) / (count - 1).where(count > 1)
+        freedom = count - self.unknowns
+        spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
         failed = _failed(support["status"]).any(dimension)
+        known = (count >= self.unknowns) & ~failed
         result = xr.Dataset(
             {
-                self.name: slope.where((count > 0) & ~failed),
-                f"{self.name}_stderr": error.where(~failed),
-                f"{self.name}_misfit": largest.where((count > 0) & ~failed),
+                self.name: slope.where(known),
+                f"{self.name}_stderr": error.where(known),
+                f"{self.name}_misfit": largest.where(known),
                 f"{self.name}_points": count.astype("int32"),
             }
         )
-        law = f"{self.of} = {self.minus:g} + {self.name} * {self.on}"
-        span = f"{lowest:g} <= {self.on} <= {highest:g}"
+        span = f"{lowest:g} <= {self.on} <= {highest:g}" if self.within else f"all {self.on}"
         for name in result:
-            result[name].attrs["comment"] = f"least squares of {law} over {span}"
+            result[name].attrs["comment"] = f"least squares of {self.law()} over {span}"
             if bool(failed.any()):
                 result[name].attrs["refused"] = (
                     "cells within the fitted range failed or are missing"
                 )
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
+
+    def offset(self, values: xr.DataArray) -> xr.DataArray:
+        """Values less what the law holds fixed."""
+        return values
+
+
+@dataclass(frozen=True)
+class ProportionalFit(_Fit):
+    """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
+    at the origin.
+    """
+
+    minus: float = 0.0
+    kind: ClassVar[str] = "proportional_fit"
+
+    def law(self) -> str:
+        """The law in words."""
+        return f"{self.of} = {self.minus:g} + {self.name} * {self.on}"
+
+    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
+        """As they are: the line goes through the origin."""
+        return values
+
+    def offset(self, values: xr.DataArray) -> xr.DataArray:
+        """Values less the value at the origin."""
+        return values - self.minus
+
+
+@dataclass(frozen=True)
+class LinearFit(_Fit):
+    """Least squares of ``of = constant + name * on``."""
+
+    unknowns: ClassVar[int] = 2
+    kind: ClassVar[str] = "linear_fit"
+
+    def law(self) -> str:
+        """The law in words."""
+        return f"{self.of} = constant + {self.name} * {self.on}"
+
+    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
+        """Less their mean, which takes care of the constant."""
+        return values - values.mean(dimension)
 
 
 @dataclass(frozen=True)
@@ -131,21 +184,17 @@ class RelativeDifference(Reduction):
         Label of the reference point on that dimension.
     """
 
-    name: str
-    of: str
-    along: str
-    reference: str | float
+    along: str = ""
+    reference: str | float = ""
     kind: ClassVar[str] = "relative_difference"
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare along `along`; NaN everywhere if the lattice has no reference point."""
+        """Compare along `along`; nothing if the lattice has no reference point."""
         values = dataset[self.of]
-        if self.reference in dataset[self.along].values:
-            difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
-            note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
-        else:
-            difference = xr.full_like(values, np.nan)
-            note = f"the lattice has no {self.along} = {self.reference} to compare with"
+        if self.reference not in dataset[self.along].values:
+            return xr.Dataset()
+        difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
+        note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
         return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
 
 
@@ -159,6 +208,8 @@ def reduced(dataset: xr.Dataset, reductions: tuple[Reduction, ...]) -> xr.Datase
     for reduction in reductions:
         for name, values in reduction(dataset).data_vars.items():
             about = quantity(str(name))
-            values.attrs = {"long_name": about.long_name, "units": about.units, **values.attrs}
+            own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
+            scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
+            values.attrs = {"long_name": about.long_name, "units": about.units, **scale, **own}
             dataset = dataset.assign({name: values})
     return dataset

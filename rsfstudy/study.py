@@ -80,7 +80,8 @@ class Axis:
         seen: list[Row] = []
         for row in self.rows:
             if row in seen:
-                raise InvalidValue(self.dimension, dict(row), "stands twice on its axis")
+                value = row.get(self.dimension, dict(row))
+                raise InvalidValue(self.dimension, value, "stands twice on its axis")
             seen.append(row)
 
     @property
@@ -155,6 +156,7 @@ class Study:
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+        self._check_parts()
         taken: dict[str, str] = {}
         for axis in self.axes:
             for name in {axis.dimension, *axis.fields}:
@@ -163,6 +165,33 @@ class Study:
                         "axis", axis.dimension, f"varies {name!r}, as {taken[name]!r} does already"
                     )
                 taken[name] = axis.dimension
+
+    def _check_parts(self) -> None:
+        parts: list[tuple[str, Sequence[Any], type]] = [
+            ("base", [self.base], Scene),
+            ("measure", [self.measure], Measure),
+            ("axes", self.axes, Axis),
+            ("reductions", self.reductions, Reduction),
+            ("claims", self.claims, Claim),
+        ]
+        for name, values, kind in parts:
+            for value in values:
+                if not isinstance(value, kind):
+                    raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
+        if not self.axes:
+            raise InvalidValue("axes", self.axes, "must hold at least one axis")
+        for reduction in self.reductions:
+            if reduction.of not in self.measure.variables:
+                raise InvalidValue(
+                    "reduction of", reduction.of, "is not measured", choices=self.measure.variables
+                )
+        for axis in self.axes:
+            self._check_sought(axis.fields)
+
+    def _check_sought(self, fields: Sequence[str]) -> None:
+        for name in fields:
+            if name in self.measure.sought:
+                raise InvalidValue(name, "...", "is what the measure looks for, and has no effect")
 
     # ---- the lattice ------------------------------------------------------------------------
 
@@ -189,16 +218,21 @@ class Study:
         InvalidValue
             For a cell that makes no meaningful scene, naming its place on the axes.
         """
+        used: set[str] = set()
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             try:
-                yield self._scene(rows)
+                scene = self._scene(rows)
             except InvalidValue as error:
                 place = ", ".join(
                     f"{name}={value!r}" for row in rows for name, value in row.items()
                 )
-                raise InvalidValue(
-                    error.name, error.value, f"cell ({place}) makes no scene: {error}"
-                ) from error
+                raise error.at(f"cell {place}") from error
+            used |= {name for name in FIELDS if getattr(scene, name) is not None}
+            yield scene
+        for axis in self.axes:
+            for name in axis.fields:
+                if name not in used:
+                    raise InvalidValue(axis.dimension, name, "has no effect in any cell")
 
     def _scene(self, rows: Sequence[Row]) -> Scene:
         fields = self.base.as_dict()
@@ -245,8 +279,9 @@ class Study:
                 "override",
                 name,
                 "is neither an axis nor a field of the scene",
-                choices=(*self.dimensions, *FIELDS),
+                choices=dict.fromkeys((*self.dimensions, *FIELDS)),
             )
+        self._check_sought([name])
         if _is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
         return replace(self, base=self.base.with_(**{name: _plain(value)}))
@@ -290,8 +325,14 @@ def _spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             continue
         for value in values:
             changed = {**row, name: _plain(value)}
-            if changed not in spread.values():
-                spread[", ".join(f"{k} = {v}" for k, v in changed.items())] = changed
+            if changed in spread.values():
+                continue
+            new = f"{name} = {value}"
+            if changed == row:
+                new = label
+            elif new in spread:
+                new = f"{label}, {new}"
+            spread[new] = changed
     return Axis(axis.dimension, spread)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -57,6 +58,12 @@ _QUANTITIES = (
         "stiffness_ratio", r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star"
     ),
     Quantity("load_velocity_ratio", "$V_0/V_*$", "1", "load point velocity after the step", "V_*"),
+    Quantity(
+        "log_load_velocity_ratio",
+        r"$\ln(V_0/V_*)$",
+        "1",
+        "logarithm of load point velocity over V_star",
+    ),
     Quantity(
         "displacement_step", r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
     ),
@@ -154,6 +161,8 @@ _QUANTITIES = (
     Quantity("regime", "", "", "equations in use"),
     # reductions
     Quantity("zeta", r"$\zeta$", "1", "slope of V_0/V_star - 1 against a/(b-a)"),
+    Quantity("static_slope", "", "1", "slope of static stress drop against ln V_0", "sigma_*"),
+    Quantity("dynamic_slope", "", "1", "slope of dynamic stress drop against ln V_0", "sigma_*"),
     # every lattice
     Quantity("status", "", "", "outcome of the cell"),
     Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),
@@ -174,6 +183,10 @@ _SUFFIXES = {
 
 #: Coordinates that follow from an axis: name -> (axis, formula).
 DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
+    "log_load_velocity_ratio": (
+        "load_velocity_ratio",
+        lambda ratio: math.log(ratio) if ratio > 0.0 else -math.inf,
+    ),
     "a_over_b_minus_a": ("b_over_a", lambda b_over_a: 1.0 / (b_over_a - 1.0)),
 }
 
@@ -189,5 +202,6 @@ def quantity(name: str) -> Quantity:
     if match:
         of = quantity(match[1])
         units = "1" if match[2] == "points" else of.units
-        return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", of.scale)
+        scale = "" if match[2] == "points" else of.scale
+        return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", scale)
     return Quantity(name, "", "1", name.replace("_", " "))

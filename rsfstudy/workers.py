@@ -18,6 +18,9 @@ from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
 _START_TIMEOUT = 60
+#: Run by each worker process at its start: on Ctrl-C it is the driver that ends a run, and its
+#: workers.
+_IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 Batch = Sequence[Scene]
 #: Takes batches of scenes and yields, in any order, the number of a batch and its finished cells.
@@ -141,20 +144,19 @@ def local_cluster(workers: int) -> Iterator[Any]:
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
         ),
     }
-    with (
-        _script_not_imported(),
-        dask.config.set(quiet),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
+    with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
+        cluster = stack.enter_context(
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,
+                preload=[_IGNORE_INTERRUPTS],
+            )
+        )
+        yield stack.enter_context(Client(cluster))
 
 
 @contextlib.contextmanager

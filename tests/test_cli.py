@@ -84,6 +84,25 @@ def test_a_failed_cell_is_listed_and_fails(tmp_path, monkeypatch):
     assert "integration_failed" in checked.stdout
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["--set", "b_over_a=1.5:3:3", "--set", "phi=55,60"],
+        ["--set", "b_over_a=1.5"],
+        ["--set", "b_over_a=2,3", "--set", "case=alpha = 0.56"],
+        ["--set", "b_over_a=2,3", "--set", "alpha=0.3"],
+    ],
+)
+def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_path):
+    ran = call("run", NAME, "--serial", *settings, "--output", tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    for command in ("check", "plot"):
+        again = call(command, NAME, "--output", tmp_path)
+        assert again.returncode == 0, again.stderr
+    assert "not as declared" in ran.stdout
+    assert settings[1].split("=")[0] in ran.stdout
+
+
 def test_plot_draws_beside_a_file(results):
     output, _said = results
     (output / f"{NAME}.png").unlink()
@@ -114,6 +133,9 @@ def test_list_and_show():
         (["run", NAME, "--set", "b_over_a"], "must read AXIS=VALUES"),
         (["run", NAME, "--set", "b_over_a="], "must read AXIS=VALUES"),
         (["run", NAME, "--set", "b_over_a=2:3:x"], "must read start:stop:count"),
+        (["run", NAME, "--set", "b_over_a=2:3"], "must read start:stop:count"),
+        (["run", NAME, "--set", "b_over_a=2,2"], "b_over_a = 2.0: stands twice"),
+        (["run", NAME, "--set", "load_velocity_ratio=3"], "is what the measure looks for"),
         (["run", NAME, "--set", "b_over_a=two"], "b_over_a = 'two': must be a number"),
         (["run", NAME, "--set", "b_over_a=0.5"], "must exceed 1"),
         (["run", NAME, "--set", "b_ovr_a=2"], "Did you mean 'b_over_a'"),

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.stats import linregress
 
 from rsfstudy.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce import ProportionalFit, RelativeDifference, reduced
+from rsfstudy.reduce import LinearFit, ProportionalFit, RelativeDifference, reduced
 from rsfstudy.status import Status
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
@@ -93,7 +94,34 @@ def test_relative_difference():
     result = reduced(lattice([2.0 * X, 1.5 * X]), (compare,))
     np.testing.assert_allclose(result.lowering.sel(case="other"), 0.25, rtol=1e-15)
     without = reduced(lattice([2.0 * X, 1.5 * X]).isel(case=[1]), (compare,))
-    assert without.lowering.isnull().all()
+    assert "lowering" not in without
+
+
+def test_reductions_describe_themselves():
+    """Names and units are those of the vocabulary, whatever the variable they come from bears."""
+    described = lattice(1.0 + 0.5 * X)
+    described.critical_velocity_ratio.attrs = {"long_name": "else", "scale": "V_*", "units": "1"}
+    described.a_over_b_minus_a.attrs = {"long_name": "coordinate"}
+    result = reduced(described, (FIT,))
+    assert result.zeta.attrs["long_name"] == "slope of V_0/V_star - 1 against a/(b-a)"
+    assert "scale" not in result.zeta.attrs
+    assert result.zeta_points.attrs["long_name"].startswith("number of points fitted for slope")
+    assert result.zeta.attrs["comment"].startswith("least squares of critical_velocity_ratio = 1 +")
+
+
+def test_a_range_without_points_gives_nothing():
+    outside = lattice(1.0 + 0.5 * X).isel(b_over_a=[3, 4])
+    assert "zeta" not in reduced(outside, (FIT,))
+
+
+@given(st.floats(-2.0, 2.0), st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
+def test_linear_fit_agrees_with_scipy(slope, noise):
+    values = 0.3 + slope * X + np.array(noise)
+    assume(np.ptp(values) > 1e-6)  # the correlation of a constant is undefined
+    fit = LinearFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    result, theirs = reduced(lattice(values), (fit,)), linregress(X, values)
+    assert float(result.slope) == pytest.approx(theirs.slope, rel=1e-9, abs=1e-14)
+    assert float(result.slope_stderr) == pytest.approx(theirs.stderr, rel=1e-6, abs=1e-10)
 
 
 def claim(**fields) -> Claim:
@@ -133,6 +161,11 @@ def test_an_expected_difference_does_not_move():
     off = [claim(published=3.0, expected="differs", because="a misprint")]
     assert not verdicts(lattice(np.full(5, 2.0)), off, {}).moved[0]
     assert verdicts(lattice(np.full(5, 3.0)), off, {}).moved[0]
+
+
+def test_claims_do_not_apply_to_a_lattice_with_more_dimensions():
+    table = verdicts(lattice(np.full((2, 5), 2.0)), [claim()], {})
+    assert table.verdict[0] == "not applicable"
 
 
 def test_claims_on_places_that_are_not_there_do_not_apply():

@@ -70,6 +70,11 @@ def test_equal_scenes_are_computed_once():
     assert dataset.sel(case="variable").critical_velocity_ratio.diff("phi").item() != 0.0
 
 
+def test_a_plain_axis_bears_its_values_even_where_some_cells_have_no_use_for_them():
+    dataset = run(SMALL.with_(phi=[55.0, 60.0], b_over_a=[2.0]))
+    assert dataset.phi.values.tolist() == [55.0, 60.0]
+
+
 def test_values_that_do_not_apply_are_nan_coordinates():
     assert np.isnan(run().alpha.sel(case="constant"))
     assert run().alpha.sel(case="variable").item() == 0.56
@@ -202,22 +207,30 @@ def test_an_interrupted_run_is_kept_and_goes_on(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.nc"]
 
 
-LONG = ["rate_step_boundary", "--serial", "--set", "b_over_a=1.3:6:120"]
+LONG = ["rate_step_boundary", "--set", "b_over_a=1.3:6:120"]
 
 
-def test_ctrl_c_ends_in_a_message_and_the_same_command_goes_on(tmp_path):
-    """A real SIGINT to the real command."""
-    command = [sys.executable, "-m", "rsfstudy.cli", "run", *LONG, "--output", str(tmp_path)]
+@pytest.mark.parametrize("options", [[*LONG, "--serial"], LONG])
+def test_ctrl_c_ends_in_a_message_and_the_same_command_goes_on(options, tmp_path):
+    """A real SIGINT to the real command and, as a terminal sends it, to its workers."""
+    command = [sys.executable, "-m", "rsfstudy.cli", "run", *options, "--output", str(tmp_path)]
     journal = tmp_path / "rate_step_boundary.cells.sqlite"
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     for _ in range(600):
         time.sleep(0.05)
         if journal.exists() and journal.stat().st_size > 30_000:
             break
-    process.send_signal(signal.SIGINT)
+    os.killpg(process.pid, signal.SIGINT)
     _out, said = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "Traceback" not in said
+    assert "Process Dask" not in said
     assert "of 360 cells are finished and kept" in " ".join(said.split())
     partial = rsfstudy.open(tmp_path / "rate_step_boundary.partial.nc")
     done = int((partial.status == 0).sum())

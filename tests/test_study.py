@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import ProportionalFit
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -84,7 +85,10 @@ def test_override_of_an_axis_replaces_its_values():
 
 
 def test_override_of_a_fixed_value():
-    assert {s.stiffness_ratio for s in study().with_(stiffness_ratio=1.5).scenes()} == {1.5}
+    assert {
+        s.stiffness_ratio
+        for s in study(Axis("b_over_a", [2.0])).with_(stiffness_ratio=1.5).scenes()
+    } == {1.5}
 
 
 def test_a_list_for_a_fixed_value_makes_an_axis():
@@ -105,9 +109,57 @@ def test_labels_select_points():
         study(Axis("case", CASES)).with_(case="strongg")
 
 
+def test_points_keep_their_labels_where_they_keep_their_values():
+    declared = study(Axis("case", {"constant": CASES["constant"], "alpha = 0.25": CASES["weak"]}))
+    changed = declared.with_(alpha=[0.25, 0.4])
+    assert changed.axes[0].labels == ("constant", "alpha = 0.25", "alpha = 0.4")
+    both = study(Axis("case", CASES)).with_(alpha=[0.25, 0.4, 0.56])
+    assert [s.alpha for s in both.scenes()] == [None, 0.25, 0.4, 0.56]
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"base": {"law": "slip"}}, "base.*must be made of Scene objects"),
+        ({"measure": "critical_step"}, "measure = 'critical_step': must be made of Measure"),
+        ({"measure": CriticalStep}, "must be made of Measure"),
+        ({"axes": []}, "must hold at least one axis"),
+        ({"axes": ["b_over_a"]}, "must be made of Axis"),
+        ({"reductions": ["zeta"]}, "must be made of Reduction"),
+        ({"claims": ["C6"]}, "must be made of Claim"),
+        (
+            {"reductions": [ProportionalFit(name="z", of="critical_displacement", on="x")]},
+            "critical_displacement'.*is not measured.*Did you mean",
+        ),
+        ({"axes": [Axis("load_velocity_ratio", [2.0])]}, "is what the measure looks for"),
+    ],
+)
+def test_studies_put_together_wrongly_are_refused_at_once(fields, message):
+    parts = {"base": Scene(), "axes": [Axis("b_over_a", [2.0])], "measure": CriticalStep()}
+    with pytest.raises(InvalidValue, match=message):
+        Study(name="trial", title="Trial", **{**parts, **fields})
+
+
+def test_what_the_measure_looks_for_cannot_be_set():
+    with pytest.raises(InvalidValue, match="is what the measure looks for"):
+        study(Axis("b_over_a", [2.0])).with_(load_velocity_ratio=3.0)
+
+
+def test_an_axis_no_cell_uses_is_refused():
+    unused = Study(
+        name="trial",
+        title="Trial",
+        base=Scene(normal_stress="constant"),
+        axes=[Axis("phi", [50.0, 60.0])],
+        measure=CriticalStep(),
+    )
+    with pytest.raises(InvalidValue, match="phi.*has no effect in any cell"):
+        list(unused.scenes())
+
+
 def test_unknown_overrides_suggest():
     with pytest.raises(InvalidValue, match="Did you mean 'stiffness_ratio'"):
-        study().with_(stifness_ratio=1.0)
+        study(Axis("b_over_a", [2.0])).with_(stifness_ratio=1.0)
 
 
 @given(st.lists(st.floats(1.01, 50.0), min_size=1, max_size=5, unique=True), st.booleans())
@@ -121,4 +173,10 @@ def test_declarations_are_plain_data(values, zipped):
 @pytest.mark.parametrize("name", ["", "two words", "a/b", "../x"])
 def test_names_that_are_no_file_names_are_refused(name):
     with pytest.raises(InvalidValue, match="identifier"):
-        Study(name=name, title="", base=Scene(), axes=[], measure=CriticalStep())
+        Study(
+            name=name,
+            title="",
+            base=Scene(),
+            axes=[Axis("b_over_a", [2.0])],
+            measure=CriticalStep(),
+        )

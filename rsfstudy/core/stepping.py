@@ -15,6 +15,9 @@ from rsfstudy.status import Status
 
 Vector = np.ndarray
 
+#: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
+_LONGEST_STEP = 1e9
+
 
 class Halt(Exception):
     """A motion that cannot go on, with the status that says why."""
@@ -142,6 +145,7 @@ def steps(
         -math.inf if backward else math.inf,
         rtol=tolerance,
         atol=tolerance * np.asarray(equations.scales),
+        max_step=_LONGEST_STEP,
     )
     counted = 0
     before = equations.point(solver.y.tolist(), solver.f.tolist())

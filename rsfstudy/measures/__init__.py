@@ -67,6 +67,11 @@ class Measure:
         return {}
 
     @property
+    def sought(self) -> tuple[str, ...]:
+        """Fields of the scene the measure looks for, whatever value the scene holds."""
+        return ()
+
+    @property
     def typical_work(self) -> int:
         """Right-hand sides one cell usually takes at the default accuracy."""
         raise TypeError(f"{type(self).__name__} states no typical work")

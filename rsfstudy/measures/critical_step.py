@@ -85,6 +85,10 @@ class CriticalStep(Measure):
         return dict.fromkeys((*names, *KINDS[self.of].beside, "critical_stiffness"), ())
 
     @property
+    def sought(self) -> tuple[str, ...]:
+        return (self.of,)
+
+    @property
     def typical_work(self) -> int:
         return 4_000
 

@@ -29,6 +29,8 @@ LN10 = math.log(10.0)
 #: Swings of ln V below this are steady sliding, and events that shrink this often are on their way
 #: to it.
 _STEADY, _SHRINKING = 1e-3, 60
+#: Displacement in D_c that sets off a motion where the scene has no step.
+_NUDGE = 0.1
 #: Samples within each integration step of a recorded orbit.
 _SAMPLES = 4
 
@@ -136,17 +138,20 @@ class LimitCycle(Measure):
         """
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        count, last, change, work = 0, None, np.inf, 0
-        spent = meter.spent
+        if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
+            # steady sliding left alone never leaves its steady state, stable or not
+            scene = scene.with_(load_velocity_ratio=1.0, displacement_step=_NUDGE)
+        count, last, spent = 0, None, meter.spent
+        change: np.ndarray | None = None
         for cycle in cycles(scene, accuracy, meter, None):
             if cycle is None or count >= self.events:
                 break
             count += 1
             if last is not None:
-                change = np.abs(cycle.numbers() - last.numbers())
-                if (change <= 0.1 * accuracy.rtol * np.abs(cycle.numbers())).all():
-                    work = meter.spent - spent
-                    return self._recorded(scene, cycle, change, count, work, accuracy, meter)
+                before, change = change, np.abs(cycle.numbers() - last.numbers())
+                if (change <= accuracy.rtol * np.abs(cycle.numbers())).all():
+                    work, left = meter.spent - spent, _still_to_come(change, before)
+                    return self._recorded(scene, cycle, left, count, work, accuracy, meter)
             last, spent = cycle, meter.spent
         if count >= self.events:
             return Outcome(
@@ -158,7 +163,7 @@ class LimitCycle(Measure):
         self,
         scene: Scene,
         cycle: Cycle,
-        change: np.ndarray,
+        left: np.ndarray,
         count: int,
         work: int,
         accuracy: Accuracy,
@@ -168,7 +173,7 @@ class LimitCycle(Measure):
         again = next(iter(cycles(scene, coarse, meter, cycle.end)))
         assert again is not None
         numbers = cycle.numbers()
-        errors = np.abs(again.numbers() - numbers) + change + 0.05 * accuracy.rtol * np.abs(numbers)
+        errors = np.abs(again.numbers() - numbers) + left + 0.05 * accuracy.rtol * np.abs(numbers)
         values: dict[str, float | np.ndarray] = {}
         for name, number, error in zip(_HEADLINES, numbers, errors, strict=True):
             values[name], values[f"{name}_error"] = float(number), float(error)
@@ -194,6 +199,14 @@ class LimitCycle(Measure):
         path = np.concatenate([[0.0], np.cumsum(strides.sum(axis=1))])
         at = np.linspace(0.0, path[-1], self.phases)
         return {name: np.interp(at, path, rows[:, i]) for i, name in enumerate(_ORBIT)}
+
+
+def _still_to_come(change: np.ndarray, before: np.ndarray | None) -> np.ndarray:
+    """How far the numbers may still be from those of the limit, from their last two changes."""
+    if before is None:
+        return change
+    contraction = min(float(change.max()) / max(float(before.max()), 1e-300), 0.95)
+    return change * max(contraction / (1.0 - contraction), 0.1)
 
 
 def cycles(

@@ -7,6 +7,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from pathlib import Path
+from types import ModuleType
 
 import xarray as xr
 from matplotlib.axes import Axes
@@ -36,11 +37,23 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     name = declaration(dataset)["plot"]
     if name not in NAMES:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
-    drawn: Axes = importlib.import_module(f"{__name__}.{name}").draw(dataset, axes)
+    module = importlib.import_module(f"{__name__}.{name}")
+    varied = {str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1}
+    if not varied <= set(getattr(module, "DIMENSIONS", varied)):
+        module = importlib.import_module(
+            f"{__name__}.lines"
+        )  # more axes than the figure has room for
+    drawn: Axes = module.draw(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
     completeness = dataset.attrs.get("completeness", "complete")
     if completeness != "complete":
         drawn.set_title(f"{drawn.get_title()} [{completeness}]".strip(), color="tab:red")
     return drawn
+
+
+def _single(dataset: xr.Dataset, module: ModuleType) -> set[str]:
+    """Dimensions of one point that a figure does not know of."""
+    known = getattr(module, "DIMENSIONS", dataset["status"].dims)
+    return {str(d) for d in dataset["status"].dims if dataset.sizes[d] == 1 and d not in known}
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

@@ -10,6 +10,9 @@ from matplotlib.axes import Axes
 
 from rsfstudy.vocabulary import quantity
 
+#: Dimensions the figure has room for.
+DIMENSIONS = ("case", "stiffness_ratio", "b_over_a")
+
 _MARKERS = "os^"
 
 

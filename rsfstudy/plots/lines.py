@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -22,9 +24,9 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
             places = zip(map(str, values.dims[:-1]), points, strict=True)
             label = ", ".join(f"{dimension} = {point}" for dimension, point in places)
         axes.plot(row[along].values, row.values, marker="o", markersize=3, label=label or None)
-    axes.set_xlabel(quantity(along).axis_label)
-    axes.set_ylabel(quantity(name).axis_label)
-    axes.set_title(dataset.attrs.get("title", ""), fontsize="medium")
+    axes.set_xlabel(textwrap.fill(quantity(along).axis_label, 60))
+    axes.set_ylabel(textwrap.fill(quantity(name).axis_label, 45))
+    axes.set_title(textwrap.fill(dataset.attrs.get("title", ""), 70), fontsize="medium")
     if 1 < rows.sizes["line"] <= 12:
         axes.legend(fontsize="small")
     axes.grid(alpha=0.3)

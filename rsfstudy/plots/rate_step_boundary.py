@@ -10,6 +10,9 @@ from matplotlib.axes import Axes
 
 from rsfstudy.vocabulary import quantity
 
+#: Dimensions the figure has room for.
+DIMENSIONS = ("case", "b_over_a")
+
 _MARKERS = "os^Dv<>"
 
 
@@ -22,10 +25,9 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.plot(reach, 1.0 + reach, "--", color="0.5", label=r"$1 + a/(b-a)$ (Gu et al. 1984)")
     for number, case in enumerate(dataset["case"].values):
         row = dataset.sel(case=case)
-        zeta, error = float(row["zeta"]), float(row["zeta_stderr"])
-        digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
-        slope = rf"$\zeta$ = {zeta:.{digits}f} $\pm$ {error:.{digits}f}"
-        text = str(case).replace("alpha", r"$\alpha$") + f": {slope}"
+        text = str(case).replace("alpha", r"$\alpha$")
+        if "zeta" in row:
+            text += f": {_slope(float(row['zeta']), float(row['zeta_stderr']))}"
         points = axes.errorbar(
             x,
             row["critical_velocity_ratio"],
@@ -34,7 +36,9 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
             markersize=4.5,
             label=text,
         )
-        axes.plot(reach, 1.0 + zeta * reach, color=points[0].get_color(), linewidth=0.9)
+        if "zeta" in row:
+            fitted = 1.0 + float(row["zeta"]) * reach
+            axes.plot(reach, fitted, color=points[0].get_color(), linewidth=0.9)
     axes.axvspan(0.25, 1.0, color="0.94", zorder=0)
     axes.text(0.27, 0.97, "fitted", transform=axes.get_xaxis_transform(), va="top", color="0.45")
     axes.set_xlabel(quantity("a_over_b_minus_a").symbol)
@@ -44,3 +48,8 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.set_ylim(1.0, 1.0 + reach[1])
     axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(0.0, 0.93))
     return axes
+
+
+def _slope(zeta: float, error: float) -> str:
+    digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
+    return rf"$\zeta$ = {zeta:.{digits}f} $\pm$ {error:.{digits}f}"

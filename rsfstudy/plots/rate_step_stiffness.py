@@ -10,6 +10,9 @@ from matplotlib.axes import Axes
 
 from rsfstudy.vocabulary import quantity
 
+#: Dimensions the figure has room for.
+DIMENSIONS = ("law", "case", "stiffness_ratio")
+
 _MARKERS = {"slip": "o", "slowness": "^"}
 
 
