@@ -109,9 +109,19 @@ _QUANTITIES = (
         "critical_stiffness",
         r"$k_{cr}D_c/\sigma_*$",
         "1",
-        "critical stiffness at the reference rate",
+        "critical stiffness of steady sliding",
         "sigma_*/D_c",
     ),
+    Quantity(
+        "critical_stiffness_from_growth",
+        r"$k_{cr}D_c/\sigma_*$",
+        "1",
+        "stiffness at which small perturbations of the assembled equations neither grow nor decay",
+        "sigma_*/D_c",
+    ),
+    Quantity("stiffness_slope", "", "1", "slope of critical stiffness against ln V", "sigma_*/D_c"),
+    Quantity("steady_friction", r"$\mu_{ss}$", "1", "steady-state friction coefficient"),
+    Quantity("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),
     Quantity(
         "recurrence_interval", "$t_r V_*/D_c$", "1", "recurrence interval of stick-slip", "D_c/V_*"
     ),
@@ -145,6 +155,37 @@ _QUANTITIES = (
     Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Quantity("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
     Quantity("phase", "", "1", "fraction of the path along a cycle"),
+    Quantity(
+        "evolution_distance",
+        r"$\delta_e/D_c$",
+        "1",
+        "slip until 1/e of the stress change after a rate step is left",
+        "D_c",
+    ),
+    Quantity("direct_stress_change", "", "1", "stress change just after a rate step", "sigma_*"),
+    Quantity(
+        "evolution_asymmetry",
+        "",
+        "1",
+        "stress change from direct effect to steady state over that of the inverse step, less 1",
+    ),
+    Quantity(
+        "direct_asymmetry",
+        "",
+        "1",
+        "direct stress change of the step over that of its inverse, less 1",
+    ),
+    Quantity(
+        "steady_stress_change", "", "1", "change of steady-state stress by a rate step", "sigma_*"
+    ),
+    Quantity(
+        "stress_left_at_unit_slip",
+        "",
+        "1",
+        "stress above its steady state after a slip of D_c",
+        "sigma_*",
+    ),
+    Quantity("slowing", "", "1", "fraction by which the evolution is shorter than the other"),
     # along a motion
     Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
     Quantity("slip", r"$\delta/D_c$", "1", "slip since the step", "D_c"),

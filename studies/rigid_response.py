@@ -1,0 +1,95 @@
+"""Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4)."""
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.reduce import RelativeDifference
+from rsfstudy.scene import Scene
+from rsfstudy.study import Axis, Study
+
+PAPER = "doi:10.1007/s11589-014-0098-4"
+DECADES = [1e-4, 1e-3, 1e-2, 1e-1, 1e1, 1e2, 200.0, 1e3, 1e4]
+
+
+def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
+    """C3, C4: variable normal stress slows the evolution."""
+    return Claim(
+        id=claim,
+        statement=f"{law} law, V = {rate:g} V_*: slower evolution with variable sigma",
+        source=f"{PAPER}, {figure}",
+        variable="slowing",
+        where={"law": law, "normal_stress": "variable", "load_velocity_ratio": rate},
+        relation="below",
+        published=0.0,
+        tolerance=0.0,
+        reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
+    )
+
+
+study = Study(
+    name="rigid_response",
+    title="Responses of a rigid slider to steps of slip rate, b/a = 2",
+    summary=(
+        "Stress against slip after the slip rate of a rigid slider steps from V_* to V. "
+        "Variable normal stress slows the evolution to the new steady state and makes upward "
+        "and downward steps unequal; with the slowness law it separates the responses to large "
+        "downward steps."
+    ),
+    base=Scene(b_over_a=2.0, alpha=0.56),
+    axes=[
+        Axis("law", ["slip", "slowness"]),
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("load_velocity_ratio", DECADES),
+    ],
+    measure=RigidResponse(),
+    reductions=[
+        RelativeDifference(
+            name="slowing", of="evolution_distance", along="normal_stress", reference="constant"
+        ),
+    ],
+    claims=[
+        *(slower("slip", rate, "Fig. 3", "C3") for rate in (1e-4, 1e-2)),
+        *(slower("slowness", rate, "Fig. 4", "C4") for rate in (1e-4, 1e-2)),
+        Claim(
+            id="C3",
+            statement="slip law, 4 decades down: more stress evolves than upward",
+            source=f"{PAPER}, section 2.3, Fig. 3",
+            variable="evolution_asymmetry",
+            where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
+            relation="above",
+            published=0.0,
+            tolerance=0.0,
+            reason="an inequality, on stress less its future steady value, as the figure plots it",
+        ),
+        Claim(
+            id="C3",
+            statement="slip law, 4 decades down: higher direct stress change than upward",
+            source=f"{PAPER}, section 2.3",
+            variable="direct_asymmetry",
+            where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
+            relation="above",
+            published=0.0,
+            tolerance=0.0,
+            reason="an inequality",
+            expected="differs",
+            because=(
+                "the jump itself is smaller downward, since strength grows more slowly the higher "
+                "the stress; the text reads it off curves of stress less its future steady value"
+            ),
+        ),
+        Claim(
+            id="C5",
+            statement="slowness law, constant, V = 200 V_*: 1/e of the stress left after 3.5 D_c",
+            source=f"{PAPER}, section 3.4",
+            variable="evolution_distance",
+            where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
+            published=3.5,
+            tolerance=0.05,
+            reason="'~3.5', printed to one decimal",
+        ),
+    ],
+    plot="rigid_response",
+    references=[
+        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
+        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+    ],
+)

@@ -1,0 +1,80 @@
+"""Linear stability: algebra and assembled equations vouch for each other."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsfstudy import Scene, steady_state
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.equations import inertial, strength_of
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.status import Status
+
+
+@given(
+    law=st.sampled_from(["slip", "slowness"]),
+    log_rate=st.floats(-5.0, 10.0),
+    phi=st.floats(45.0, 85.0),
+    alpha=st.floats(0.0, 1.0),
+    b_over_a=st.floats(1.05, 10.0),
+)
+def test_closed_form_is_the_threshold_of_growth(law, log_rate, phi, alpha, b_over_a):
+    scene = Scene(
+        law=law, load_velocity_ratio=math.exp(log_rate), phi=phi, alpha=alpha, b_over_a=b_over_a
+    )
+    outcome = LinearStability()(scene, Accuracy())
+    if outcome.status is Status.OK:
+        values = outcome.values
+        # truncation of the central differences: (1e-4)**2 of relative curvatures
+        assert values["critical_stiffness_from_growth"] == pytest.approx(
+            values["critical_stiffness"], rel=1e-6
+        )
+
+
+def test_without_steady_state_there_is_no_critical_stiffness():
+    outcome = LinearStability()(Scene(phi=40.0, load_velocity_ratio=1e-4), Accuracy())
+    assert outcome.status is Status.NO_STEADY_STATE
+    assert outcome.values["steady_friction"] > math.tan(math.radians(40.0))
+    faster = LinearStability()(Scene(phi=40.0, load_velocity_ratio=1.0), Accuracy())
+    assert faster.status is Status.OK
+
+
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
+def test_mass_shifts_the_threshold(effects):
+    """At T = 1e8 s double precision sees K = K_cr (1 + D q), q = K eps**2/a, D = 1 - mu_*
+    cot(phi).
+    """
+    scene = Scene(inertia=True, period=1e8, **effects)
+    steadiness = 1.0 - scene.mu_star * scene.cot_phi
+
+    def growth(ratio: float) -> float:
+        system = inertial(scene.with_(stiffness_ratio=ratio))
+        columns = []
+        for unit, scale in zip(np.eye(3), system.scales, strict=True):
+            step = 1e-5 * scale * unit
+            ahead, behind = system.rate(0.0, step), system.rate(0.0, -step)
+            columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
+        values = np.linalg.eigvals(np.array(columns).T)
+        return float(values[np.argsort(np.abs(values))][:2].real.max())
+
+    low, high = 1.0, 1.2
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if growth(middle) > 0.0 else (low, middle)
+    shift = steadiness * low * scene.critical_stiffness * scene.inertial_time**2 / scene.a
+    assert shift > 0.005
+    assert low == pytest.approx(1.0 + shift, rel=1e-6)
+    assert strength_of(scene)(0.0)[0] == 0.0
+
+
+def test_faster_sliding_stabilises():
+    """C2: a stiffness that is critical at V_* is above critical at any larger V."""
+    scene = Scene()
+    for log_rate in (0.5, 2.0, 8.0):
+        faster = steady_state.critical_stiffness(
+            log_rate, scene.mu_star, scene.a, scene.b, scene.cot_phi, scene.alpha
+        )
+        assert faster < scene.critical_stiffness

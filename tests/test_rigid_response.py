@@ -1,0 +1,101 @@
+"""Rigid responses: closed forms at constant normal stress, and what variable normal stress
+changes.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.equations import log_rate_at
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.rigid_response import RigidResponse, friction_after_step
+from rsfstudy.status import Status
+
+
+def response(rate: float, **fields) -> dict:
+    outcome = RigidResponse()(Scene(load_velocity_ratio=rate, **fields), Accuracy())
+    assert outcome.status is Status.OK, outcome.message
+    return dict(outcome.values)
+
+
+SLIP = RigidResponse().inner_coordinates["slip"]
+CONSTANT = {"normal_stress": "constant"}
+
+
+@pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 200.0, 1e4])
+def test_slowness_law_at_constant_normal_stress_is_eq_17a(rate):
+    """tau less mu_* sigma + a sigma ln V: -b ln V + b ln[1 + (V - 1) exp(-slip)]."""
+    scene = Scene()
+    exact = scene.mu_star + scene.a * math.log(rate) - scene.b * math.log(rate)
+    exact = exact + scene.b * np.log1p((rate - 1.0) * np.exp(-SLIP))
+    found = response(rate, law="slowness", **CONSTANT)
+    np.testing.assert_allclose(found["shear_stress"], exact, atol=1e-9 * scene.a * 20)
+
+
+@pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 1e4])
+def test_slip_law_at_constant_normal_stress_decays_over_one_slip_distance(rate):
+    """Eq. 17b is exact for the slip law: 1/e after D_c, whatever the step."""
+    found = response(rate, law="slip", **CONSTANT)
+    assert found["evolution_distance"] == pytest.approx(1.0, abs=1e-7)
+    assert found["evolution_distance_error"] < 1e-6
+    assert found["direct_stress_change"] == pytest.approx(Scene().a * math.log(rate), rel=1e-12)
+
+
+def test_small_steps_of_the_slowness_law_are_eq_17b():
+    found = response(1.0 + 1e-4, law="slowness", **CONSTANT)
+    assert found["evolution_distance"] == pytest.approx(1.0, abs=1e-4)  # ln(1 + x) = x, x < 1e-4
+
+
+def test_slip_of_3p5_of_the_paper():
+    found = response(200.0, law="slowness", **CONSTANT)
+    assert found["evolution_distance"] == pytest.approx(3.4978, abs=5e-5)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("rate", [1e-3, 1e3])
+def test_ends_of_a_response_are_the_direct_effect_and_the_steady_state(law, rate):
+    scene = Scene(law=law, load_velocity_ratio=rate)
+    found = response(rate, law=law)
+    direct = found["direct_stress_change"]
+    assert log_rate_at(scene, direct, 0.0) == pytest.approx(math.log(rate), rel=1e-12)
+    assert found["shear_stress"][0] == pytest.approx(scene.mu_star + direct, rel=1e-14)
+    mu_ss = scene.mu_star - (scene.b - scene.a) * math.log(rate)
+    far = RigidResponse(slip=60.0)(scene, Accuracy()).values
+    last = far["shear_stress"][-1] / far["normal_stress_ratio"][-1]
+    assert last == pytest.approx(mu_ss, abs=1e-6)
+
+
+def test_variable_normal_stress_makes_up_and_down_steps_unequal():
+    assert response(1e-3, **CONSTANT)["direct_asymmetry"] == pytest.approx(0.0, abs=1e-12)
+    assert response(1e-3, **CONSTANT)["evolution_asymmetry"] == pytest.approx(0.0, abs=1e-12)
+    # the jump is smaller downward, what evolves after it is larger
+    assert response(1e-3)["direct_asymmetry"] < -0.05
+    assert response(1e-3)["evolution_asymmetry"] > 0.05
+
+
+def test_variable_normal_stress_separates_large_down_steps_of_the_slowness_law():
+    """C4: after D_c, steps down by 2 and by 4 decades leave the same stress at constant normal
+    stress only.
+    """
+    apart = {}
+    for name, fields in (("constant", CONSTANT), ("variable", {})):
+        two, four = (response(r, law="slowness", **fields) for r in (1e-2, 1e-4))
+        apart[name] = abs(two["stress_left_at_unit_slip"] / four["stress_left_at_unit_slip"] - 1.0)
+    assert apart["constant"] < 0.02
+    assert apart["variable"] > 10.0 * apart["constant"]
+
+
+def test_steps_without_a_response_are_named():
+    assert RigidResponse()(Scene(), Accuracy()).status is Status.NO_STEADY_STATE
+    beyond = Scene(load_velocity_ratio=1e-35)
+    assert RigidResponse()(beyond, Accuracy()).status is Status.NO_STEADY_STATE
+    assert friction_after_step(Scene(), 0.0) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("fields", [{"slip": 0.5}, {"slip": math.inf}, {"points": 1}])
+def test_responses_need_slip_and_points(fields):
+    with pytest.raises(InvalidValue, match="must be at least"):
+        RigidResponse(**fields)
