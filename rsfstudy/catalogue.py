@@ -13,9 +13,10 @@ _PACKAGE = "rsfstudy.named_studies"
 
 
 def names() -> tuple[str, ...]:
-    """Names of the studies, in alphabetical order."""
+    """Names of the studies, in alphabetical order; files that start with _ are shared by them."""
     package = importlib.import_module(_PACKAGE)
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__)))
+    found = (module.name for module in pkgutil.iter_modules(package.__path__))
+    return tuple(sorted(name for name in found if not name.startswith("_")))
 
 
 def load(name: str) -> Study:

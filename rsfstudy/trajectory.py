@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from rsfstudy.core.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Halt, Meter, Step
+from rsfstudy.core.timeline import OBSERVED, elapsed, observed, timed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
@@ -74,14 +75,12 @@ def _follow(
     rows: list[tuple[float, ...]],
 ) -> None:
     """Append samples up to `duration`; stretches of one regime have clocks of their own."""
-    begin = latest = 0.0
     equations = None
-    for step in motion(scene, accuracy, meter, clock=True):
+    for step, begin in timed(scene, motion(scene, accuracy, meter, clock=True)):
         if step.equations is not equations:
-            equations, begin = step.equations, latest
+            equations = step.equations
             rows.append(_sample(scene, step, step.start, begin))
-        latest = begin + _elapsed(scene, step, step.end)
-        last = latest >= duration
+        last = begin + elapsed(scene, step, step.end) >= duration
         if last:
             step = _until(scene, step, duration - begin)
         clocks = np.linspace(step.start, step.end, _POINTS_PER_STEP + 1)[1:].tolist()
@@ -90,34 +89,20 @@ def _follow(
             return
 
 
-def _elapsed(scene: Scene, step: Step, clock: float) -> float:
-    """Time in D_c/V_* since the regime began."""
-    if step.equations.regime == "inertial":
-        return clock * scene.inertial_time
-    return float(step.state_at(clock)[2])
-
-
-def _until(scene: Scene, step: Step, elapsed: float) -> Step:
-    """The part of a step that ends after this time."""
-    if _elapsed(scene, step, step.end) <= elapsed:
+def _until(scene: Scene, step: Step, duration: float) -> Step:
+    """The part of a step that ends this long after its regime began."""
+    if elapsed(scene, step, step.end) <= duration:
         return step
-    clock = brentq(lambda c: _elapsed(scene, step, c) - elapsed, step.start, step.end)
+    clock = brentq(lambda c: elapsed(scene, step, c) - duration, step.start, step.end)
     return step.until(float(clock))
 
 
 def _sample(scene: Scene, step: Step, clock: float, begin: float) -> tuple[float, ...]:
     point = step.before if clock == step.start else step.point_at(clock)
-    time = begin + (_elapsed(scene, step, clock) if clock > 0.0 else 0.0)
-    loaded = scene.displacement_step + scene.load_velocity * time
-    return (
-        time,
-        loaded - point.spring / scene.stiffness,
-        point.log_rate / math.log(10.0),
-        scene.mu_star + point.spring,
-        1.0 + scene.cot_phi * point.friction,
-        point.imbalance - scene.b * point.log_rate,
-        REGIMES.index(step.equations.regime),
-    )
+    time = begin + elapsed(scene, step, clock)
+    # slip is counted from the start, before which the spring was displaced by the step
+    row = observed(scene, point, time, scene.spring_stress_step)
+    return (*row, REGIMES.index(step.equations.regime))
 
 
 def _dataset(
@@ -128,16 +113,8 @@ def _dataset(
     rtol: float,
     meter: Meter,
 ) -> xr.Dataset:
-    names = (
-        "time",
-        "slip",
-        "log10_slip_rate",
-        "shear_stress",
-        "normal_stress_ratio",
-        "state_variable",
-    )
     dataset = xr.Dataset()
-    for column, name in enumerate(names):
+    for column, name in enumerate(OBSERVED):
         about = quantity(name)
         attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
         dataset[name] = ("sample", samples[:, column], {k: v for k, v in attrs.items() if v})

@@ -10,8 +10,8 @@ from rsfstudy.reduce import ProportionalFit, RelativeDifference
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
-CONSTANT, WEAK, STRONG = "constant normal stress", "alpha = 0.25", "alpha = 0.56"
+from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
+
 CLOSE = "'very close'; 'maximum difference of a few percents'"
 
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 9) / 4])
@@ -42,14 +42,7 @@ study = Study(
     ),
     base=Scene(law="slip"),
     axes=[
-        Axis(
-            "case",
-            {
-                CONSTANT: {"normal_stress": "constant"},
-                WEAK: {"normal_stress": "variable", "alpha": 0.25},
-                STRONG: {"normal_stress": "variable", "alpha": 0.56},
-            },
-        ),
+        Axis("case", CASES),
         Axis("stiffness_ratio", [1.0, 1.5, 2.0]),
         Axis("b_over_a", 1.0 + 1.0 / a_over_b_minus_a),
     ],
@@ -88,8 +81,7 @@ study = Study(
     ],
     plot="displacement_boundary",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
         "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
     ],
 )

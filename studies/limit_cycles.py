@@ -5,7 +5,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
+from ._paper import PAPER, REFERENCE
 
 
 def speaks_of(law: str, normal_stress: str) -> dict[str, str]:
@@ -81,8 +81,7 @@ study = Study(
     ],
     plot="limit_cycles",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
         "Rice and Tse (1986), J. Geophys. Res. 91, 521-530",
     ],
 )

@@ -10,7 +10,7 @@ from rsfstudy.reduce import LinearFit
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
+from ._paper import PAPER, REFERENCE
 
 
 def steepness(phi: float, gentler: float) -> Claim:
@@ -89,8 +89,7 @@ study = Study(
     ],
     plot="linear_stability",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
         "Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694",
     ],
 )

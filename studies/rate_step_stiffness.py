@@ -10,8 +10,7 @@ from rsfstudy.reduce import RelativeDifference
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
-CONSTANT, WEAK, STRONG = "constant normal stress", "alpha = 0.25", "alpha = 0.56"
+from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
 
 
 def slowness(stiffness_ratio: float, published: float, tolerance: float, digits: str) -> Claim:
@@ -39,14 +38,7 @@ study = Study(
     base=Scene(b_over_a=math.e),
     axes=[
         Axis("law", ["slip", "slowness"]),
-        Axis(
-            "case",
-            {
-                CONSTANT: {"normal_stress": "constant"},
-                WEAK: {"normal_stress": "variable", "alpha": 0.25},
-                STRONG: {"normal_stress": "variable", "alpha": 0.56},
-            },
-        ),
+        Axis("case", CASES),
         Axis("stiffness_ratio", np.linspace(1.0, 2.0, 21)),
     ],
     measure=CriticalStep(of="load_velocity_ratio", direction="up"),
@@ -82,8 +74,7 @@ study = Study(
     ],
     plot="rate_step_stiffness",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
         "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
     ],
 )

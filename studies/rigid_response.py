@@ -6,7 +6,8 @@ from rsfstudy.reduce import RelativeDifference
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
+from ._paper import PAPER, REFERENCE
+
 DECADES = [1e-4, 1e-3, 1e-2, 1e-1, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
@@ -89,7 +90,6 @@ study = Study(
     ],
     plot="rigid_response",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
     ],
 )

@@ -10,7 +10,7 @@ from rsfstudy.reduce import LinearFit
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
-PAPER = "doi:10.1007/s11589-014-0098-4"
+from ._paper import PAPER, REFERENCE
 
 base = Scene(b_over_a=2.0, alpha=0.56, inertia=True)
 weakening = base.b - base.a
@@ -86,8 +86,7 @@ study = Study(
     ],
     plot="stress_drop",
     references=[
-        "Effect of varying normal stress on stability and dynamic motion of a spring-slider system "
-        f"with rate- and state-dependent friction, Earthquake Science (2014), {PAPER}",
+        REFERENCE,
         "Gu and Wong (1991), J. Geophys. Res. 96, 21677-21691",
     ],
 )

@@ -18,6 +18,7 @@ import numpy as np
 from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Halt, Meter, Step
+from rsfstudy.core.timeline import OBSERVED, elapsed, observed, timed
 from rsfstudy.equations import Point
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
@@ -40,14 +41,6 @@ _HEADLINES = (
     "dynamic_stress_drop",
     "min_log10_slip_rate",
     "max_log10_slip_rate",
-)
-_ORBIT = (
-    "time",
-    "slip",
-    "log10_slip_rate",
-    "shear_stress",
-    "normal_stress_ratio",
-    "state_variable",
 )
 
 
@@ -122,7 +115,7 @@ class LimitCycle(Measure):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         scalars = [name for h in _HEADLINES for name in (h, f"{h}_error")]
         scalars += ["slip_per_event", "healing_exponent", "events_until_repeat", "work_per_cycle"]
-        return dict.fromkeys(scalars, ()) | dict.fromkeys(_ORBIT, ("phase",))
+        return dict.fromkeys(scalars, ()) | dict.fromkeys(OBSERVED, ("phase",))
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -198,7 +191,7 @@ class LimitCycle(Measure):
         strides = np.abs(np.diff(rows[:, [0, 2, 3]], axis=0) / np.where(spread > 0.0, spread, 1.0))
         path = np.concatenate([[0.0], np.cumsum(strides.sum(axis=1))])
         at = np.linspace(0.0, path[-1], self.phases)
-        return {name: np.interp(at, path, rows[:, i]) for i, name in enumerate(_ORBIT)}
+        return {name: np.interp(at, path, rows[:, i]) for i, name in enumerate(OBSERVED)}
 
 
 def _still_to_come(change: np.ndarray, before: np.ndarray | None) -> np.ndarray:
@@ -219,7 +212,7 @@ def cycles(
     """
     watch = _Watch(scene, started=start is not None)
     swings: list[float] = []
-    for step, now in _timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
+    for step, now in timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
         cycle = watch.see(step, now)
         if cycle is not None:
             swings.append(cycle.fastest - cycle.slowest)
@@ -231,24 +224,6 @@ def cycles(
         elif watch.at_rest(step):
             yield None
             return
-
-
-def _timed(scene: Scene, moving: Iterator[Step]) -> Iterator[tuple[Step, float]]:
-    """Steps with the time at which their stretch began."""
-    begin = latest = 0.0
-    equations = None
-    for step in moving:
-        if step.equations is not equations:
-            equations, begin = step.equations, latest
-        yield step, begin
-        latest = begin + elapsed(scene, step, step.end)
-
-
-def elapsed(scene: Scene, step: Step, clock: float) -> float:
-    """Time in D_c/V_* since the stretch of a step began."""
-    if step.equations.regime == "inertial":
-        return clock * scene.inertial_time
-    return float(step.state_at(clock)[2]) if clock > 0.0 else 0.0
 
 
 class _Watch:
@@ -331,25 +306,14 @@ def _samples(
     """Points of one cycle, from the maximum of spring stress on."""
     load, risen = scene.log_load_rate, False
     moving = motion(scene, accuracy, meter, start=start, clock=True)
-    for step, begin in _timed(scene, moving):
+    for step, begin in timed(scene, moving):
         ends = risen and step.before.log_rate < load <= step.after.log_rate
         if ends:
             step = step.until(step.locate(lambda point: point.log_rate - load))
         for clock in np.linspace(step.start, step.end, _SAMPLES + 1).tolist():
             point = step.before if clock == step.start else step.point_at(clock)
-            yield _row(scene, point, begin + elapsed(scene, step, clock), start[0])
+            yield observed(scene, point, begin + elapsed(scene, step, clock), start[0])
         risen = risen or step.after.log_rate < load
         if ends:
             return
     raise Halt(Status.INTEGRATION_FAILED, "a motion ended by itself")
-
-
-def _row(scene: Scene, point: Point, time: float, begun: float) -> tuple[float, ...]:
-    return (
-        time,
-        scene.load_velocity * time - (point.spring - begun) / scene.stiffness,
-        point.log_rate / LN10,
-        scene.mu_star + point.spring,
-        1.0 + scene.cot_phi * point.friction,
-        point.imbalance - scene.b * point.log_rate,
-    )
