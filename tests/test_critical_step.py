@@ -14,10 +14,11 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import log_rate_at
+from rsfstudy.equations import log_rate_at, quasi_static
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep, error_of_leaving_mass_out
 from rsfstudy.measures.swing import swing
+from rsfstudy.measures.touching import touching_point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -420,3 +421,16 @@ def test_public_call_returns_a_small_dataset():
     assert float(step.critical_displacement) == float(held.critical_displacement)
     assert float(moving.critical_displacement) < float(held.critical_displacement)
     assert np.isfinite(float(step.slip_rate_after_step))
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("load", [0.0, 1.5])
+def test_the_critical_path_touches_the_norm_at_rest(law, load):
+    """At the touching point ln V is at the norm and stationary, by the assembled equations."""
+    scene = Scene(law=law, load_velocity_ratio=load)
+    start = touching_point(scene)
+    assert start is not None
+    system = quasi_static(scene, clock=False)
+    point = system.point(start, system.rate(0.0, start))
+    assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
+    assert point.growth == pytest.approx(0.0, abs=1e-11)

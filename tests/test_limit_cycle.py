@@ -90,6 +90,11 @@ def test_balances_of_the_orbit(case):
         assert found[name][-1] == pytest.approx(found[name][0], abs=1e-5)
     assert (np.diff(found["time"]) >= 0.0).all()
     assert np.ptp(found["shear_stress"]) == pytest.approx(found["static_stress_drop"], rel=1e-3)
+    # the dynamic drop ends at peak slip rate; the orbit is kept at 400 points
+    peak = found["shear_stress"][found["log10_slip_rate"].argmax()]
+    dynamic = found["shear_stress"].max() - peak
+    assert dynamic == pytest.approx(found["dynamic_stress_drop"], rel=0.1)
+    assert dynamic < 0.9 * found["static_stress_drop"]
     assert found["log10_slip_rate"].max() == pytest.approx(found["max_log10_slip_rate"], abs=0.05)
     assert found["log10_slip_rate"].min() == pytest.approx(found["min_log10_slip_rate"], abs=0.3)
     # both the slow part and the rupture are resolved: no stride longer than a few per cent of the

@@ -35,7 +35,6 @@ class Meter:
 
     budget: int
     by_regime: dict[str, int] = field(default_factory=dict)
-    steps: int = 0
 
     @property
     def spent(self) -> int:
@@ -155,7 +154,6 @@ def steps(
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             failure = solver.step()
         meter.charge(regime, solver.nfev - counted)
-        meter.steps += 1
         counted = solver.nfev
         if solver.status == "failed":
             raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
