@@ -43,6 +43,8 @@ class Claim:
         Coordinate values that single out one number.
     minus : mapping, optional
         A second place; the claim is then on the difference.
+    minus_variable : str, optional
+        The variable at the second place, where it is another.
     relation : {"equals", "below", "above"}
         How ours should relate to the published value.
     published : float
@@ -67,6 +69,7 @@ class Claim:
     reason: str
     relation: str = "equals"
     minus: Mapping[str, Any] = field(default_factory=dict)
+    minus_variable: str = ""
     expected: str = REPRODUCED
     because: str = ""
 
@@ -91,7 +94,7 @@ class Claim:
         try:
             ours = _pick(dataset, self.variable, self.where)
             if self.minus:
-                ours -= _pick(dataset, self.variable, self.minus)
+                ours -= _pick(dataset, self.minus_variable or self.variable, self.minus)
         except KeyError:
             return math.nan, NOT_APPLICABLE
         if math.isnan(ours):

@@ -356,7 +356,7 @@ def _failures(dataset: xr.Dataset) -> int:
     if _undone(dataset):
         size = dataset["status"].size
         _console.print(f"{_undone(dataset)} of {size} cells are not computed yet", style="red")
-    failed = dataset["status"] > int(Status.NORM_UNREACHABLE)
+    failed = dataset["status"] >= int(Status.WORK_BUDGET_SPENT)
     if not bool(failed.any()):
         return OK
     failed = failed & (dataset["status"] != int(Status.PENDING))

@@ -26,12 +26,16 @@ class Status(IntEnum):
     SHEAR_STRESS_REVERSED = 7, "shear stress reverses: friction of forward slip no longer applies"
     NORM_BELOW_LOADING_RATE = 8, "the loading alone already reaches the instability norm"
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
-    WORK_BUDGET_SPENT = 10, "the work budget was spent before an answer was reached"
-    INTEGRATION_FAILED = 11, "the integrator gave up or returned non-finite numbers"
-    UNVERIFIED = 12, "two formulations disagree: no bracket confirms the value"
-    CELL_RAISED = 13, "the measure raised an exception"
-    WORKER_LOST = 14, "the worker process died while computing this cell"
-    PENDING = 15, "not computed yet"
+    SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
+    UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
+
+    # failures, from here on
+    WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
+    INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
+    UNVERIFIED = 22, "two formulations disagree: no bracket confirms the value"
+    CELL_RAISED = 23, "the measure raised an exception"
+    WORKER_LOST = 24, "the worker process died while computing this cell"
+    PENDING = 25, "not computed yet"
 
     @property
     def label(self) -> str:
@@ -41,4 +45,4 @@ class Status(IntEnum):
     @property
     def is_answer(self) -> bool:
         """True where the status answers the question, even if no number can."""
-        return self <= Status.NORM_UNREACHABLE
+        return self < Status.WORK_BUDGET_SPENT

@@ -51,6 +51,46 @@ def critical_stiffness(
     return (b - a) * sigma_ss / (1.0 - cot_phi * (mu_ss - alpha))
 
 
+def critical_stiffness_explicit(
+    log_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
+) -> float:
+    """The same as an explicit function of V: ``k_cr = (b - a) sigma_* (1 - mu_* cot(phi)) / {D_c
+    (1 - mu_ss cot(phi)) [1 - (mu_ss - alpha) cot(phi)]}`` (He et al. 1998).
+    """
+    mu_ss = steady_friction(log_rate, mu_star, a, b)
+    above = (b - a) * (1.0 - mu_star * cot_phi)
+    return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
+
+
+def rise_by_mass(
+    critical: float, norm: float, mu_ss: float, sigma_ss: float, a: float, cot_phi: float
+) -> float:
+    """How much mass raises the critical stiffness, as a fraction; ``math.inf`` where sliding is
+    unstable at every stiffness.
+
+    Small perturbations of steady sliding obey, per time D_c/V with M = K w**2,
+
+        E M p**3 + (D M + a sigma_ss) p**2 + [E K - (b-a) sigma_ss] p + D K = 0,
+        D = 1 - mu_ss cot(phi),  E = D + alpha cot(phi),
+
+    which has purely imaginary roots at K = K_cr/(1 - q) with q = K_cr D w**2/(a sigma_ss): q/(1-q)
+    is the rise.
+
+    Parameters
+    ----------
+    critical : float
+        Critical stiffness without mass, K_cr, times D_c/sigma_*.
+    norm : float
+        w = V T/(2 pi D_c) of steady sliding.
+    mu_ss, sigma_ss : float
+        Steady-state friction coefficient, and normal stress over sigma_*.
+    a, cot_phi : float
+        Direct effect parameter; cotangent of the driving angle.
+    """
+    share = critical * (1.0 - mu_ss * cot_phi) * norm**2 / (a * sigma_ss)
+    return share / (1.0 - share) if share < 1.0 else math.inf
+
+
 def lowest_log_rate(mu_star: float, a: float, b: float, cot_phi: float) -> float:
     """Smallest ln(V/V_*) with a steady state: where phi = atan(mu_ss); ``-inf`` at constant normal
     stress.

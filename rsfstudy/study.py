@@ -180,11 +180,11 @@ class Study:
                     raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
         if not self.axes:
             raise InvalidValue("axes", self.axes, "must hold at least one axis")
+        known = list(self.measure.variables)
         for reduction in self.reductions:
-            if reduction.of not in self.measure.variables:
-                raise InvalidValue(
-                    "reduction of", reduction.of, "is not measured", choices=self.measure.variables
-                )
+            if reduction.of not in known:
+                raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
+            known.append(reduction.name)
         for axis in self.axes:
             self._check_sought(axis.fields)
 

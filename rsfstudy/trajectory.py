@@ -47,8 +47,9 @@ def simulate(
     -------
     xarray.Dataset
         ``time``, ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring),
-        ``normal_stress_ratio``, ``state_variable`` and ``regime`` along ``sample``. A motion that
-        cannot go on ends early, with its ``status`` and ``message`` in the attributes.
+        ``frictional_stress``, ``normal_stress_ratio``, ``state_variable`` and ``regime`` along
+        ``sample``. A motion that cannot go on ends early, with its ``status`` and ``message`` in
+        the attributes.
 
     Raises
     ------
@@ -64,7 +65,9 @@ def simulate(
         _follow(scene, duration, Accuracy(rtol, budget), meter, rows)
     except Halt as halt:
         status, message = halt.status, str(halt)
-    return _dataset(scene, np.array(rows).reshape(-1, 7), status, message, rtol, meter)
+    return _dataset(
+        scene, np.array(rows).reshape(-1, len(OBSERVED) + 1), status, message, rtol, meter
+    )
 
 
 def _follow(

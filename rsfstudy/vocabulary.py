@@ -102,6 +102,18 @@ _QUANTITIES = (
     Quantity(
         "displacement_slope", "", "1", "slope of critical displacement against a/(b-a)", "D_c"
     ),
+    Quantity("over_eq_11", "", "1", "critical load point velocity over that of eq. 11"),
+    Quantity("over_eq_14", "", "1", "critical displacement step over D_c a/(b-a)"),
+    Quantity(
+        "implied_norm", r"$VT/(2\pi D_c)$", "1", "instability norm that gives the published value"
+    ),
+    Quantity(
+        "lattice_boundary",
+        "$V_0/V_*$",
+        "1",
+        "boundary between stable and unstable cells",
+        "V_*",
+    ),
     Quantity(
         "lowering", "", "1", "fraction by which the boundary lies below that of the reference"
     ),
@@ -118,6 +130,27 @@ _QUANTITIES = (
         "1",
         "stiffness at which small perturbations of the assembled equations neither grow nor decay",
         "sigma_*/D_c",
+    ),
+    Quantity(
+        "critical_stiffness_explicit",
+        r"$k_{cr}D_c/\sigma_*$",
+        "1",
+        "critical stiffness as an explicit function of slip rate",
+        "sigma_*/D_c",
+    ),
+    Quantity(
+        "relative_critical_stiffness",
+        r"$k_{cr}(V)/k_{cr}(V_*)$",
+        "1",
+        "critical stiffness over that at V_star",
+    ),
+    Quantity("rise_by_mass", "", "1", "fraction by which mass raises the critical stiffness"),
+    Quantity(
+        "stabilising_velocity",
+        "$V_0/V_*$",
+        "1",
+        "load point velocity beyond which a spring of that stiffness slides stably",
+        "V_*",
     ),
     Quantity("stiffness_slope", "", "1", "slope of critical stiffness against ln V", "sigma_*/D_c"),
     Quantity("steady_friction", r"$\mu_{ss}$", "1", "steady-state friction coefficient"),
@@ -145,12 +178,55 @@ _QUANTITIES = (
     Quantity(
         "max_log10_slip_rate", "", "1", "decimal logarithm of the fastest slip rate over V_star"
     ),
+    Quantity(
+        "peak_log10_slip_rate",
+        r"$\log_{10}(V_{peak}/V_*)$",
+        "1",
+        "decimal logarithm of the slip rate over V_star at each peak",
+    ),
+    Quantity("peak", "", "1", "number of the peak of slip rate after the step"),
+    Quantity(
+        "peak_ratio",
+        "",
+        "1",
+        "second over first peak of ln V above the load point velocity: 1 where oscillations repeat",
+    ),
+    Quantity(
+        "peak_lowering", "", "1", "what mass takes off the decimal logarithm of the peak slip rate"
+    ),
+    Quantity(
+        "paths_parting",
+        "",
+        "1",
+        "log10(V/V_star) at which mass makes the path leave its massless twin",
+    ),
+    Quantity(
+        "paths_merging",
+        "",
+        "1",
+        "log10(V/V_star) at which mass lets the path join its massless twin",
+    ),
+    Quantity(
+        "paths_offset",
+        "",
+        "1",
+        "stress after the rupture with mass, less that without",
+        "sigma_*",
+    ),
+    Quantity("unstable", "", "1", "whether the step triggers instability"),
     Quantity("slip_per_event", r"$\delta/D_c$", "1", "slip per stick-slip cycle", "D_c"),
     Quantity(
         "healing_exponent",
         "",
         "1",
         "exponent of the state variable theta in slip rate, from arrest to the slowest slip rate",
+    ),
+    Quantity("residual_friction", r"$\tau/\sigma$", "1", "friction coefficient at peak slip rate"),
+    Quantity(
+        "drop_asymmetry",
+        "",
+        "1",
+        "stress drop while slip accelerates over that while it decelerates",
     ),
     Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Quantity("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
@@ -185,6 +261,26 @@ _QUANTITIES = (
         "stress above its steady state after a slip of D_c",
         "sigma_*",
     ),
+    Quantity(
+        "closed_form_misfit",
+        "",
+        "1",
+        "largest departure of stress from the closed form at constant normal stress",
+        "sigma_*",
+    ),
+    Quantity(
+        "exponential_misfit",
+        "",
+        "1",
+        "largest departure from exponential decay over D_c, as a fraction of the stress change",
+    ),
+    Quantity(
+        "separation",
+        "",
+        "1",
+        "spread of the stress left after a slip of D_c by downward steps of 2 to 4 decades",
+        "sigma_*",
+    ),
     Quantity("slowing", "", "1", "fraction by which the evolution is shorter than the other"),
     # along a motion
     Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
@@ -195,6 +291,13 @@ _QUANTITIES = (
     Quantity(
         "shear_stress", r"$\tau/\sigma_*$", "1", "shear stress carried by the spring", "sigma_*"
     ),
+    Quantity(
+        "frictional_stress",
+        r"$\tau_f/\sigma_*$",
+        "1",
+        "frictional resistance: what the spring carries, less what accelerates the mass",
+        "sigma_*",
+    ),
     Quantity("normal_stress_ratio", r"$\sigma/\sigma_*$", "1", "normal stress", "sigma_*"),
     Quantity(
         "state_variable", r"$\Theta$", "1", "state variable, as a part of the friction coefficient"
@@ -204,6 +307,24 @@ _QUANTITIES = (
     Quantity("zeta", r"$\zeta$", "1", "slope of V_0/V_star - 1 against a/(b-a)"),
     Quantity("static_slope", "", "1", "slope of static stress drop against ln V_0", "sigma_*"),
     Quantity("dynamic_slope", "", "1", "slope of dynamic stress drop against ln V_0", "sigma_*"),
+    *(
+        Quantity(
+            f"{drop}_slope_{range_}",
+            "",
+            "1",
+            f"slope of {drop} stress drop against ln V_0 {words}",
+            "sigma_*",
+        )
+        for drop in ("static", "dynamic")
+        for range_, words in (
+            ("slow", "from V_star to 10 V_star"),
+            ("fast", "from 100 to 1000 V_star"),
+        )
+    ),
+    Quantity(
+        "static_slope_scaled", "$f(k)$", "1", "slope of static stress drop over (a-b) sigma_star"
+    ),
+    Quantity("dynamic_slope_scaled", "", "1", "slope of dynamic stress drop over (a-b) sigma_star"),
     # every lattice
     Quantity("status", "", "", "outcome of the cell"),
     Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),
@@ -220,7 +341,11 @@ _SUFFIXES = {
     "stderr": "standard error (misfit of the fitted law) of",
     "misfit": "largest misfit of the law fitted for",
     "points": "number of points fitted for",
+    "crossings": "changes of the answer along",
+    "closed_form": "published closed form beside",
 }
+
+_COUNTS = ("points", "crossings")
 
 #: Coordinates that follow from an axis: name -> (axis, formula).
 DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
@@ -242,7 +367,7 @@ def quantity(name: str) -> Quantity:
     match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIXES)})", name)
     if match:
         of = quantity(match[1])
-        units = "1" if match[2] == "points" else of.units
-        scale = "" if match[2] == "points" else of.scale
+        units = "1" if match[2] in _COUNTS else of.units
+        scale = "" if match[2] in _COUNTS else of.scale
         return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", scale)
     return Quantity(name, "", "1", name.replace("_", " "))

@@ -78,6 +78,32 @@ study = Study(
             )
             for stress in ("constant", "variable")
         ),
+        *(
+            Claim(
+                id="C14",
+                statement=f"slowness law, {stress}: drops in acceleration and deceleration unequal",
+                source=f"{PAPER}, section 3.4, Fig. 11",
+                variable="drop_asymmetry",
+                where=speaks_of("slowness", stress),
+                relation="above",
+                published=1.5,
+                tolerance=0.0,
+                reason="'strongly asymmetrical'; 1 is symmetrical",
+            )
+            for stress in ("constant", "variable")
+        ),
+        Claim(
+            id="C14",
+            statement="constant normal stress: far more so than with the slip law",
+            source=f"{PAPER}, section 3.4, Rice and Tse (1986)",
+            variable="drop_asymmetry",
+            where=speaks_of("slowness", "constant"),
+            minus=speaks_of("slip", "constant"),
+            relation="above",
+            published=1.0,
+            tolerance=0.0,
+            reason="'different to the slip law', whose two drops are within a quarter of equal",
+        ),
     ],
     plot="limit_cycles",
     references=[

@@ -6,11 +6,32 @@ import numpy as np
 
 from rsfstudy.claims import Claim
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import LinearFit
+from rsfstudy.reduce import Inverse, LinearFit
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
 from ._paper import PAPER, REFERENCE
+
+MASSLESS, AS_PUBLISHED, HEAVY = "no mass", "T = 5 s", "T = 1e6 s"
+MASSES: dict[str, dict[str, bool | float]] = {
+    MASSLESS: {"inertia": False},
+    AS_PUBLISHED: {"inertia": True, "period": 5.0},
+    HEAVY: {"inertia": True, "period": 1e6},
+}
+
+
+def vouched(mass: str, phi: float, rate: float) -> Claim:
+    """C1: the closed form is the threshold of the equations as they are assembled."""
+    return Claim(
+        id="C1",
+        statement=f"{mass}, phi = {phi:g}, {rate:g} V_*: k_cr is that of growing perturbations",
+        source=f"{PAPER}, eqs. 7 and 8",
+        variable="critical_stiffness_error",
+        where={"mass": mass, "phi": phi, "load_velocity_ratio": rate},
+        published=0.0,
+        tolerance=1e-9,
+        reason="central differences of the assembled equations",
+    )
 
 
 def steepness(phi: float, gentler: float) -> Claim:
@@ -20,8 +41,8 @@ def steepness(phi: float, gentler: float) -> Claim:
         statement=f"k_cr falls with V more steeply at {phi:g} than at {gentler:g} degrees",
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
-        where={"phi": phi},
-        minus={"phi": gentler},
+        where={"mass": MASSLESS, "phi": phi},
+        minus={"mass": MASSLESS, "phi": gentler},
         relation="below",
         published=0.0,
         tolerance=0.0,
@@ -35,10 +56,13 @@ study = Study(
     summary=(
         "Above its curve steady sliding is stable under small perturbations, below it unstable. "
         "The curves fall with slip rate, the more steeply the smaller the angle between the "
-        "driving stress and the fault normal; where phi < atan(mu_ss) there is no steady state."
+        "driving stress and the fault normal; where phi < atan(mu_ss) there is no steady state. "
+        "So a faster load point can stabilise a spring, and a slower one destabilise it. Mass "
+        "raises the curves by about (T V/(2 pi D_c))**2: nothing at T = 5 s up to 1e5 V_*."
     ),
     base=Scene(b_over_a=2.0, alpha=0.56),
     axes=[
+        Axis("mass", MASSES),
         Axis("phi", [40.0, 45.0, 50.0, 60.0, 75.0]),
         Axis("load_velocity_ratio", 10.0 ** np.linspace(-6.0, 6.0, 49)),
     ],
@@ -50,6 +74,12 @@ study = Study(
             on="log_load_velocity_ratio",
             within=(-1.2, 1.2),
         ),
+        Inverse(
+            name="stabilising_velocity",
+            of="relative_critical_stiffness",
+            on="load_velocity_ratio",
+            levels=0.8,
+        ),
     ],
     claims=[
         Claim(
@@ -57,7 +87,7 @@ study = Study(
             statement="phi = 60 degrees: k_cr falls with V",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stiffness_slope",
-            where={"phi": 60.0},
+            where={"mass": MASSLESS, "phi": 60.0},
             relation="below",
             published=0.0,
             tolerance=0.0,
@@ -67,24 +97,52 @@ study = Study(
         steepness(40.0, 50.0),
         Claim(
             id="C1",
-            statement="phi = 60 degrees, V = V_*: k_cr by eq. 8 is that of growing perturbations",
+            statement="phi = 50, 100 V_*: eq. 7 equals eq. 8",
             source=f"{PAPER}, eqs. 7 and 8",
-            variable="critical_stiffness_error",
-            where={"phi": 60.0, "load_velocity_ratio": 1.0},
+            variable="critical_stiffness",
+            where={"mass": MASSLESS, "phi": 50.0, "load_velocity_ratio": 100.0},
+            minus_variable="critical_stiffness_explicit",
+            minus={"mass": MASSLESS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
-            tolerance=1e-9,
-            reason="central differences of the assembled equations",
+            tolerance=1e-15,
+            reason="an identity; rounding",
         ),
+        vouched(MASSLESS, 60.0, 1.0),
+        vouched(AS_PUBLISHED, 60.0, 1.0),
+        vouched(HEAVY, 60.0, 1.0),
+        vouched(HEAVY, 40.0, 100.0),
         Claim(
             id="C2",
             statement="phi = 40 degrees, V = 1e-4 V_*: mu_ss exceeds tan(phi) = 0.8391",
             source=f"{PAPER}, eq. 9",
             variable="steady_friction",
-            where={"phi": 40.0, "load_velocity_ratio": 1e-4},
+            where={"mass": MASSLESS, "phi": 40.0, "load_velocity_ratio": 1e-4},
             relation="above",
             published=0.8391,
             tolerance=0.0,
             reason="an inequality: no steady state there, while faster sliding has one",
+        ),
+        Claim(
+            id="C2",
+            statement="phi = 50: a spring of 0.8 k_cr(V_*) slides stably from below 1000 V_* on",
+            source=f"{PAPER}, section 2.2, Fig. 2",
+            variable="stabilising_velocity",
+            where={"mass": MASSLESS, "phi": 50.0},
+            relation="below",
+            published=1000.0,
+            tolerance=0.0,
+            reason="an inequality; the limit cycles of that spring end there too",
+        ),
+        Claim(
+            id="C2",
+            statement="phi = 60: it takes more than ten times the velocity at phi = 50",
+            source=f"{PAPER}, section 2.2, Fig. 2",
+            variable="stabilising_velocity",
+            where={"mass": MASSLESS, "phi": 60.0},
+            relation="above",
+            published=1000.0,
+            tolerance=0.0,
+            reason="'the curve is very flat'",
         ),
     ],
     plot="linear_stability",

@@ -2,13 +2,14 @@
 
 from rsfstudy.claims import Claim
 from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.reduce import RelativeDifference
+from rsfstudy.reduce import RelativeDifference, Spread
 from rsfstudy.scene import Scene
 from rsfstudy.study import Axis, Study
 
 from ._paper import PAPER, REFERENCE
 
-DECADES = [1e-4, 1e-3, 1e-2, 1e-1, 1e1, 1e2, 200.0, 1e3, 1e4]
+#: Steps of 1 to 4 decades; a small one, and the one of section 3.4.
+STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
 def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
@@ -39,12 +40,18 @@ study = Study(
     axes=[
         Axis("law", ["slip", "slowness"]),
         Axis("normal_stress", ["constant", "variable"]),
-        Axis("load_velocity_ratio", DECADES),
+        Axis("load_velocity_ratio", STEPS),
     ],
     measure=RigidResponse(),
     reductions=[
         RelativeDifference(
             name="slowing", of="evolution_distance", along="normal_stress", reference="constant"
+        ),
+        Spread(
+            name="separation",
+            of="stress_left_at_unit_slip",
+            on="load_velocity_ratio",
+            within=(1e-4, 1e-2),
         ),
     ],
     claims=[
@@ -76,6 +83,58 @@ study = Study(
                 "the jump itself is smaller downward, since strength grows more slowly the higher "
                 "the stress; the text reads it off curves of stress less its future steady value"
             ),
+        ),
+        Claim(
+            id="C4",
+            statement="slowness law, constant: down steps of 2-4 decades are indistinguishable",
+            source=f"{PAPER}, section 2.3, Fig. 4",
+            variable="separation",
+            where={"law": "slowness", "normal_stress": "constant"},
+            published=0.0,
+            tolerance=2.9e-4,
+            reason="a line's width in the figure: 0.02 a sigma_*, one in a thousand of its height",
+        ),
+        Claim(
+            id="C4",
+            statement="slowness law, variable: they become separate, by more than 0.5 a sigma_*",
+            source=f"{PAPER}, section 2.3, Fig. 4",
+            variable="separation",
+            where={"law": "slowness", "normal_stress": "variable"},
+            relation="above",
+            published=0.5 * 0.0145,
+            tolerance=0.0,
+            reason="25 times that width",
+        ),
+        Claim(
+            id="C5",
+            statement="slowness law, constant, V = 200 V_*: stress against slip is eq. 17a",
+            source=f"{PAPER}, eqs. 16 and 17a",
+            variable="closed_form_misfit",
+            where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
+            published=0.0,
+            tolerance=1e-8,
+            reason="the accuracy asked for, 1e-7 of the stress that evolves (0.15 sigma_*)",
+        ),
+        Claim(
+            id="C5",
+            statement="slowness law, constant, V = 1.05 V_*: decays exponentially (eq. 17b)",
+            source=f"{PAPER}, eq. 17b",
+            variable="exponential_misfit",
+            where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 1.05},
+            published=0.0,
+            tolerance=0.01,
+            reason="ln(1 + x) = x to x/2, over ln 1.05: a quarter of it at most",
+        ),
+        Claim(
+            id="C5",
+            statement="slowness law, constant, V = 200 V_*: far slower than eq. 17b",
+            source=f"{PAPER}, section 3.4",
+            variable="exponential_misfit",
+            where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
+            relation="above",
+            published=0.3,
+            tolerance=0.0,
+            reason="an inequality: at some slip, over 0.3 of the change is left beyond eq. 17b",
         ),
         Claim(
             id="C5",

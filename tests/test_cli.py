@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 import rsfstudy
 from rsfstudy import cli
+from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -75,7 +76,7 @@ def test_check_fails_when_a_verdict_moves(results, tmp_path):
 def test_a_failed_cell_is_listed_and_fails(tmp_path, monkeypatch):
     study = rsfstudy.studies()[NAME]
     dataset = rsfstudy.run(study, workers=0, output=None, progress=False, b_over_a=[2, 3])
-    dataset.status[1, 0] = 11
+    dataset.status[1, 0] = int(Status.INTEGRATION_FAILED)
     dataset.message[1, 0] = "step without length"
     dataset.to_netcdf(tmp_path / "failed.nc")
     checked = call("check", tmp_path / "failed.nc")
@@ -126,7 +127,7 @@ def test_list_and_show():
     [
         (["run"], "name one study, or say --all"),
         (["run", NAME, "--all"], "name one study, or say --all"),
-        (["run", "rate_step"], "Did you mean 'rate_step_boundary'"),
+        (["run", "rate_step"], "Did you mean 'rate_step_lattice' or 'rate_step_boundary'"),
         (["run", NAME, "--serial", "--scheduler", "x"], "exclude each other"),
         (["run", NAME, "--workers", "0"], "0 is not in the range"),
         (["run", NAME, "--rtol", "1"], "rtol = 1.0: must lie between"),

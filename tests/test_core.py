@@ -261,8 +261,14 @@ def test_mass_follows_a_displacement_step_within_the_inertial_time():
 
 def test_work_budget_ends_a_motion():
     with pytest.raises(Halt, match="more than 500 right-hand sides") as halted:
-        follow(Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _s: False, 500)
+        follow(Scene(stiffness_ratio=1.1, load_velocity_ratio=1.2), 1e-9, lambda _s: False, 500)
     assert halted.value.status is Status.WORK_BUDGET_SPENT
+
+
+def test_slip_without_mass_that_runs_away_is_named():
+    with pytest.raises(Halt, match="beyond 10.120") as halted:
+        follow(Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _s: False, 10**4)
+    assert halted.value.status is Status.SLIP_RATE_UNBOUNDED
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ FLOORS = {
     "laws": 1,
     "effects": 1,
     "loading": 1,
+    "closed_forms": 1,
     "steady_state": 1,
     "scene": 2,
     "equations": 2,

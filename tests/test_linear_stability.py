@@ -78,3 +78,34 @@ def test_faster_sliding_stabilises():
             log_rate, scene.mu_star, scene.a, scene.b, scene.cot_phi, scene.alpha
         )
         assert faster < scene.critical_stiffness
+
+
+@given(
+    log_norm=st.floats(-6.0, 0.3),
+    log_rate=st.floats(-3.0, 3.0),
+    phi=st.floats(50.0, 85.0),
+    alpha=st.floats(0.0, 1.0),
+    law=st.sampled_from(["slip", "slowness"]),
+)
+def test_the_rise_by_mass_is_that_of_the_assembled_equations(log_norm, log_rate, phi, alpha, law):
+    """From V T/(2 pi D_c) where mass hardly shows to where no stiffness is stable."""
+    rate = math.exp(log_rate)
+    period = 2.0 * math.pi * 10.0**log_norm / (rate * 1.17e-8)
+    scene = Scene(
+        law=law, load_velocity_ratio=rate, phi=phi, alpha=alpha, inertia=True, period=period
+    )
+    outcome = LinearStability()(scene, Accuracy())
+    assert outcome.status in (Status.OK, Status.UNSTABLE_AT_ANY_STIFFNESS)
+    if outcome.status is Status.OK:
+        found = outcome.values["critical_stiffness_from_growth"]
+        # close to where no stiffness is stable the threshold is ill-conditioned by its own rise
+        slack = 1e-6 * (1.0 + outcome.values["rise_by_mass"])
+        assert found == pytest.approx(outcome.values["critical_stiffness"], rel=slack)
+
+
+def test_where_mass_leaves_no_stable_stiffness():
+    scene = Scene(inertia=True, period=1e8)
+    assert LinearStability()(scene, Accuracy()).status is Status.OK
+    faster = LinearStability()(scene.with_(load_velocity_ratio=100.0), Accuracy())
+    assert faster.status is Status.UNSTABLE_AT_ANY_STIFFNESS
+    assert "direct effect" in faster.message

@@ -9,7 +9,18 @@ from scipy.stats import linregress
 
 from rsfstudy.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce import LinearFit, ProportionalFit, RelativeDifference, reduced
+from rsfstudy.reduce import (
+    Boundary,
+    Difference,
+    Inverse,
+    LinearFit,
+    OverClosedForm,
+    Parting,
+    ProportionalFit,
+    RelativeDifference,
+    Spread,
+    reduced,
+)
 from rsfstudy.status import Status
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
@@ -185,3 +196,148 @@ def test_claims_do_not_apply_to_another_scene():
 def test_claims_are_checked(fields):
     with pytest.raises(InvalidValue):
         claim(**fields)
+
+
+# ---- boundaries, levels, closed forms, paths ----------------------------------------------------
+
+V0 = np.array([1.0, 1.5, 2.0, 2.5, 3.0])
+BOUNDARY = Boundary(name="edge", of="unstable", on="load_velocity_ratio")
+
+
+def answers(values, status=None) -> xr.Dataset:
+    values = np.atleast_2d(np.asarray(values, dtype=float))
+    codes = np.zeros(values.shape) if status is None else np.atleast_2d(status)
+    dims = ("row", "load_velocity_ratio")
+    return xr.Dataset(
+        {"unstable": (dims, values), "status": (dims, codes.astype(np.int8))},
+        coords={"load_velocity_ratio": V0, "row": np.arange(len(values))},
+    )
+
+
+@given(st.floats(1.0, 3.0), st.permutations(range(5)))
+def test_the_bracket_holds_the_boundary_in_any_order_of_the_axis(edge, order):
+    assume(edge not in V0)
+    lattice = answers(edge < V0).isel(load_velocity_ratio=list(order))
+    result = reduced(lattice, (BOUNDARY,)).isel(row=0)
+    assert float(result.edge_stable) < edge < float(result.edge_unstable)
+    assert abs(float(result.edge) - edge) <= float(result.edge_error)
+    assert float(result.edge_error) == pytest.approx(0.25)
+    assert int(result.edge_crossings) == 1
+
+
+def test_a_boundary_downward_has_its_unstable_side_below():
+    result = reduced(answers([1, 1, 0, 0, 0]), (BOUNDARY,)).isel(row=0)
+    assert (float(result.edge_unstable), float(result.edge_stable)) == (1.5, 2.0)
+    assert float(result.edge) == 1.75
+
+
+def test_rows_without_a_single_boundary_give_no_number_but_say_what_they_saw():
+    lattice = answers([[0, 0, 0, 0, 0], [1, 1, 1, 1, 1], [0, 1, 0, 1, 1]])
+    result = reduced(lattice, (BOUNDARY,))
+    assert result.edge.isnull().all()
+    assert result.edge_crossings.values.tolist() == [0, 0, 3]
+    assert float(result.edge_stable[0]) == 3.0
+    assert np.isnan(result.edge_unstable[0])
+    assert float(result.edge_unstable[1]) == 1.0
+
+
+def test_cells_without_an_answer_widen_the_bracket_and_failed_ones_refuse_it():
+    left_out = answers([0, 0, np.nan, 1, 1], [0, 0, Status.NORM_BELOW_LOADING_RATE, 0, 0])
+    result = reduced(left_out, (BOUNDARY,)).isel(row=0)
+    assert (float(result.edge_stable), float(result.edge_unstable)) == (1.5, 2.5)
+    failed = answers([0, 0, np.nan, 1, 1], [0, 0, Status.WORK_BUDGET_SPENT, 0, 0])
+    result = reduced(failed, (BOUNDARY,)).isel(row=0)
+    assert np.isnan(result.edge)
+    assert "failed" in result.edge.attrs["refused"]
+
+
+@given(st.floats(0.2, 3.0), st.floats(1.2, 8.0))
+def test_a_level_of_a_power_law_is_inverted(power, level):
+    """In logarithms a power law is a straight line, which the interpolant keeps."""
+    x = np.geomspace(1.0, 100.0, 9)
+    dataset = xr.Dataset(
+        {"y": ("x", x**power), "status": ("x", np.zeros(9, np.int8))}, coords={"x": x}
+    )
+    level = min(level, 0.9 * 100.0**power)
+    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=level, uncertainty=0.01),))
+    assert float(found["at"]) == pytest.approx(level ** (1.0 / power), rel=1e-9)
+    assert float(found["at_error"]) == pytest.approx(float(found["at"]) * 0.01 / power, rel=0.02)
+
+
+def test_levels_by_label_and_levels_out_of_reach():
+    x = np.geomspace(1.0, 100.0, 9)
+    dataset = xr.Dataset(
+        {"y": (("c", "x"), np.stack([x, x, x])), "status": (("c", "x"), np.zeros((3, 9), np.int8))},
+        coords={"x": x, "c": ["a", "b", "c"]},
+    )
+    levels = {"a": 10.0, "b": 1e3}
+    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=levels, along="c"),))
+    assert float(found["at"].sel(c="a")) == pytest.approx(10.0)
+    assert found["at"].sel(c=["b", "c"]).isnull().all()
+
+
+def test_over_a_closed_form():
+    dataset = lattice(2.0 * (1.0 + X))
+    form = OverClosedForm(
+        name="over",
+        of="critical_velocity_ratio",
+        form="velocity_step_at_critical_stiffness",
+    )
+    result = reduced(dataset, (form,))
+    np.testing.assert_allclose(result.over, 2.0, rtol=1e-14)
+    np.testing.assert_allclose(result.over_closed_form, 1.0 + X, rtol=1e-14)
+    assert "Gu et al. (1984)" in result.over.attrs["comment"]
+    assert "over" not in form(dataset.drop_vars("b_over_a"))
+    with pytest.raises(InvalidValue, match="is no closed form"):
+        OverClosedForm(name="over", of="critical_velocity_ratio", form="net_weakenin")
+
+
+def test_differences_and_spreads():
+    dataset = lattice([X, 3.0 * X])
+    apart = Difference(
+        name="apart", of="critical_velocity_ratio", along="case", reference="reference"
+    )
+    np.testing.assert_allclose(reduced(dataset, (apart,)).apart.sel(case="other"), 2.0 * X)
+    spread = Spread(
+        name="spread", of="critical_velocity_ratio", on="a_over_b_minus_a", within=(0.25, 1.0)
+    )
+    assert reduced(dataset, (spread,)).spread.values.tolist() == [0.75, 2.25]
+    codes = np.zeros((2, 5))
+    codes[1, 1] = Status.PENDING
+    refused = reduced(lattice([X, X], codes), (spread,))
+    assert np.isnan(refused.spread[1])
+    assert float(refused.spread[0]) == 0.75
+
+
+def loops(tilt: float) -> xr.Dataset:
+    """Two paths up to 10^6 and 10^5 V_* and down again: the second leaves the first at 10^4 and
+    comes back, `tilt` higher, from 10^3 on.
+    """
+    up = np.linspace(0.0, 6.0, 300)
+    first = np.concatenate([up, up[::-1][1:]]), np.concatenate([2.0 - 0.1 * up, 0.2 + 0 * up[1:]])
+    to = np.linspace(0.0, 5.0, 300)
+    rise = 2.0 - 0.1 * to - np.clip(to - 4.0, 0.0, None)
+    fall = 0.2 + tilt + 0.05 * np.clip(to[::-1][1:] - 3.0, 0.0, None)
+    second = np.concatenate([to, to[::-1][1:]]), np.concatenate([rise, fall])
+    dims = ("inertia", "phase")
+    return xr.Dataset(
+        {
+            "log10_slip_rate": (dims, np.stack([first[0], second[0]])),
+            "frictional_stress": (dims, np.stack([first[1], second[1]])),
+            "status": ("inertia", np.zeros(2, np.int8)),
+        },
+        coords={"inertia": [0, 1]},
+    )
+
+
+def test_where_paths_part_and_merge():
+    parting = Parting(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3)
+    result = reduced(loops(0.0), (parting,))
+    assert float(result.paths_parting) == pytest.approx(4.0, abs=0.02)
+    assert float(result.paths_merging) == pytest.approx(3.07, abs=0.03)
+    assert float(result.paths_offset) == pytest.approx(0.0, abs=1e-3)
+    apart = reduced(loops(0.1), (parting,))
+    assert np.isnan(apart.paths_merging)
+    assert float(apart.paths_offset) == pytest.approx(0.1, abs=1e-2)
+    same = loops(0.0).isel(inertia=[0, 0]).assign_coords(inertia=[0, 1])
+    assert np.isnan(reduced(same, (parting,)).paths_parting)

@@ -23,6 +23,8 @@ from rsfstudy.status import Status
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
 LOST, LOCKED = 1e-9, 1e6
+#: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
+UNBOUNDED = 120.0 * math.log(10.0)
 
 
 def motion(
@@ -58,8 +60,8 @@ def motion(
     Raises
     ------
     Halt
-        With `normal_stress_lost`, `shear_stress_reversed` or `locked` where the equations end, or
-        as `steps` does.
+        With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
+        the equations end, or as `steps` does.
     """
     from_steady_sliding = start is None
     if start is None:
@@ -188,7 +190,7 @@ def _rupture(
 
 
 def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
-    """Pass steps on until normal stress vanishes or grows without bound.
+    """Pass steps on until normal stress vanishes, or normal stress or slip rate grow without bound.
 
     Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
     """
@@ -198,4 +200,6 @@ def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
             raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
         if ratio >= LOCKED:
             raise Halt(Status.LOCKED, f"normal stress grew to {ratio:.3g} sigma_* and goes on")
+        if step.after.log_rate >= UNBOUNDED:
+            raise Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")
         yield step

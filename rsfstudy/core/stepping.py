@@ -109,6 +109,9 @@ def steps(
 ) -> Iterator[Step]:
     """Integrate from clock zero, step by step, for as long as the caller asks.
 
+    The equations do not depend on the clock. Where steps become shorter than the spacing of
+    floating-point numbers around it, the clock starts anew at zero.
+
     Parameters
     ----------
     equations : Equations
@@ -137,16 +140,18 @@ def steps(
     def rate(clock: float, unknowns: Vector) -> list[float]:
         return equations.rate(clock, unknowns.tolist())
 
-    solver = DOP853(
-        rate,
-        0.0,
-        np.asarray(state, dtype=float),
-        -math.inf if backward else math.inf,
-        rtol=tolerance,
-        atol=tolerance * np.asarray(equations.scales),
-        max_step=_LONGEST_STEP,
-    )
-    counted = 0
+    def started(unknowns: Vector) -> DOP853:
+        return DOP853(
+            rate,
+            0.0,
+            unknowns,
+            -math.inf if backward else math.inf,
+            rtol=tolerance,
+            atol=tolerance * np.asarray(equations.scales),
+            max_step=_LONGEST_STEP,
+        )
+
+    solver, counted = started(np.asarray(state, dtype=float)), 0
     before = equations.point(solver.y.tolist(), solver.f.tolist())
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
@@ -156,7 +161,10 @@ def steps(
         meter.charge(regime, solver.nfev - counted)
         counted = solver.nfev
         if solver.status == "failed":
-            raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
+            if solver.t == 0.0:
+                raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
+            solver, counted = started(solver.y), 0
+            continue
         unknowns = solver.y.tolist()
         if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
             raise Halt(

@@ -18,7 +18,7 @@ import numpy as np
 from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Halt, Meter, Step
-from rsfstudy.core.timeline import OBSERVED, elapsed, observed, timed
+from rsfstudy.core.timeline import OBSERVED, along_path, elapsed, sampled, timed
 from rsfstudy.equations import Point
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
@@ -32,8 +32,6 @@ LN10 = math.log(10.0)
 _STEADY, _SHRINKING = 1e-3, 60
 #: Displacement in D_c that sets off a motion where the scene has no step.
 _NUDGE = 0.1
-#: Samples within each integration step of a recorded orbit.
-_SAMPLES = 4
 
 _HEADLINES = (
     "recurrence_interval",
@@ -93,8 +91,8 @@ class LimitCycle(Measure):
     Parameters
     ----------
     phases : int
-        Points of the orbit that are kept along `phase`; spaced evenly along its path in time, ln V
-        and stress.
+        Points of the orbit that are kept along `phase`, spread over its slow part and its
+        rupture.
     events : int
         Most events to wait for a cycle that repeats.
     """
@@ -114,7 +112,8 @@ class LimitCycle(Measure):
     @property
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         scalars = [name for h in _HEADLINES for name in (h, f"{h}_error")]
-        scalars += ["slip_per_event", "healing_exponent", "events_until_repeat", "work_per_cycle"]
+        scalars += ["slip_per_event", "healing_exponent", "residual_friction", "drop_asymmetry"]
+        scalars += ["events_until_repeat", "work_per_cycle"]
         return dict.fromkeys(scalars, ()) | dict.fromkeys(OBSERVED, ("phase",))
 
     @property
@@ -177,21 +176,12 @@ class LimitCycle(Measure):
         values["healing_exponent"] = (
             healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan
         )
+        stress = scene.mu_star + cycle.at_peak
+        values["residual_friction"] = stress / (1.0 + scene.cot_phi * cycle.at_peak)
+        values["drop_asymmetry"] = (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest)
         values["events_until_repeat"], values["work_per_cycle"] = float(count), float(work)
-        return Outcome(Status.OK, values | self._orbit(scene, cycle.end, accuracy, meter))
-
-    def _orbit(
-        self, scene: Scene, start: tuple[float, float], accuracy: Accuracy, meter: Meter
-    ) -> dict[str, np.ndarray]:
-        """The cycle at points spaced evenly along its path; straight between the samples of its
-        steps.
-        """
-        rows = np.array(list(_samples(scene, start, accuracy, meter)))
-        spread = np.ptp(rows[:, [0, 2, 3]], axis=0)
-        strides = np.abs(np.diff(rows[:, [0, 2, 3]], axis=0) / np.where(spread > 0.0, spread, 1.0))
-        path = np.concatenate([[0.0], np.cumsum(strides.sum(axis=1))])
-        at = np.linspace(0.0, path[-1], self.phases)
-        return {name: np.interp(at, path, rows[:, i]) for i, name in enumerate(OBSERVED)}
+        orbit = along_path(list(_orbit(scene, cycle.end, accuracy, meter)), self.phases)
+        return Outcome(Status.OK, values | orbit)
 
 
 def _still_to_come(change: np.ndarray, before: np.ndarray | None) -> np.ndarray:
@@ -300,19 +290,17 @@ class _Watch:
         return away < 1e-6 * self._farthest
 
 
-def _samples(
+def _orbit(
     scene: Scene, start: tuple[float, float], accuracy: Accuracy, meter: Meter
 ) -> Iterator[tuple[float, ...]]:
-    """Points of one cycle, from the maximum of spring stress on."""
+    """What is observed along one cycle, from the maximum of spring stress on."""
     load, risen = scene.log_load_rate, False
     moving = motion(scene, accuracy, meter, start=start, clock=True)
     for step, begin in timed(scene, moving):
         ends = risen and step.before.log_rate < load <= step.after.log_rate
         if ends:
             step = step.until(step.locate(lambda point: point.log_rate - load))
-        for clock in np.linspace(step.start, step.end, _SAMPLES + 1).tolist():
-            point = step.before if clock == step.start else step.point_at(clock)
-            yield observed(scene, point, begin + elapsed(scene, step, clock), start[0])
+        yield from sampled(scene, step, begin, start[0])
         risen = risen or step.after.log_rate < load
         if ends:
             return

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import quasi_static, strength_of
+from rsfstudy.equations import Equations, inertial, quasi_static, slow_manifold, strength_of
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
@@ -22,6 +23,11 @@ from rsfstudy.status import Status
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
 #: balance there.
 _DIFFERENCE = 1e-4
+#: Slip rate norm from which growth is found from the full equations; below, double precision does
+#: not see mass in them, and the slow manifold, of first order in mass, is exact enough.
+_MASS_SHOWS = 1e-3
+#: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
+_LARGEST_RISE = 1e6
 
 
 @dataclass(frozen=True)
@@ -30,8 +36,7 @@ class LinearStability(Measure):
     sigma_*/D_c.
 
     Twice: by the closed form, and as the stiffness at which small perturbations of the assembled
-    equations neither grow nor decay, so that algebra and code vouch for each other. Mass is left
-    out: it changes the threshold by about T V_*/(2 pi D_c) squared.
+    equations neither grow nor decay, so that algebra and code vouch for each other.
     """
 
     name: ClassVar[str] = "linear_stability"
@@ -46,6 +51,9 @@ class LinearStability(Measure):
             "critical_stiffness",
             "critical_stiffness_error",
             "critical_stiffness_from_growth",
+            "critical_stiffness_explicit",
+            "relative_critical_stiffness",
+            "rise_by_mass",
             "steady_friction",
             "steady_normal_stress",
         )
@@ -71,31 +79,55 @@ class LinearStability(Measure):
                 {"steady_friction": mu_ss},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
-        closed = steady_state.critical_stiffness(
-            load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0
-        )
-        spring = steady_state.steady_shear_stress(mu_ss, scene.mu_star, cot_phi)
-        psi = strength_of(scene)(spring)[0] - scene.a * load
-        around = closed / scene.critical_stiffness
-
-        def growth_at(ratio: float) -> float:
-            meter.charge("quasi_static", 4)
-            return growth(scene.with_(stiffness_ratio=ratio), spring, psi)
-
-        found = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
-        found *= scene.critical_stiffness
+        sigma_ss = steady_state.steady_normal_stress(mu_ss, scene.mu_star, cot_phi)
+        values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
+        parameters = (load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0)
+        massless, rise = steady_state.critical_stiffness(*parameters), 0.0
+        if scene.inertia:
+            norm = scene.load_velocity * scene.inertial_time
+            rise = steady_state.rise_by_mass(massless, norm, mu_ss, sigma_ss, scene.a, cot_phi)
+            if rise > _LARGEST_RISE:
+                return Outcome(
+                    Status.UNSTABLE_AT_ANY_STIFFNESS,
+                    values,
+                    f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
+                )
+        closed = massless * (1.0 + rise)
+        found = _threshold(scene, closed, meter)
         return Outcome(
             Status.OK,
             {
                 "critical_stiffness": closed,
                 "critical_stiffness_error": abs(found - closed) + 1e-15 * closed,
                 "critical_stiffness_from_growth": found,
-                "steady_friction": mu_ss,
-                "steady_normal_stress": steady_state.steady_normal_stress(
-                    mu_ss, scene.mu_star, cot_phi
-                ),
+                "critical_stiffness_explicit": steady_state.critical_stiffness_explicit(*parameters)
+                * (1.0 + rise),
+                "relative_critical_stiffness": closed / scene.critical_stiffness,
+                "rise_by_mass": rise,
+                **values,
             },
         )
+
+
+def _threshold(scene: Scene, near: float, meter: Meter) -> float:
+    """Stiffness at which perturbations of steady sliding neither grow nor decay."""
+    load = scene.log_load_rate
+    mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
+    spring = steady_state.steady_shear_stress(mu_ss, scene.mu_star, scene.cot_phi)
+    psi = strength_of(scene)(spring)[0] - scene.a * load
+    with_mass = scene.inertia and scene.load_velocity * scene.inertial_time > _MASS_SHOWS
+    around = near / scene.critical_stiffness
+
+    def growth_at(ratio: float) -> float:
+        changed = scene.with_(stiffness_ratio=ratio)
+        if with_mass:
+            meter.charge("inertial", 6)
+            return growth_with_mass(changed, spring)
+        meter.charge("quasi_static", 4)
+        return growth(changed, spring, psi)
+
+    found = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
+    return found * scene.critical_stiffness
 
 
 def growth(scene: Scene, spring: float, psi: float) -> float:
@@ -103,8 +135,31 @@ def growth(scene: Scene, spring: float, psi: float) -> float:
 
     Its determinant is positive for every stiffness, so the trace alone decides.
     """
-    rate = quasi_static(scene, clock=False).rate
-    step = _DIFFERENCE * scene.a
-    along_spring = rate(0.0, (spring + step, psi))[0] - rate(0.0, (spring - step, psi))[0]
-    along_psi = rate(0.0, (spring, psi + step))[1] - rate(0.0, (spring, psi - step))[1]
-    return math.fsum((along_spring, along_psi)) / (2.0 * step)
+    assemble = slow_manifold if scene.inertia else quasi_static
+    jacobian = _jacobian(assemble(scene, clock=False), (spring, psi))
+    return math.fsum(jacobian[i][i] for i in range(2))
+
+
+def growth_with_mass(scene: Scene, spring: float) -> float:
+    """What has the sign of the growth of small oscillations by the full equations: with the
+    characteristic polynomial p**3 + c2 p**2 + c1 p + c0, it is c0 - c1 c2 (Routh).
+    """
+    state = (spring, scene.log_load_rate, spring)
+    j = np.array(_jacobian(inertial(scene), state))
+    c2 = -float(np.trace(j))
+    c1 = 0.5 * (float(np.trace(j)) ** 2 - float(np.trace(j @ j)))
+    c0 = -float(np.linalg.det(j))
+    return c0 - c1 * c2
+
+
+def _jacobian(equations: Equations, state: tuple[float, ...]) -> list[list[float]]:
+    """Derivatives of the rates (rows) by the unknowns (columns), by central differences."""
+    columns = []
+    for number, scale in enumerate(equations.scales):
+        step = _DIFFERENCE * scale
+        ahead, behind = (
+            equations.rate(0.0, [x + sign * step * (i == number) for i, x in enumerate(state)])
+            for sign in (1.0, -1.0)
+        )
+        columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])
+    return [list(row) for row in zip(*columns, strict=True)]

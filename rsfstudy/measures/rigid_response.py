@@ -59,6 +59,8 @@ class RigidResponse(Measure):
             "evolution_asymmetry",
             "steady_stress_change",
             "stress_left_at_unit_slip",
+            "closed_form_misfit",
+            "exponential_misfit",
         )
         profiles = ("shear_stress", "normal_stress_ratio", "state_variable")
         return dict.fromkeys(scalars, ()) | dict.fromkeys(profiles, ("slip",))
@@ -84,7 +86,9 @@ class RigidResponse(Measure):
         level = steady + (start - steady) / math.e
         distance, rows = self._follow(scene, start, level, accuracy.solver, meter)
         loose, _rows = self._follow(scene, start, level, 10.0 * accuracy.solver, meter)
-        left = float(np.interp(1.0, self.inner_coordinates["slip"], rows[:, 0])) - steady
+        slip = self.inner_coordinates["slip"]
+        exponential = steady + (start - steady) * np.exp(-slip)
+        departs = (rows[:, 0] - exponential) / (start - steady)
         return Outcome(
             Status.OK,
             {
@@ -93,7 +97,9 @@ class RigidResponse(Measure):
                 "direct_stress_change": start,
                 **_asymmetry(scene, log_rate),
                 "steady_stress_change": steady,
-                "stress_left_at_unit_slip": left,
+                "stress_left_at_unit_slip": float(np.interp(1.0, slip, rows[:, 0])) - steady,
+                "closed_form_misfit": _closed_form_misfit(scene, slip, rows[:, 0]),
+                "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
                 "normal_stress_ratio": 1.0 + scene.cot_phi * rows[:, 0],
                 "state_variable": rows[:, 1],
@@ -118,6 +124,27 @@ class RigidResponse(Measure):
             if len(rows) == len(at) and not math.isnan(distance):
                 return distance, np.array(rows)
         raise Halt(Status.INTEGRATION_FAILED, "a response ended by itself")
+
+
+def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> float:
+    """Largest departure of the stress change from the closed forms at constant normal stress, over
+    sigma_*; NaN at variable normal stress.
+
+    Above its steady value (a - b) ln(V/V_*), stress is ``b ln[1 + (V/V_* - 1) exp(-slip/D_c)]`` for
+    the slowness law and ``b ln(V/V_*) exp(-slip/D_c)`` for the slip law (eqs. 17a and 17b of the
+    paper, less mu_* sigma + a sigma ln(V/V_*), which they leave out).
+    """
+    if scene.normal_stress == "variable":
+        return math.nan
+    rate = scene.log_load_rate
+    evolving = {
+        "slowness": np.log1p(math.expm1(rate) * np.exp(-slip)),
+        "slip": rate * np.exp(-slip),
+    }
+    if scene.law not in evolving:
+        return math.nan
+    exact = (scene.a - scene.b) * rate + scene.b * evolving[scene.law]
+    return float(np.abs(stress - exact).max())
 
 
 def _steady_stress(scene: Scene, log_rate: float) -> float:

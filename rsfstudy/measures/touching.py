@@ -82,8 +82,9 @@ def start_of_path(
         round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125)
     )  # work of an eighth-order method
     try:
-        for step in steps(quasi_static(scene, clock=False), start, tolerance, path, backward=True):
-            if step.start == 0.0 and step.after.log_rate > step.before.log_rate:
+        backward = steps(quasi_static(scene, clock=False), start, tolerance, path, backward=True)
+        for number, step in enumerate(backward):
+            if number == 0 and step.after.log_rate > step.before.log_rate:
                 return None
             if step.after.log_rate < _SLOWEST:
                 return None

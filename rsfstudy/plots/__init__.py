@@ -1,11 +1,14 @@
 """Figures: ``draw(dataset, axes)`` draws a results dataset and computes nothing; one file each,
 found by name.
+
+A figure of several panels lists its functions of that kind in ``PANELS``.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -16,38 +19,54 @@ from matplotlib.figure import Figure
 from rsfstudy.errors import InvalidValue
 from rsfstudy.store import declaration
 
-NAMES = tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+Panel = Callable[[xr.Dataset, Axes], Axes]
+
+NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+
+#: Size of one panel in inches.
+_PANEL = (6.4, 4.8)
 
 
 def figure(dataset: xr.Dataset) -> Figure:
-    """The figure of a results dataset, as its study declares it.
+    """The figure of a results dataset, as its study declares it, with all its panels.
 
     Raises
     ------
     InvalidValue
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
     """
-    found = Figure(figsize=(6.4, 4.8), layout="constrained")
-    draw(dataset, found.add_subplot())
+    panels = getattr(_module(dataset), "PANELS", (None,))
+    columns = min(2, len(panels))
+    rows = -(-len(panels) // columns)
+    found = Figure(figsize=(_PANEL[0] * columns, _PANEL[1] * rows), layout="constrained")
+    for number, panel in enumerate(panels, start=1):
+        draw(dataset, found.add_subplot(rows, columns, number), panel)
     return found
 
 
-def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """Draw a results dataset as its study declares it."""
+def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
+    """Draw a results dataset as its study declares it: its main panel, or another."""
+    module = _module(dataset)
+    chosen: Panel = panel or module.draw
+    drawn = chosen(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
+    completeness = dataset.attrs.get("completeness", "complete")
+    if completeness != "complete":
+        drawn.set_title(f"{drawn.get_title()} [{completeness}]".strip(), color="tab:red")
+    return drawn
+
+
+def _module(dataset: xr.Dataset) -> ModuleType:
+    """The module that draws a dataset: the one it declares, or plain lines where it has more axes
+    than that has room for.
+    """
     name = declaration(dataset)["plot"]
     if name not in NAMES:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     module = importlib.import_module(f"{__name__}.{name}")
     varied = {str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1}
-    if not varied <= set(getattr(module, "DIMENSIONS", varied)):
-        module = importlib.import_module(
-            f"{__name__}.lines"
-        )  # more axes than the figure has room for
-    drawn: Axes = module.draw(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
-    completeness = dataset.attrs.get("completeness", "complete")
-    if completeness != "complete":
-        drawn.set_title(f"{drawn.get_title()} [{completeness}]".strip(), color="tab:red")
-    return drawn
+    if varied <= set(getattr(module, "DIMENSIONS", varied)):
+        return module
+    return importlib.import_module(f"{__name__}.lines")
 
 
 def _single(dataset: xr.Dataset, module: ModuleType) -> set[str]:

@@ -1,42 +1,141 @@
-"""Stick-slip cycles in the plane of stress and slip rate, as in Figs. 9 and 10 of the paper."""
+"""Stick-slip cycles: stress against slip rate, as in Figs. 9 and 10 of the paper, and against slip,
+as in Fig. 11.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.plots import Panel
+from rsfstudy.plots._phase_plane import (
+    LN10,
+    constant_state_line,
+    cot_phi,
+    label_axes,
+    steady_line,
+)
 from rsfstudy.vocabulary import quantity
+
+#: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
+#: steady state.
+_STATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """Spring stress against slip rate, one orbit a cell, with the steady-state line of constant
-    normal stress.
+    """Stress against slip rate for the first law (Fig. 9), with constant-state and steady-state
+    lines.
     """
-    cells = dataset["shear_stress"].dims[:-1]
-    orbits = dataset.stack(cell=cells) if cells else dataset.expand_dims("cell")
-    for number in range(orbits.sizes["cell"]):
-        orbit = orbits.isel(cell=number)
-        if int(orbit["status"]) != 0:
-            continue
-        point = np.atleast_1d(np.asarray(orbit["cell"].item(), dtype=object))
+    return _phase_plane(dataset, axes, 0)
+
+
+def _phase_plane(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
+    cells = _cells(dataset, law)
+    for number, (cell, label) in enumerate(cells):
         axes.plot(
-            orbit["log10_slip_rate"],
-            orbit["shear_stress"],
-            linestyle="--" if "constant" in point else "-",
-            color=f"C{number // 2}",
+            cell["log10_slip_rate"],
+            cell["frictional_stress"],
+            color=f"C{number}",
             linewidth=1.2,
-            label=", ".join(map(str, point)),
+            label=label,
         )
-    reach = np.array(axes.get_xlim())
-    weakening = (dataset["b_over_a"] - 1.0) * dataset["a"]
-    if weakening.ndim == 0 and dataset["mu_star"].ndim == 0:
-        steady = float(dataset["mu_star"]) - float(weakening) * np.log(10.0) * reach
-        axes.plot(reach, steady, ":", color="0.5", label="steady state, constant normal stress")
-    axes.axhline(0.0, color="0.8", linewidth=0.8)
+    reach, height = np.array(axes.get_xlim(), dtype=float), axes.get_ylim()
+    rates = np.linspace(reach[0], reach[1], 200)
+    drawn: set[float] = set()
+    for number, (cell, _label) in enumerate(cells):
+        if cot_phi(cell) in drawn:
+            continue
+        drawn.add(cot_phi(cell))
+        axes.plot(rates, steady_line(cell, rates), "--", color=f"C{number}", linewidth=0.8)
+        for state in _STATES:
+            theta = -state * LN10 * float(cell["a"]) * float(cell["b_over_a"])
+            line = constant_state_line(cell, theta, rates)
+            axes.plot(rates, line, ":", color=f"C{number}", linewidth=0.6)
+            inside = np.flatnonzero((line > height[0]) & (line < height[1]))
+            if inside.size:
+                at = inside[-1]
+                axes.text(
+                    rates[at],
+                    line[at],
+                    f"{theta:.2g}",
+                    fontsize="xx-small",
+                    color=f"C{number}",
+                    ha="right",
+                )
+    axes.plot([], [], "--", color="0.4", linewidth=0.8, label="steady state")
+    axes.plot([], [], ":", color="0.4", linewidth=0.8, label=r"constant state, $\Theta$")
     axes.set_xlim(*reach)
-    axes.set_xlabel(quantity("log10_slip_rate").symbol)
-    axes.set_ylabel(f"Shear stress, {quantity('shear_stress').symbol}")
-    axes.set_title(str(dataset.attrs.get("title", "")), fontsize="medium")
-    axes.legend(fontsize="small")
+    axes.set_ylim(*height)
+    label_axes(axes)
+    axes.set_title(_title(dataset, law), fontsize="medium")
+    axes.legend(fontsize="x-small")
     return axes
+
+
+def _stress_slip(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
+    """Two cycles, one after the other, against slip."""
+    for number, (cell, label) in enumerate(_cells(dataset, law)):
+        slip, stress = cell["slip"].values, cell["frictional_stress"].values
+        both = np.concatenate([slip, slip + slip[-1] - slip[0]])
+        axes.plot(both, np.tile(stress, 2), color=f"C{number}", linewidth=1.2, label=label)
+        axes.plot(slip, cell["shear_stress"], "--", color=f"C{number}", linewidth=0.7)
+        fastest = int(cell["log10_slip_rate"].values.argmax())
+        axes.plot(slip[fastest], stress[fastest], "o", color=f"C{number}", markersize=4)
+    axes.plot([], [], "o", color="0.4", markersize=4, label="fastest slip")
+    axes.plot([], [], "--", color="0.4", linewidth=0.7, label="spring")
+    axes.set_xlabel(quantity("slip").symbol)
+    axes.set_ylabel(f"Frictional stress, {quantity('frictional_stress').symbol}")
+    axes.set_title(_title(dataset, law), fontsize="medium")
+    axes.legend(fontsize="x-small")
+    axes.grid(alpha=0.3)
+    return axes
+
+
+def _of_law(function: Callable[[xr.Dataset, Axes, int], Axes], law: int) -> Panel:
+    def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
+        return function(dataset, axes, law)
+
+    return panel
+
+
+PANELS = (
+    draw,
+    _of_law(_phase_plane, -1),
+    _of_law(_stress_slip, 0),
+    _of_law(_stress_slip, -1),
+)
+
+
+def _title(dataset: xr.Dataset, law: int) -> str:
+    return f"{np.atleast_1d(dataset['law'].values)[law]} law".capitalize()
+
+
+def _cells(dataset: xr.Dataset, law: int) -> list[tuple[xr.Dataset, str]]:
+    """The orbits of one law that exist and differ, each with a label."""
+    chosen = dataset.isel(law=law) if "law" in dataset.dims else dataset
+    dims = [str(d) for d in chosen["status"].dims]
+    stacked = chosen.stack(cell=dims) if dims else chosen.expand_dims("cell")
+    found: list[tuple[xr.Dataset, str]] = []
+    seen: set[tuple[float, ...]] = set()
+    for number in range(stacked.sizes["cell"]):
+        cell = stacked.isel(cell=number)
+        numbers = tuple(cell["frictional_stress"].values.tolist())
+        if int(cell["status"]) == 0 and numbers not in seen:
+            seen.add(numbers)
+            found.append((cell, ", ".join(_place(cell, d) for d in dims if _counts(cell, d))))
+    return found
+
+
+def _counts(cell: xr.Dataset, dimension: str) -> bool:
+    """Whether a dimension says anything of a cell: angles do not at constant normal stress."""
+    return not (dimension in ("phi", "alpha") and cot_phi(cell) == 0.0)
+
+
+def _place(cell: xr.Dataset, dimension: str) -> str:
+    value = cell[dimension].item()
+    if dimension == "normal_stress":
+        return f"{value} normal stress"
+    return value if isinstance(value, str) else f"{quantity(dimension).symbol} = {value:g}"

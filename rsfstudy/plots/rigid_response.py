@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.plots import Panel
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -12,23 +15,42 @@ DIMENSIONS = ("law", "normal_stress", "load_velocity_ratio")
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """One curve a step; the laws by colour, variable normal stress solid and constant normal stress
-    dashed.
-    """
-    future = dataset["mu_star"] + dataset["steady_stress_change"]
-    left = (dataset["shear_stress"] - future) / dataset["a"]
-    keys = []
-    for number, law in enumerate(dataset["law"].values):
-        for stress in dataset["normal_stress"].values:
-            line, label = f"C{number}", f"{law} law, {stress} normal stress"
-            line += "--" if stress == "constant" else "-"
-            keys += axes.plot([], [], line, label=label)
-            for rate in dataset["load_velocity_ratio"].values:
-                curve = left.sel(law=law, normal_stress=stress, load_velocity_ratio=rate)
-                axes.plot(dataset["slip"], curve, line, linewidth=0.9)
+    """The slip law at variable normal stress (Fig. 3a)."""
+    return _panel(dataset, axes, 0, -1)
+
+
+def _panel(dataset: xr.Dataset, axes: Axes, law: int, stress: int) -> Axes:
+    """One law and normal stress condition: steps up solid, steps down dashed."""
+    cell = dataset.isel(law=law, normal_stress=stress)
+    future = cell["mu_star"] + cell["steady_stress_change"]
+    left = (cell["shear_stress"] - future) / cell["a"]
+    for rate in cell["load_velocity_ratio"].values:
+        decades = math.log10(rate)
+        if abs(decades - round(decades)) > 1e-9:
+            continue  # steps between decades are there for their numbers
+        axes.plot(
+            cell["slip"],
+            left.sel(load_velocity_ratio=rate),
+            "-" if rate > 1.0 else "--",
+            color=f"C{round(abs(decades)) - 1}",
+            linewidth=1.0,
+            label=f"$10^{{{round(decades)}}}$",
+        )
     axes.axhline(0.0, color="0.7", linewidth=0.8)
     axes.set_xlabel(quantity("slip").symbol)
     axes.set_ylabel(r"$(\tau - \tau_{ss})/(a\,\sigma_*)$")
-    axes.set_title("Rigid slider: steps of slip rate by 1 to 4 decades", fontsize="medium")
-    axes.legend(handles=keys, fontsize="small")
+    names = cell["law"].item(), cell["normal_stress"].item()
+    axes.set_title("{} law, {} normal stress".format(*names), fontsize="medium")
+    axes.legend(title=quantity("load_velocity_ratio").symbol, fontsize="x-small", ncols=2)
+    axes.grid(alpha=0.3)
     return axes
+
+
+def _other(law: int, stress: int) -> Panel:
+    def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
+        return _panel(dataset, axes, law, stress)
+
+    return panel
+
+
+PANELS = (draw, _other(0, 0), _other(-1, -1), _other(-1, 0))

@@ -1,43 +1,13 @@
-"""Reductions: from a lattice to boundaries and scaling slopes, kept in the same dataset.
-
-A reduction never draws on failed or missing cells: where there are any within its support, the
-result is NaN and says why. Cells that answered without a number (such as `stable_for_all_steps`)
-are left out, and counted.
-"""
+"""Fits along one coordinate: slopes with their standard errors."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
-import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
-from rsfstudy.status import Status
-from rsfstudy.vocabulary import quantity
-
-#: Values of a coordinate count as within a range they miss by a rounding error.
-_ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class Reduction:
-    """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables."""
-
-    #: Name of the kind in declarations.
-    kind: ClassVar[str]
-
-    name: str
-    of: str
-
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The new variables."""
-        raise TypeError(f"{type(self).__name__} reduces nothing")
-
-    def describe(self) -> dict[str, Any]:
-        """The reduction as plain data."""
-        return {"kind": self.kind, **asdict(self)}
+from rsfstudy.reduce.base import Reduction, dimension_of, failed, within
 
 
 @dataclass(frozen=True)
@@ -80,19 +50,8 @@ class _Fit(Reduction):
         InvalidValue
             Where `on` is no coordinate along one dimension.
         """
-        if self.on not in dataset.coords or dataset[self.on].ndim != 1:
-            raise InvalidValue(
-                "on",
-                self.on,
-                "must be a coordinate along one dimension",
-                choices=[str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != self.on],
-            )
-        dimension = str(dataset[self.on].dims[0])
-        lowest, highest = self.within or (-np.inf, np.inf)
-        inside = (dataset[self.on] >= lowest - _ROUNDING * abs(lowest)) & (
-            dataset[self.on] <= highest + _ROUNDING * abs(highest)
-        )
-        support = dataset.isel({dimension: np.flatnonzero(inside.values)})
+        dimension = dimension_of(dataset, self.on)
+        support = within(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
         used = support[self.of].notnull()
@@ -105,8 +64,8 @@ class _Fit(Reduction):
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        failed = _failed(support["status"]).any(dimension)
-        known = (count >= self.unknowns) & ~failed
+        refused = failed(support["status"]).any(dimension)
+        known = (count >= self.unknowns) & ~refused
         result = xr.Dataset(
             {
                 self.name: slope.where(known),
@@ -115,10 +74,11 @@ class _Fit(Reduction):
                 f"{self.name}_points": count.astype("int32"),
             }
         )
-        span = f"{lowest:g} <= {self.on} <= {highest:g}" if self.within else f"all {self.on}"
+        span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
+        span = span.format(*(self.within or ()), on=self.on)
         for name in result:
             result[name].attrs["comment"] = f"least squares of {self.law()} over {span}"
-            if bool(failed.any()):
+            if bool(refused.any()):
                 result[name].attrs["refused"] = (
                     "cells within the fitted range failed or are missing"
                 )
@@ -165,51 +125,3 @@ class LinearFit(_Fit):
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Less their mean, which takes care of the constant."""
         return values - values.mean(dimension)
-
-
-@dataclass(frozen=True)
-class RelativeDifference(Reduction):
-    """How far a variable lies below its value at a reference point of one dimension: ``1 -
-    of/of_reference``.
-
-    Parameters
-    ----------
-    name : str
-        Name of the result.
-    of : str
-        Variable to compare.
-    along : str
-        Dimension of the reference.
-    reference : str or float
-        Label of the reference point on that dimension.
-    """
-
-    along: str = ""
-    reference: str | float = ""
-    kind: ClassVar[str] = "relative_difference"
-
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare along `along`; nothing if the lattice has no reference point."""
-        values = dataset[self.of]
-        if self.reference not in dataset[self.along].values:
-            return xr.Dataset()
-        difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
-        note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
-        return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
-
-
-def _failed(status: xr.DataArray) -> xr.DataArray:
-    """Where a cell failed or was not computed."""
-    return status > int(Status.NORM_UNREACHABLE)
-
-
-def reduced(dataset: xr.Dataset, reductions: tuple[Reduction, ...]) -> xr.Dataset:
-    """The dataset with the results of its reductions, each described by the vocabulary."""
-    for reduction in reductions:
-        for name, values in reduction(dataset).data_vars.items():
-            about = quantity(str(name))
-            own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
-            scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
-            values.attrs = {"long_name": about.long_name, "units": about.units, **scale, **own}
-            dataset = dataset.assign({name: values})
-    return dataset

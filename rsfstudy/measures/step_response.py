@@ -1,0 +1,115 @@
+"""The motion after a step: its peaks of slip rate, one after the other, and the path it takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
+from rsfstudy.core.motion import motion
+from rsfstudy.core.stepping import Meter
+from rsfstudy.core.timeline import OBSERVED, along_path, sampled, timed
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+LN10 = math.log(10.0)
+
+#: Part of the largest distance from steady sliding at which an oscillation counts as over.
+_OVER = 1e-3
+
+
+@dataclass(frozen=True)
+class StepResponse(Measure):
+    """Oscillations of slip rate that the step of a scene sets off.
+
+    Parameters
+    ----------
+    peaks : int
+        Peaks of slip rate to follow; fewer where the oscillation dies down before.
+    phases : int
+        Points of the path that are kept along `phase`, spread over its slow parts and its
+        ruptures.
+    """
+
+    peaks: int = 8
+    phases: int = 2000
+    name: ClassVar[str] = "step_response"
+
+    def __post_init__(self) -> None:
+        if self.peaks < 2:
+            raise InvalidValue("peaks", self.peaks, "must be at least 2")
+        if self.phases < 2:
+            raise InvalidValue("phases", self.phases, "must be at least 2")
+
+    @property
+    def headline(self) -> str:
+        return "max_log10_slip_rate"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        scalars = ("max_log10_slip_rate", "max_log10_slip_rate_error", "peak_ratio")
+        return (
+            dict.fromkeys(scalars, ())
+            | {"peak_log10_slip_rate": ("peak",)}
+            | dict.fromkeys(OBSERVED, ("phase",))
+        )
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {
+            "peak": np.arange(1, self.peaks + 1),
+            "phase": np.linspace(0.0, 1.0, self.phases),
+        }
+
+    @property
+    def typical_work(self) -> int:
+        return 10_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the motion, and once more at a looser tolerance for the error of its peaks."""
+        if scene.log_load_rate == -math.inf:
+            return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
+        peaks, rows = self._follow(scene, accuracy, meter)
+        coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
+        again, _rows = self._follow(scene, coarse, meter)
+        common = min(len(peaks), len(again))
+        errors = np.abs(peaks[:common] - again[:common]) + 0.05 * accuracy.rtol * np.abs(
+            peaks[:common]
+        )
+        heights = peaks - scene.log_load_rate / LN10
+        found = np.full(self.peaks, np.nan)
+        found[: len(peaks)] = peaks
+        return Outcome(
+            Status.OK,
+            {
+                "max_log10_slip_rate": float(peaks.max()),
+                "max_log10_slip_rate_error": float(errors[peaks[:common].argmax()]),
+                "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
+                "peak_log10_slip_rate": found,
+                **along_path(rows, self.phases),
+            },
+        )
+
+    def _follow(
+        self, scene: Scene, accuracy: Accuracy, meter: Meter
+    ) -> tuple[np.ndarray, list[tuple[float, ...]]]:
+        """The peaks of log10(V/V_*), and what is observed on the way."""
+        peaks: list[float] = []
+        rows: list[tuple[float, ...]] = []
+        load, farthest = scene.log_load_rate, 0.0
+        for step, begin in timed(scene, motion(scene, accuracy, meter, clock=True)):
+            rows += sampled(scene, step, begin, scene.spring_stress_step)
+            if step.before.growth > 0.0 >= step.after.growth:
+                top = step.point_at(step.locate(lambda point: point.growth))
+                peaks.append(top.log_rate / LN10)
+            away = max(abs(step.after.log_rate - load), abs(step.after.imbalance) / scene.b)
+            farthest = max(farthest, away)
+            if len(peaks) == self.peaks or (peaks and away < _OVER * farthest):
+                return np.array(peaks), rows
+        raise AssertionError("a motion never ends by itself")

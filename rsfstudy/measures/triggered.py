@@ -1,0 +1,49 @@
+"""Whether the step of a scene triggers instability: yes or no."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
+from rsfstudy.core.stepping import Meter
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.swing import swing
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Triggered(Measure):
+    """1 where the motion after the step reaches the instability norm, 0 where it never does.
+
+    Its error is 1 where a ten times looser tolerance gives the other answer, and 0 elsewhere.
+    """
+
+    name: ClassVar[str] = "triggered"
+
+    @property
+    def headline(self) -> str:
+        return "unstable"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        return dict.fromkeys(("unstable", "unstable_error"), ())
+
+    @property
+    def typical_work(self) -> int:
+        return 800
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the motion until the answer is certain, at two tolerances."""
+        if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
+            return Outcome(
+                Status.NORM_BELOW_LOADING_RATE,
+                message=f"norm {scene.instability_norm:g} is reached by the loading alone",
+            )
+        coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
+        answer, again = (swing(scene, tight, meter).reached for tight in (accuracy, coarse))
+        return Outcome(
+            Status.OK, {"unstable": float(answer), "unstable_error": float(answer != again)}
+        )

@@ -1,0 +1,68 @@
+"""What all reductions share: a name, what they reduce, and that they never draw on failed cells."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
+
+#: Values of a coordinate count as within a range they miss by a rounding error.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables."""
+
+    #: Name of the kind in declarations.
+    kind: ClassVar[str]
+
+    name: str
+    of: str
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """The new variables."""
+        raise TypeError(f"{type(self).__name__} reduces nothing")
+
+    def describe(self) -> dict[str, Any]:
+        """The reduction as plain data."""
+        return {"kind": self.kind, **asdict(self)}
+
+
+def failed(status: xr.DataArray) -> xr.DataArray:
+    """Where a cell failed or was not computed."""
+    return status >= int(Status.WORK_BUDGET_SPENT)
+
+
+def dimension_of(dataset: xr.Dataset, on: str) -> str:
+    """The one dimension a coordinate lies along.
+
+    Raises
+    ------
+    InvalidValue
+        Where `on` is no coordinate along one dimension.
+    """
+    if on not in dataset.coords or dataset[on].ndim != 1:
+        raise InvalidValue(
+            "on",
+            on,
+            "must be a coordinate along one dimension",
+            choices=[str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != on],
+        )
+    return str(dataset[on].dims[0])
+
+
+def within(dataset: xr.Dataset, on: str, span: tuple[float, float] | None) -> xr.Dataset:
+    """The part of a dataset in a range of a coordinate, both ends included."""
+    if span is None:
+        return dataset
+    values, (lowest, highest) = dataset[on].values, span
+    inside = (values >= lowest - ROUNDING * abs(lowest)) & (
+        values <= highest + ROUNDING * abs(highest)
+    )
+    return dataset.isel({dimension_of(dataset, on): np.flatnonzero(inside)})

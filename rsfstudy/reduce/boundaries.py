@@ -1,0 +1,185 @@
+"""Boundaries: where a lattice changes from no to yes, and where a smooth number reaches a level."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import PchipInterpolator
+
+from rsfstudy.reduce.base import Reduction, dimension_of, failed
+
+
+@dataclass(frozen=True)
+class Boundary(Reduction):
+    """Boundary between the points of a coordinate whose cells say no and those that say yes.
+
+    Nothing is interpolated: cells that answer yes or no bracket the boundary and tell no more.
+
+    Parameters
+    ----------
+    name : str
+        Name of the boundary, the middle of its bracket; ``<name>_stable`` and ``<name>_unstable``
+        (the ends of the bracket), ``<name>_error`` (half its width) and ``<name>_crossings`` (how
+        often the answer changes: the boundary is a number only where it changes once) come with it.
+    of : str
+        Variable that is above `level` where the answer is yes (unstable).
+    on : str
+        Coordinate along one dimension.
+    level : float
+        What separates no from yes.
+    """
+
+    on: str = ""
+    level: float = 0.5
+    kind: ClassVar[str] = "boundary"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Bracket the boundary along the dimension of `on`, for each point of the others.
+
+        Failed cells refuse their row; cells that answered without a number are left out.
+
+        Raises
+        ------
+        InvalidValue
+            Where `on` is no coordinate along one dimension.
+        """
+        dimension = dimension_of(dataset, self.on)
+        values = dataset[self.of].where(~failed(dataset["status"]).any(dimension))
+        found = xr.apply_ufunc(
+            self._bracket,
+            values,
+            dataset[self.on].astype(float),
+            input_core_dims=[[dimension], [dimension]],
+            output_core_dims=[[], [], []],
+            vectorize=True,
+        )
+        stable, unstable, crossings = found
+        once = crossings == 1
+        note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
+        result = xr.Dataset(
+            {
+                self.name: (0.5 * (stable + unstable)).where(once),
+                f"{self.name}_error": (0.5 * abs(unstable - stable)).where(once),
+                f"{self.name}_stable": stable,
+                f"{self.name}_unstable": unstable,
+                f"{self.name}_crossings": crossings,
+            }
+        )
+        for name in result:
+            result[name].attrs["comment"] = note
+            if bool(failed(dataset["status"]).any()):
+                result[name].attrs["refused"] = "cells along it failed or are missing"
+        return result
+
+    def _bracket(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:
+        """Ends of the bracket next to the first change of the answer, and the number of changes."""
+        order = [i for i in np.argsort(on) if not np.isnan(values[i])]
+        if not order:
+            return np.nan, np.nan, np.nan
+        says_yes, at = values[order] > self.level, on[order]
+        changes = np.flatnonzero(says_yes[1:] != says_yes[:-1])
+        if changes.size == 0:
+            end = (np.nan, at[0]) if says_yes[0] else (at[-1], np.nan)
+            return *end, 0.0
+        first = changes[0]
+        lower, upper = at[first], at[first + 1]
+        ends = (upper, lower) if says_yes[first] else (lower, upper)
+        return *ends, float(changes.size)
+
+
+@dataclass(frozen=True)
+class Inverse(Reduction):
+    """Where along a coordinate a smooth, monotone variable reaches a level; in logarithms of both.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result; ``<name>_error`` comes with it: what the uncertainty of the level does,
+        and how much the result moves when every other point is left out.
+    of : str
+        Variable that reaches the level; positive.
+    on : str
+        Coordinate along one dimension; positive.
+    levels : float, or mapping of str to float
+        The level; or one for each label of the dimension `along`, where labels that are missing
+        have none.
+    uncertainty : float
+        Relative uncertainty of the level; a mapping as `levels`.
+    along : str
+        Dimension of the labels.
+    """
+
+    on: str = ""
+    levels: float | Mapping[str, float] = 1.0
+    uncertainty: float | Mapping[str, float] = 0.0
+    along: str = ""
+    kind: ClassVar[str] = "inverse"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Interpolate along the dimension of `on`; NaN where the level is out of reach.
+
+        Raises
+        ------
+        InvalidValue
+            Where `on` is no coordinate along one dimension.
+        """
+        dimension = dimension_of(dataset, self.on)
+        if dataset.sizes[dimension] < 4:
+            return xr.Dataset()
+        values = dataset[self.of].where(~failed(dataset["status"]).any(dimension))
+        found, error = xr.apply_ufunc(
+            _inverse,
+            values,
+            dataset[self.on].astype(float),
+            self._labelled(dataset, self.levels),
+            self._labelled(dataset, self.uncertainty),
+            input_core_dims=[[dimension], [dimension], [], []],
+            output_core_dims=[[], []],
+            vectorize=True,
+        )
+        note = f"{self.on} at which {self.of} reaches {self.levels}"
+        return xr.Dataset(
+            {
+                self.name: found.assign_attrs(comment=note),
+                f"{self.name}_error": error.assign_attrs(comment=note),
+            }
+        )
+
+    def _labelled(self, dataset: xr.Dataset, values: float | Mapping[str, float]) -> xr.DataArray:
+        if not isinstance(values, Mapping):
+            return xr.DataArray(float(values))
+        labels = dataset[self.along]
+        return xr.DataArray(
+            [float(values.get(label, np.nan)) for label in labels.values],
+            coords={self.along: labels},
+            dims=self.along,
+        )
+
+
+def _inverse(
+    values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
+) -> tuple[float, float]:
+    known = np.isfinite(values) & (values > 0.0) & (on > 0.0)
+    x, y = np.log(on[known]), np.log(values[known])
+    if np.isnan(level) or level <= 0.0 or x.size < 4:
+        return np.nan, np.nan
+    fine = _reaches(x, y, np.log(level))
+    coarse = _reaches(x[::2], y[::2], np.log(level))
+    ends = [_reaches(x, y, np.log(level) + d) for d in (-uncertainty, uncertainty)]
+    error = abs(fine - coarse) + max(abs(fine - end) for end in ends)
+    return float(np.exp(fine)), float(np.exp(fine) * error)
+
+
+def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
+    """The one place where the interpolant through the points is at the level; NaN where not one."""
+    roots = PchipInterpolator(*_ascending(x, y)).solve(level, extrapolate=False)
+    return float(roots[0]) if len(roots) == 1 else np.nan
+
+
+def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(x)
+    return x[order], y[order]

@@ -1,0 +1,149 @@
+"""Comparisons: with a reference point of the lattice, with a closed form, and among the points of
+one dimension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import xarray as xr
+
+from rsfstudy.closed_forms import FORMS
+from rsfstudy.errors import InvalidValue
+from rsfstudy.reduce.base import Reduction, dimension_of, failed, within
+
+
+@dataclass(frozen=True)
+class RelativeDifference(Reduction):
+    """How far a variable lies below its value at a reference point of one dimension: ``1 -
+    of/of_reference``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    of : str
+        Variable to compare.
+    along : str
+        Dimension of the reference.
+    reference : str or float
+        Label of the reference point on that dimension.
+    """
+
+    along: str = ""
+    reference: str | float = ""
+    kind: ClassVar[str] = "relative_difference"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Compare along `along`; nothing if the lattice has no reference point."""
+        values = dataset[self.of]
+        if self.reference not in dataset[self.along].values:
+            return xr.Dataset()
+        difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
+        note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
+        return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
+
+
+@dataclass(frozen=True)
+class Difference(Reduction):
+    """How far a variable lies above its value at a reference point of one dimension: ``of -
+    of_reference``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    of : str
+        Variable to compare.
+    along : str
+        Dimension of the reference.
+    reference : str or float
+        Label of the reference point on that dimension.
+    """
+
+    along: str = ""
+    reference: str | float = ""
+    kind: ClassVar[str] = "difference"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Compare along `along`; nothing if the lattice has no reference point."""
+        values = dataset[self.of]
+        if self.along not in values.dims or self.reference not in dataset[self.along].values:
+            return xr.Dataset()
+        difference = values - values.sel({self.along: self.reference}, drop=True)
+        note = f"{self.of} less its value at {self.along} = {self.reference}"
+        return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
+
+
+@dataclass(frozen=True)
+class OverClosedForm(Reduction):
+    """A variable over a published closed form.
+
+    Parameters
+    ----------
+    name : str
+        Name of the ratio; ``<name>_closed_form``, the closed form itself, comes with it.
+    of : str
+        Variable to compare.
+    form : str
+        Name in `rsfstudy.closed_forms`.
+    """
+
+    form: str = ""
+    kind: ClassVar[str] = "over_closed_form"
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise InvalidValue("form", self.form, "is no closed form", choices=FORMS)
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Compare in every cell; nothing where the lattice lacks a field of the formula."""
+        form = FORMS[self.form]
+        if not all(name in dataset.coords for name in form.fields):
+            return xr.Dataset()
+        fields = [dataset[name].astype(float) for name in form.fields]
+        exact = xr.apply_ufunc(form.value, *fields, vectorize=True)
+        note = f"{form.text}: {form.source}"
+        return xr.Dataset(
+            {
+                self.name: (dataset[self.of] / exact).assign_attrs(
+                    comment=f"{self.of} over {note}"
+                ),
+                f"{self.name}_closed_form": exact.assign_attrs(comment=note),
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Spread(Reduction):
+    """How far apart the values along one coordinate lie: the largest less the smallest.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    of : str
+        Variable to compare.
+    on : str
+        Coordinate along one dimension.
+    within : tuple of float
+        Range of `on`, both ends included; all of it by default.
+    """
+
+    on: str = ""
+    within: tuple[float, float] | None = None
+    kind: ClassVar[str] = "spread"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Along the dimension of `on`; nothing where fewer than two points are in range."""
+        dimension = dimension_of(dataset, self.on)
+        support = within(dataset, self.on, self.within)
+        if support.sizes[dimension] < 2:
+            return xr.Dataset()
+        values = support[self.of]
+        spread = values.max(dimension) - values.min(dimension)
+        spread = spread.where(~failed(support["status"]).any(dimension))
+        span = "" if self.within is None else f" from {self.within[0]:g} to {self.within[1]:g}"
+        note = f"largest less smallest {self.of} over {self.on}{span}"
+        return xr.Dataset({self.name: spread.assign_attrs(comment=note)})

@@ -1,0 +1,138 @@
+"""Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.reduce import Difference, Parting
+from rsfstudy.scene import Scene
+from rsfstudy.study import Axis, Study
+
+from ._paper import PAPER, REFERENCE
+
+RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
+
+
+def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str) -> Claim:
+    """C11: quasi-static slip stays bounded, each peak lower than the one before."""
+    return Claim(
+        id="C11",
+        statement=f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: decays",
+        source=source,
+        variable="peak_ratio",
+        where={
+            "normal_stress": normal_stress,
+            "stiffness_ratio": stiffness_ratio,
+            "load_velocity_ratio": rate,
+            "inertia": False,
+        },
+        relation="below",
+        published=1.0,
+        tolerance=0.0,
+        reason="an inequality",
+    )
+
+
+def repeats(rate: float) -> Claim:
+    """C11: the theorem of Ranjith and Rice at k = k_cr."""
+    return Claim(
+        id="C11",
+        statement=f"quasi-static, constant, k = k_cr, {rate:g} V_*: oscillations repeat",
+        source=RANJITH_RICE,
+        variable="peak_ratio",
+        where={
+            "normal_stress": "constant",
+            "stiffness_ratio": 1.0,
+            "load_velocity_ratio": rate,
+            "inertia": False,
+        },
+        published=1.0,
+        tolerance=1e-5,
+        reason="a theorem; 100 times the accuracy asked for, since neutral orbits heal no error",
+    )
+
+
+LARGEST = {"normal_stress": "variable", "stiffness_ratio": 1.0, "load_velocity_ratio": 200.0}
+
+study = Study(
+    name="bounded_slip",
+    title="Motions after steps of load point velocity, slowness law, k >= k_cr(V_*), b/a = 2",
+    summary=(
+        "With the slowness law and k >= k_cr the slip rate after any step stays bounded, "
+        "without mass too; at constant normal stress and k = k_cr oscillations repeat for "
+        "ever. Bounded is not slow: after large steps mass limits the slip rate, and the motion "
+        "with mass leaves the quasi-static one. At variable normal stress and k = k_cr the two "
+        "join again after the rupture; on stiffer springs, and at constant normal stress, an "
+        "offset of stress remains."
+    ),
+    base=Scene(law="slowness", b_over_a=2.0, alpha=0.56),
+    axes=[
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("stiffness_ratio", [1.0, 1.1, 1.25]),
+        Axis("load_velocity_ratio", [2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0]),
+        Axis("inertia", [False, True]),
+    ],
+    measure=StepResponse(),
+    reductions=[
+        Difference(name="peak_lowering", of="max_log10_slip_rate", along="inertia", reference=0),
+        Parting(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3),
+    ],
+    claims=[
+        decays("variable", 1.0, 2.0, f"{PAPER}, Fig. 8"),
+        decays("variable", 1.0, 200.0, f"{PAPER}, Fig. 8"),
+        decays("constant", 1.1, 2.0, RANJITH_RICE),
+        decays("constant", 1.1, 200.0, RANJITH_RICE),
+        repeats(2.0),
+        repeats(200.0),
+        Claim(
+            id="C18",
+            statement="V_0 = 200 V_*: mass lowers the peak slip rate by an order of magnitude",
+            source=f"{PAPER}, section 4, Fig. 12",
+            variable="peak_lowering",
+            where={**LARGEST, "inertia": True},
+            published=-1.0,
+            tolerance=0.5,
+            reason="'by one order of magnitude'",
+            expected="differs",
+            because=(
+                "peaks are 10^13.335 and 10^8.952 V_*. Without mass every part of the stress the "
+                "spring carries beyond the state's strength goes into slip rate, e-fold for each "
+                "a sigma; with mass it goes into acceleration. The gap is one order for V_0 = 19 "
+                "V_*, or for 200 V_* on a spring of 1.12 k_cr"
+            ),
+        ),
+        Claim(
+            id="C18",
+            statement="V_0 = 200 V_*: the paths merge again, and the next peaks are the same",
+            source=f"{PAPER}, section 4, Fig. 12",
+            variable="peak_log10_slip_rate",
+            where={**LARGEST, "peak": 2, "inertia": True},
+            minus={**LARGEST, "peak": 2, "inertia": False},
+            published=0.0,
+            tolerance=1e-3,
+            reason="what mass leaves of a difference in the state after the rupture",
+        ),
+        Claim(
+            id="C18",
+            statement="V_0 = 200 V_*: they merge on the segment of constant stress",
+            source=f"{PAPER}, section 4, Fig. 12",
+            variable="paths_merging",
+            where=LARGEST,
+            relation="above",
+            published=0.0,
+            tolerance=0.0,
+            reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
+        ),
+        Claim(
+            id="C18",
+            statement="V_0 = 200 V_*: with mass the slip is a rupture, beyond the norm 5e-4",
+            source=f"{PAPER}, section 4",
+            variable="max_log10_slip_rate",
+            where={**LARGEST, "inertia": True},
+            relation="above",
+            published=4.73,
+            tolerance=0.0,
+            reason="an inequality: the norm V T/(2 pi D_c) = 5e-4 is at 10^4.73 V_*",
+        ),
+    ],
+    plot="bounded_slip",
+    references=[REFERENCE, RANJITH_RICE],
+)

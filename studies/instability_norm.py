@@ -1,0 +1,93 @@
+"""Instability norm: how boundaries depend on it, and which norm the paper's numbers imply."""
+
+import math
+
+import numpy as np
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import Inverse
+from rsfstudy.scene import Scene
+from rsfstudy.study import Axis, Study
+
+from ._paper import PAPER, REFERENCE
+
+#: The two numbers of section 4 (slowness law, b/a = e, alpha = 0.56), and where the slip law at
+#: constant normal stress feels the norm most: weak net weakening.
+SOFT, STIFF = "slowness, k = k_cr", "slowness, k = 1.5 k_cr"
+BOUNDARIES: dict[str, dict[str, str | float]] = {
+    SOFT: {
+        "law": "slowness",
+        "normal_stress": "variable",
+        "alpha": 0.56,
+        "b_over_a": math.e,
+        "stiffness_ratio": 1.0,
+    },
+    STIFF: {
+        "law": "slowness",
+        "normal_stress": "variable",
+        "alpha": 0.56,
+        "b_over_a": math.e,
+        "stiffness_ratio": 1.5,
+    },
+    **{
+        f"slip, constant, a/(b-a) = {inverse:g}": {
+            "law": "slip",
+            "normal_stress": "constant",
+            "b_over_a": 1.0 + 1.0 / inverse,
+            "stiffness_ratio": 1.0,
+        }
+        for inverse in (1.0, 2.0, 4.0, 10.0)
+    },
+}
+
+study = Study(
+    name="instability_norm",
+    title="Critical load point velocity step against the instability norm",
+    summary=(
+        "A motion counts as unstable once V T/(2 pi D_c) reaches a norm the paper does not "
+        "state. Both of its numbers for the slowness law imply the same one, 5e-4. The slip "
+        "law feels the norm where b - a is small against a: at a/(b-a) = 4 the boundary is 4.66 "
+        "V_* at 5e-4, and 5 V_* for a norm without bound."
+    ),
+    base=Scene(),
+    axes=[
+        Axis("boundary", BOUNDARIES),
+        Axis("instability_norm", np.geomspace(5e-6, 5e-2, 33)),
+    ],
+    measure=CriticalStep(of="load_velocity_ratio", direction="up"),
+    reductions=[
+        Inverse(
+            name="implied_norm",
+            of="critical_velocity_ratio",
+            on="instability_norm",
+            along="boundary",
+            levels={SOFT: 11.8, STIFF: 2361.0},
+            uncertainty={SOFT: 0.05 / 11.8, STIFF: 0.5 / 2361.0},
+        ),
+    ],
+    claims=[
+        Claim(
+            id="C17",
+            statement="'~2361 V_*' at k = 1.5 k_cr implies the norm 5e-4",
+            source=f"{PAPER}, section 4",
+            variable="implied_norm",
+            where={"boundary": STIFF},
+            published=5e-4,
+            tolerance=2e-7,
+            reason="half a unit of the printed 2361 is 1.3e-7 in the norm",
+        ),
+        Claim(
+            id="C17",
+            statement="'~11.8 V_*' at k = k_cr implies the norm 5e-4",
+            source=f"{PAPER}, section 4",
+            variable="implied_norm",
+            where={"boundary": SOFT},
+            published=5e-4,
+            tolerance=7.7e-6,
+            reason="half a unit of the last digit of the printed 11.8 is 7.7e-6 in the norm",
+        ),
+    ],
+    plot="instability_norm",
+    references=[REFERENCE],
+)

@@ -1,0 +1,47 @@
+"""Rate-step boundary the plain way: a lattice of cells that are stable or unstable (Fig. 6)."""
+
+import math
+
+import numpy as np
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.reduce import Boundary
+from rsfstudy.scene import Scene
+from rsfstudy.study import Axis, Study
+
+from ._paper import CASES, CONSTANT, PAPER, REFERENCE
+
+study = Study(
+    name="rate_step_lattice",
+    title="Stable and unstable steps of load point velocity, slip law, b/a = e",
+    summary=(
+        "Each cell follows one motion and says whether it reaches the instability norm; the "
+        "boundary between the cells is all such a lattice can tell, to within its spacing. It "
+        "costs 40 motions for two digits where rate_step_stiffness has ten from a few paths."
+    ),
+    base=Scene(law="slip", b_over_a=math.e),
+    axes=[
+        Axis("case", CASES),
+        Axis("stiffness_ratio", [1.0, 1.25, 1.5, 1.75, 2.0]),
+        Axis("load_velocity_ratio", np.geomspace(1.1, 5.0, 40)),
+    ],
+    measure=Triggered(),
+    reductions=[
+        Boundary(name="lattice_boundary", of="unstable", on="load_velocity_ratio"),
+    ],
+    claims=[
+        Claim(
+            id="C8",
+            statement="constant normal stress, k = k_cr: V_0/V_* = 1 + 1/(e - 1)",
+            source=f"{PAPER}, eqs. 10 and 11",
+            variable="lattice_boundary",
+            where={"case": CONSTANT, "stiffness_ratio": 1.0},
+            published=1.0 + 1.0 / (math.e - 1.0),
+            tolerance=0.035,
+            reason="half of the spacing of the lattice, 3.9 %",
+        ),
+    ],
+    plot="rate_step_lattice",
+    references=[REFERENCE],
+)

@@ -1,0 +1,107 @@
+"""The motion after a step: closed peaks, decay and repetition, mass, and slip that runs away."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.status import Status
+
+SLOWNESS = {"law": "slowness", "normal_stress": "constant"}
+
+
+def response(peaks: int = 3, rtol: float = 1e-7, **fields):
+    return StepResponse(peaks=peaks, phases=50)(Scene(**fields), Accuracy(rtol))
+
+
+def closed_peak(weakening: float, load: float) -> float:
+    """log10 of the peak slip rate, slowness law at k = k_cr and constant normal stress.
+
+    H = Omega - ln Omega + lambda (w - ln w) is conserved, with Omega = V theta/D_c and w = V_0
+    theta/D_c; at a peak lambda (w - Omega) = (1 + lambda)(1 - Omega).
+    """
+    conserved = 1.0 + weakening * (load - math.log(load))
+
+    def excess(log_w: float) -> float:
+        omega = 1.0 + weakening * -math.expm1(log_w)
+        here = omega - math.log(omega) + weakening * (math.exp(log_w) - log_w)
+        return here - conserved
+
+    log_w = brentq(excess, -1e4, -1e-12, xtol=1e-13)
+    omega = 1.0 + weakening * -math.expm1(log_w)
+    return (math.log(omega * load) - log_w) / math.log(10.0)
+
+
+@pytest.mark.parametrize(("weakening", "load"), [(1.0, 2.0), (0.5, 20.0), (3.0, 5.0), (1.0, 200.0)])
+def test_peaks_of_the_slowness_law_are_those_of_its_conserved_quantity(weakening, load):
+    """To the accuracy asked for, up to the peak of 10^87 V_* after a 200-fold step."""
+    found = response(b_over_a=1.0 + weakening, load_velocity_ratio=load, **SLOWNESS)
+    assert found.status is Status.OK
+    np.testing.assert_allclose(
+        found.values["peak_log10_slip_rate"], closed_peak(weakening, load), rtol=1e-6
+    )
+    # neutral orbits pass errors on from peak to peak: hence ten times rtol
+    assert found.values["peak_ratio"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_two_hundred_fold_step_peaks_at_10_to_the_87():
+    assert closed_peak(1.0, 200.0) == pytest.approx(87.03, abs=5e-3)
+
+
+def test_the_error_estimate_covers_the_error():
+    for rtol in (1e-4, 1e-6, 1e-8):
+        found = response(b_over_a=2.0, load_velocity_ratio=20.0, rtol=rtol, **SLOWNESS)
+        error = abs(found.values["max_log10_slip_rate"] - closed_peak(1.0, 20.0))
+        assert error <= found.values["max_log10_slip_rate_error"]
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
+def test_oscillations_above_critical_stiffness_decay(law, normal_stress):
+    found = response(
+        law=law, normal_stress=normal_stress, stiffness_ratio=1.1, load_velocity_ratio=1.2
+    )
+    assert (np.diff(found.values["peak_log10_slip_rate"]) < 0.0).all()
+    assert found.values["peak_ratio"] < 0.8
+
+
+def test_below_critical_stiffness_they_grow():
+    found = response(stiffness_ratio=0.95, load_velocity_ratio=1.01)
+    assert found.values["peak_ratio"] > 1.0
+
+
+def test_mass_lowers_the_peak_after_a_large_step_and_leaves_small_ones_alone():
+    large, small = (
+        [
+            response(law="slowness", load_velocity_ratio=load, inertia=inertia).values
+            for inertia in (False, True)
+        ]
+        for load in (200.0, 2.0)
+    )
+    assert large[0]["max_log10_slip_rate"] == pytest.approx(13.34, abs=0.01)
+    assert large[1]["max_log10_slip_rate"] == pytest.approx(8.95, abs=0.01)
+    assert small[1]["max_log10_slip_rate"] == pytest.approx(
+        small[0]["max_log10_slip_rate"], abs=1e-7
+    )
+
+
+def test_slip_that_runs_away_without_mass_is_an_answer():
+    found = response(law="slip", load_velocity_ratio=20.0)
+    assert found.status is Status.SLIP_RATE_UNBOUNDED
+    assert found.status.is_answer
+    assert math.isnan(found.values.get("max_log10_slip_rate", math.nan))
+
+
+def test_a_held_load_point_is_refused_by_status():
+    assert response(displacement_step=1.0).status is Status.NO_STEADY_STATE
+
+
+@pytest.mark.parametrize("wrong", [{"peaks": 1}, {"phases": 1}])
+def test_meaningless_lengths_are_refused(wrong):
+    with pytest.raises(InvalidValue, match=next(iter(wrong))):
+        StepResponse(**wrong)

@@ -1,0 +1,45 @@
+"""Yes or no: does a step trigger instability?"""
+
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.status import Status
+
+
+def answer(**fields) -> tuple[float, float]:
+    outcome = Triggered()(Scene(**fields), Accuracy())
+    assert outcome.status is Status.OK
+    return outcome.values["unstable"], outcome.values["unstable_error"]
+
+
+@pytest.mark.parametrize("b_over_a", [2.0, 3.0, 5.0])
+def test_either_side_of_the_closed_form(b_over_a):
+    """V_0/V_* = 1 + a/(b-a) at constant normal stress and k = k_cr."""
+    critical = 1.0 + 1.0 / (b_over_a - 1.0)
+    fields = {"normal_stress": "constant", "b_over_a": b_over_a}
+    assert answer(load_velocity_ratio=critical * 0.999, **fields) == (0.0, 0.0)
+    assert answer(load_velocity_ratio=critical * 1.001, **fields) == (1.0, 0.0)
+
+
+def test_displacement_steps_too():
+    assert answer(displacement_step=0.9, normal_stress="constant")[0] == 0.0
+    assert answer(displacement_step=1.1, normal_stress="constant")[0] == 1.0
+
+
+def test_an_answer_the_tolerance_decides_says_so():
+    """Within a loose tolerance of the boundary, a tighter and a looser one disagree somewhere."""
+    errors = [
+        Triggered()(Scene(load_velocity_ratio=1.66025 + 4e-6 * i), Accuracy(1e-3)).values[
+            "unstable_error"
+        ]
+        for i in range(-20, 21)
+    ]
+    assert 1.0 in errors
+    assert errors[0] == errors[-1] == 0.0
+
+
+def test_a_norm_below_the_loading_is_no_question():
+    outcome = Triggered()(Scene(load_velocity_ratio=1e5, instability_norm=5e-4), Accuracy())
+    assert outcome.status is Status.NORM_BELOW_LOADING_RATE
