@@ -1,9 +1,14 @@
-"""The named studies: found by file name, loaded one at a time."""
+"""Where studies come from: the named ones, found by file name, and files of a user's own."""
 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.study import Study
@@ -20,14 +25,63 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> Study:
-    """The declaration of a named study.
+    """The declaration of a named study, or that of a Python file with a `study` in it.
 
     Raises
     ------
     InvalidValue
-        For a name there is no study of, with close matches.
+        For a name there is no study of, with close matches, and for a file that is not there,
+        raises, or declares no study.
     """
+    if name.endswith(".py"):
+        return _declared_in(_run(Path(name)), name)
     if name not in names():
-        raise InvalidValue("study", name, "is unknown", choices=names())
+        raise InvalidValue(
+            "study", name, "is unknown", choices=names(), remedy="Or name a file: path/to/study.py."
+        )
     study: Study = importlib.import_module(f"{_PACKAGE}.{name}").study
+    return study
+
+
+def _run(path: Path) -> ModuleType:
+    """The module a file makes.
+
+    It is taken out of the list of modules again: worker processes, which cannot import it, then get
+    what it defines by value.
+    """
+    if not path.is_file():
+        raise InvalidValue("study", str(path), "is no file")
+    spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except InvalidValue as error:
+        raise error.at(f"{path}{_line(error, path)}") from error
+    except SyntaxError as error:
+        raise InvalidValue("study", str(path), f"line {error.lineno}: {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        rule = f"raises {type(error).__name__}{_line(error, path)}: {error}"
+        raise InvalidValue("study", str(path), rule) from error
+    finally:
+        del sys.modules[spec.name]
+    return module
+
+
+def _line(error: BaseException, path: Path) -> str:
+    """Where in the file an error arose."""
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename) == path
+    ]
+    return f", line {lines[-1]}" if lines else ""
+
+
+def _declared_in(module: ModuleType, name: str) -> Study:
+    study = getattr(module, "study", None)
+    if not isinstance(study, Study):
+        raise InvalidValue("study", name, "declares no study", remedy="Write study = Study(...).")
     return study

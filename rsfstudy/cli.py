@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
-import pandas as pd
 import xarray as xr
 from rich.console import Console
-from rich.table import Column, Table
+from rich.table import Table
 
-from rsfstudy import api, catalogue, runner, store
-from rsfstudy.claims import NOT_APPLICABLE
+from rsfstudy import api, catalogue, runner, terminal
 from rsfstudy.core.accuracy import DEFAULT_RTOL
 from rsfstudy.errors import InvalidValue, RsfStudyError
-from rsfstudy.status import Status
 from rsfstudy.study import Study
+from rsfstudy.terminal import FAILED, OK
 from rsfstudy.workers import existing_cluster
 
-OK, FAILED, WRONG_USAGE = 0, 1, 2
+WRONG_USAGE = 2
 
-_console = Console()
 _stderr = Console(stderr=True)
 
 _all = click.option("--all", "every", is_flag=True, help="Every named study.")
@@ -75,7 +72,7 @@ def list_studies() -> None:
     table = Table("study", "cells", "what it shows", box=None)
     for name, study in api.studies().items():
         table.add_row(name, str(study.size), study.title)
-    _console.print(table)
+    terminal.console.print(table)
 
 
 @cli.command()
@@ -85,16 +82,16 @@ def show(name: str, settings: tuple[str, ...]) -> None:
     """Show the declaration of a study, without running it."""
     study = _declared(name, settings)
     scenes = list(study.scenes())
-    _console.print(f"[bold]{study.name}[/bold]: {study.title}\n")
+    terminal.console.print(f"[bold]{study.name}[/bold]: {study.title}\n")
     if study.summary:
-        _console.print(study.summary + "\n")
+        terminal.console.print(study.summary + "\n")
     table = Table("", "", box=None, show_header=False)
     for axis in study.axes:
-        points = axis.labels or [_short(row[axis.dimension]) for row in axis.rows]
+        points = axis.labels or [terminal.short(row[axis.dimension]) for row in axis.rows]
         table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
     varied = {field for axis in study.axes for field in axis.fields}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    table.add_row("fixed", ", ".join(f"{n} = {_short(v)}" for n, v in fixed.items()))
+    table.add_row("fixed", ", ".join(f"{n} = {terminal.short(v)}" for n, v in fixed.items()))
     table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in study.measure.describe().items()))
     table.add_row("gives", ", ".join(study.measure.variables))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
@@ -106,7 +103,7 @@ def show(name: str, settings: tuple[str, ...]) -> None:
         "cost",
         f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {DEFAULT_RTOL:g}",
     )
-    _console.print(table)
+    terminal.console.print(table)
 
 
 @cli.command()
@@ -149,7 +146,7 @@ def run(
                 command=runner.command_line(),
             )
             _draw(dataset, output / f"{study.name}.png")
-            status = max(status, _report(dataset, study.name, output))
+            status = max(status, terminal.report(dataset, study.name, output))
     return status
 
 
@@ -159,15 +156,17 @@ def run(
 @_output
 def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
-    status = OK
-    for what in _results(name, every):
-        if every and not (output / f"{what}.nc").exists():
-            _console.print(f"{what}: not run yet", style="red")
+    if not every:
+        dataset = api.open(_results(name, every)[0], output)
+        return max(terminal.claims(dataset), terminal.failures(dataset))
+    status, found = OK, []
+    for what in catalogue.names():
+        if (output / f"{what}.nc").exists():
+            found.append(api.open(what, output))
+        else:
+            terminal.console.print(f"{what}: not run yet", style="red")
             status = FAILED
-            continue
-        dataset = api.open(what, output)
-        status = max(status, _claims(dataset), _failures(dataset))
-    return status
+    return max([status, terminal.all_claims(found), *map(terminal.failures, found)])
 
 
 @cli.command()
@@ -180,11 +179,10 @@ def plot(name: str | None, every: bool, output: Path) -> None:
         dataset = api.open(what, output)
         path = Path(what).with_suffix(".png") if what.endswith(".nc") else output / f"{what}.png"
         _draw(dataset, path)
-        _console.print(f"{path}", highlight=False)
+        terminal.console.print(f"{path}", highlight=False)
 
 
-# ---- what was asked for
-# ---------------------------------------------------------------------------
+# ---- what was asked for ---------------------------------------------------------------------
 
 
 def _named(name: str | None, every: bool) -> list[Study]:
@@ -247,133 +245,10 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         yield client
 
 
-# ---- what is shown
-# --------------------------------------------------------------------------------
-
-
 def _draw(dataset: xr.Dataset, path: Path) -> None:
     from rsfstudy import plots
 
     plots.save(dataset, path)
-
-
-def _report(dataset: xr.Dataset, name: str, output: Path) -> int:
-    _reductions(dataset)
-    moved = _claims(dataset)
-    failed = _failures(dataset)
-    work = int(dataset["rhs_evaluations"].sum())
-    tally = ", ".join(f"{count} {label}" for label, count in runner.counts(dataset).items())
-    _console.print(f"{name}: {tally}; {work:,} right-hand sides", highlight=False)
-    _console.print(f"wrote {output / name}.nc and {output / name}.png", highlight=False)
-    return max(moved, failed)
-
-
-def _reductions(dataset: xr.Dataset) -> None:
-    """Slopes and their like: variables with a standard error, one row for each point of their
-    dimensions.
-    """
-    for slope in [str(n) for n in dataset.data_vars if f"{n}_stderr" in dataset]:
-        frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
-        rows = frame.to_dataframe().reset_index()
-        columns = [*dataset[slope].dims, slope, "standard error", "largest misfit", "points"]
-        table = Table(
-            *map(str, columns), title=dataset[slope].attrs["comment"], title_justify="left"
-        )
-        wanted = [
-            *dataset[slope].dims,
-            slope,
-            f"{slope}_stderr",
-            f"{slope}_misfit",
-            f"{slope}_points",
-        ]
-        for row in rows[wanted].itertuples(index=False):
-            table.add_row(*(_short(value) for value in row))
-        _console.print(table)
-
-
-def _claims(dataset: xr.Dataset) -> int:
-    """Print the claims; FAILED where a verdict is not the expected one."""
-    table_of = api.check(dataset)
-    overrides = store.declaration(dataset)["overrides"]
-    _console.print(f"[bold]{dataset.attrs['id']}[/bold] ({dataset.attrs['completeness']})")
-    if overrides:
-        _console.print(f"not as declared: {_settings(overrides)}", highlight=False, markup=False)
-    if (table_of.empty or table_of["verdict"].eq(NOT_APPLICABLE).all()) and not _undone(dataset):
-        _console.print("no claim applies")
-        return OK
-    table = Table(
-        "",
-        Column("claim", ratio=3),
-        Column("published", no_wrap=True),
-        Column("ours", no_wrap=True),
-        Column("tolerance, and why", ratio=4),
-        Column("verdict", no_wrap=True),
-        expand=True,
-        padding=(0, 0),
-    )
-    for row in table_of.itertuples(index=False):
-        table.add_row(*_claim_row(row))
-    _console.print(table)
-    moved = table_of[table_of["moved"]]
-    for row in moved.itertuples(index=False):
-        _console.print(
-            f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red"
-        )
-    return FAILED if len(moved) else OK
-
-
-def _settings(overrides: Mapping[str, Any]) -> str:
-    texts = {
-        name: ",".join(map(_short, value)) if isinstance(value, list) else _short(value)
-        for name, value in overrides.items()
-    }
-    return ", ".join(f"{name}={text}" for name, text in texts.items())
-
-
-def _undone(dataset: xr.Dataset) -> int:
-    """Number of cells that are not computed yet."""
-    return int((dataset["status"] == int(Status.PENDING)).sum())
-
-
-def _claim_row(row: Any) -> tuple[str, ...]:
-    sign = {"equals": "", "below": "< ", "above": "> "}[row.relation]
-    reason = f"{row.tolerance:g}: {row.reason}"
-    if row.because:
-        reason += f". It differs because {row.because}"
-    colour = "red" if row.moved else "green" if row.verdict == "reproduced" else "yellow"
-    return (
-        row.id,
-        row.claim,
-        f"{sign}{row.published:g}",
-        "-" if pd.isna(row.ours) else f"{row.ours:.6g}",
-        reason,
-        f"[{colour}]{row.verdict}[/{colour}]",
-    )
-
-
-def _failures(dataset: xr.Dataset) -> int:
-    """Print the cells that failed; FAILED if there are any."""
-    if _undone(dataset):
-        size = dataset["status"].size
-        _console.print(f"{_undone(dataset)} of {size} cells are not computed yet", style="red")
-    failed = dataset["status"] >= int(Status.WORK_BUDGET_SPENT)
-    if not bool(failed.any()):
-        return OK
-    failed = failed & (dataset["status"] != int(Status.PENDING))
-    if not bool(failed.any()):
-        return FAILED
-    table = Table("cell", "status", "message", title=f"{int(failed.sum())} cells failed")
-    labels = {int(s): s.label for s in Status}
-    for index in np.argwhere(failed.values)[:20]:
-        cell = dataset[["status", "message"]].isel(dict(zip(failed.dims, index, strict=True)))
-        place = ", ".join(f"{d} = {_short(cell[d].item())}" for d in map(str, failed.dims))
-        table.add_row(place, labels[int(cell["status"])], str(cell["message"].item()))
-    _console.print(table)
-    return FAILED
-
-
-def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ FLOORS = {
     "catalogue": 6,
     "plots": 7,
     "api": 7,
+    "terminal": 7,
     "cli": 7,
     "__init__": 7,
     "named_studies": 7,
@@ -43,7 +44,7 @@ HOMES = {
     "distributed": {"workers"},
     "matplotlib": {"plots"},
     "click": {"cli"},
-    "rich": {"api", "cli"},
+    "rich": {"api", "cli", "terminal"},
     "sqlite3": {"journal"},
 }
 

@@ -14,6 +14,13 @@ from rsfstudy.cli import cli
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+#: The block that is a file of its own, run by its path.
+FILE = next(i for i, block in enumerate(BLOCKS) if "study = Study(" in block)
+
+
+def test_the_study_of_your_own_fits_in_thirty_lines():
+    assert "<!-- file angle.py -->\n```python\n" + BLOCKS[FILE] in README
+    assert len(BLOCKS[FILE].splitlines()) <= 30
 
 
 def test_there_are_examples():
@@ -24,7 +31,10 @@ def test_there_are_examples():
 def test_python_runs_as_it_stands(number, tmp_path):
     """In an empty directory, in this order where one uses another's results."""
     code = BLOCKS[number]
-    if "outputs/rate_step_boundary.nc" in code:
+    if number == FILE:
+        (tmp_path / "angle.py").write_text(code)
+        command = [sys.executable, "-m", "rsfstudy.cli", "run", "angle.py"]
+    elif "outputs/rate_step_boundary.nc" in code:
         rsfstudy.run("rate_step_boundary", workers=0, output=tmp_path / "outputs", progress=False)
         (tmp_path / "test_block.py").write_text(code)
         command = [sys.executable, "-m", "pytest", "-q", "test_block.py"]

@@ -1,0 +1,99 @@
+"""Each misprint that `studies/MISPRINTS.md` corrects: the corrected formula holds, the printed one
+does not.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.equations import log_rate_at, strength_of
+from rsfstudy.laws import evolution_of
+
+PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
+
+
+def test_eq_3():
+    """A jump of normal stress at V = V_*, by the assembled relation of stress, state and rate."""
+    scene = Scene(alpha=0.56, phi=60.0)
+    stress = 0.3  # of shear stress; normal stress follows
+    change = scene.cot_phi * stress
+    psi = strength_of(scene)(stress)[0]  # the state at which V stays V_* under that stress
+    state_change = psi - strength_of(scene)(stress)[2]
+    friction = scene.mu_star + state_change
+    assert (1.0 + change) * friction == pytest.approx(scene.mu_star + stress, rel=1e-14)
+    jump = -scene.alpha * math.log1p(change)
+    corrected = scene.mu_star * change + (1.0 + change) * jump
+    printed = scene.mu_star * change + jump
+    direct = (1.0 + change) * (scene.mu_star + jump) - scene.mu_star
+    assert corrected == pytest.approx(direct, rel=1e-14)
+    assert abs(printed - direct) > 0.01
+
+
+def test_eq_4b():
+    """dTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
+    b, theta, rate = 0.029, 0.7, 3.0
+    per_slip = evolution_of("slowness")(math.log(rate), b * math.log(theta), b)
+    assert per_slip == pytest.approx(b * (1.0 - theta * rate) / theta / rate, rel=1e-13)
+
+
+def test_eq_11():
+    """Exact at k = k_cr, and too high elsewhere by what the page says."""
+    run = {"workers": 0, "output": None, "progress": False}
+    ratios = [1.0, 1.1, 1.25, 1.5, 2.0]
+    dataset = rsfstudy.run(
+        "rate_step_stiffness",
+        law="slip",
+        case=["constant normal stress"],
+        stiffness_ratio=ratios,
+        **run,
+    )
+    short = 1.0 - dataset.over_eq_11.values.ravel()
+    assert short[0] == pytest.approx(0.0, abs=1e-7)
+    quoted = re.search(r"by ([\d., and]+) % at k/k_cr = 1.1", PAGE)
+    assert quoted is not None
+    numbers = [float(n) for n in re.findall(r"\d\.\d", quoted[1])]
+    np.testing.assert_allclose(100.0 * short[1:], numbers, atol=0.051)
+
+
+def test_eq_13():
+    scene = Scene(alpha=0.56, b_over_a=2.0, stiffness_ratio=1.0)
+    jump = scene.stiffness / (scene.b_over_a - 1.0)
+    state = -scene.alpha * math.log1p(scene.cot_phi * jump)
+    held = (1.0 - scene.cot_phi * (scene.mu_star + state)) * jump - state
+    corrected = held / scene.a / (1.0 + scene.cot_phi * jump)
+    assert corrected == pytest.approx(log_rate_at(scene, jump, 0.0), rel=1e-12)
+    assert math.exp(corrected) == pytest.approx(2.6975, abs=5e-5)
+    printed = (1.0 - scene.cot_phi * (scene.mu_star + state) * jump - state) / scene.a
+    assert abs(printed / (1.0 + scene.cot_phi * jump) - corrected) > 1.0
+
+
+def test_eq_17a():
+    """The corrected stress starts with the direct effect and ends in steady state."""
+    scene = Scene(normal_stress="constant", law="slowness")
+    x = math.log(200.0)
+
+    def stress(slip: float) -> float:
+        evolving = scene.b * math.log1p(math.expm1(x) * math.exp(-slip))
+        return scene.mu_star + (scene.a - scene.b) * x + evolving
+
+    assert stress(0.0) == pytest.approx(scene.mu_star + scene.a * x, rel=1e-14)
+    assert stress(60.0) == pytest.approx(scene.mu_star + (scene.a - scene.b) * x, rel=1e-12)
+
+
+def test_the_axis_of_figure_5():
+    dataset = rsfstudy.run(
+        "rate_step_boundary",
+        case=["constant normal stress", "alpha = 0.56"],
+        b_over_a=[1.25, 2.0, 5.0],
+        workers=0,
+        output=None,
+        progress=False,
+    )
+    low, one, high = dataset.lowering.sel(case="alpha = 0.56").values  # b/a: 1.25, 2, 5
+    assert (high, one) == (pytest.approx(0.063, abs=5e-4), pytest.approx(0.170, abs=5e-4))
+    assert low == pytest.approx(0.25, abs=0.01)

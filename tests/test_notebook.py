@@ -1,0 +1,61 @@
+"""The analysis notebook runs as it stands, on files alone."""
+
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+import rsfstudy
+
+NOTEBOOK = Path(__file__).parent.parent / "studies" / "analysis.ipynb"
+STUDIES = (
+    "linear_stability",
+    "rigid_response",
+    "rate_step_boundary",
+    "rate_step_stiffness",
+    "displacement_boundary",
+    "bounded_slip",
+    "limit_cycles",
+    "stress_drop",
+)
+
+
+@pytest.fixture(scope="module")
+def executed(tmp_path_factory):
+    outputs = tmp_path_factory.mktemp("outputs")
+    for name in STUDIES:
+        rsfstudy.run(name, output=outputs, progress=False)
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MPLBACKEND", raising=False)  # the kernel chooses its own
+        patch.setenv("RSFSTUDY_OUTPUTS", str(outputs))
+        client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": outputs}})
+        return client.execute()
+
+
+def test_it_makes_the_figures_of_the_paper(executed):
+    pictures = [
+        output
+        for cell in executed.cells
+        for output in cell.get("outputs", [])
+        if "image/png" in output.get("data", {})
+    ]
+    assert len(pictures) >= 7
+
+
+def test_no_cell_complains(executed):
+    for cell in executed.cells:
+        for output in cell.get("outputs", []):
+            assert output.get("name") != "stderr", output["text"]
+
+
+def test_it_needs_nothing_of_ours():
+    source = NOTEBOOK.read_text()
+    assert "import rsfstudy" not in source
+    assert "from rsfstudy" not in source
+
+
+def test_it_is_kept_without_its_output():
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells)

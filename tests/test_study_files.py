@@ -1,0 +1,96 @@
+"""A study in a file of the user's own: it runs by its path, and what is wrong with it is told."""
+
+import subprocess
+import sys
+
+import pytest
+
+import rsfstudy
+from rsfstudy import catalogue
+from rsfstudy.errors import InvalidValue
+
+DECLARATION = """
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures.critical_step import CriticalStep
+
+study = Study(
+    name="mine",
+    title="My own",
+    base=Scene(),
+    axes=[Axis("phi", [55, 65])],
+    measure=CriticalStep(of="displacement_step"),
+)
+"""
+
+OWN_MEASURE = """
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Stiffness(Measure):
+    name: ClassVar[str] = "stiffness"
+    headline = "stiffness"
+    variables = {"stiffness": (), "stiffness_error": ()}
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        return Outcome(Status.OK, {"stiffness": scene.stiffness, "stiffness_error": 0.0})
+
+
+study = Study(
+    name="own", title="My own measure", base=Scene(), axes=[Axis("phi", [55, 65])],
+    measure=Stiffness(),
+)
+"""
+
+
+def written(tmp_path, text: str) -> str:
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    return str(path)
+
+
+def test_a_file_runs_by_its_path_on_workers(tmp_path):
+    file = written(tmp_path, DECLARATION)
+    command = [sys.executable, "-m", "rsfstudy.cli", "run", file, "--output", str(tmp_path)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert (tmp_path / "mine.nc").exists()
+    assert (tmp_path / "mine.png").exists()
+    assert rsfstudy.open("mine", tmp_path).sizes["phi"] == 2
+
+
+def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
+    dataset = rsfstudy.run(written(tmp_path, OWN_MEASURE), output=tmp_path, progress=False)
+    assert (dataset.status == 0).all(), dataset.message.values
+    assert float(dataset.stiffness[0]) == rsfstudy.Scene(phi=55).stiffness
+    assert "study_file_mine" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("study = 1", "declares no study"),
+        ("", "declares no study"),
+        ("x = 1\nx +", "line 2: invalid syntax"),
+        ("\n\n1 / 0", "raises ZeroDivisionError, line 3: division by zero"),
+        ("from rsfstudy import Scene\nScene(alfa=1)", "raises TypeError, line 2"),
+        ("from rsfstudy import Scene\nScene(a=-1)", "line 2: a = -1.0: must be greater than 0"),
+        ("raise SystemExit('no')", "raises SystemExit, line 1: no"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
+    with pytest.raises(InvalidValue) as refused:
+        catalogue.load(written(tmp_path, text))
+    assert complaint in str(refused.value)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(InvalidValue, match="is no file"):
+        catalogue.load(str(tmp_path / "nothing.py"))
