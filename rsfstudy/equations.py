@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rsfstudy.effects import inclined_driving, inertia, linker_dieterich
+from rsfstudy.effects import inclined_driving, inertia, linker_dieterich, radiation_damping
 from rsfstudy.laws import evolution_of
 from rsfstudy.scene import Scene
 
@@ -112,11 +112,17 @@ def strength_of(scene: Scene) -> Strength:
     return inclined_with_state_effect
 
 
-def log_rate_at(scene: Scene, friction: float, psi: float) -> float:
-    """ln(V/V_*) for a frictional stress and state: the general relation of stress, state and slip
-    rate.
-    """
-    return (strength_of(scene)(friction)[0] - psi) / scene.a
+def log_rate_at(scene: Scene, spring: float, psi: float) -> float:
+    """ln(V/V_*) for a spring stress and state where mass does not act."""
+    strength, damping = strength_of(scene), scene.radiation_damping
+    if damping > 0.0:
+        return radiation_damping.balanced_rate(spring, psi, strength, scene.a, damping)[0]
+    return (strength(spring)[0] - psi) / scene.a
+
+
+def radiated(scene: Scene, log_rate: float) -> float:
+    """Part of the spring stress that waves carry away at this slip rate, over sigma_*."""
+    return radiation_damping.radiated(log_rate, scene.radiation_damping)
 
 
 def quasi_static(scene: Scene, *, clock: bool) -> Equations:
@@ -154,6 +160,43 @@ def quasi_static(scene: Scene, *, clock: bool) -> Equations:
     if clock:
         unknowns, scales = (*unknowns, "time"), (*scales, 1.0)  # type: ignore[assignment]
     return Equations("quasi_static", unknowns, scales, rate, point)
+
+
+def quasi_dynamic(scene: Scene, *, clock: bool) -> Equations:
+    """With radiation damping: the quasi-static unknowns and independent variable, but friction and
+    radiation share the stress of the spring, ``f = g + eta (V - 1)``.
+    """
+    strength, evolution = strength_of(scene), evolution_of(scene.law)
+    a, b, stiffness, damping = scene.a, scene.b, scene.stiffness, scene.radiation_damping
+    load = scene.log_load_rate
+    balanced_rate = radiation_damping.balanced_rate
+
+    def rate(_: float, state: State) -> list[float]:
+        x, friction = balanced_rate(state[0], state[1], strength, a, damping)
+        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
+        shift = strength(friction)[2]
+        loading = -stiffness * math.tanh(0.5 * (x - load))
+        rates = [loading, share * evolution(x, state[1] - shift, b)]
+        if clock:
+            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+        return rates
+
+    def point(state: State, rates: State) -> Point:
+        spring, psi = float(state[0]), float(state[1])
+        x, friction = balanced_rate(spring, psi, strength, a, damping)
+        _value, slope, shift = strength(friction)
+        change = slope * float(rates[0]) - float(rates[1])
+        growth = change / (a + slope * damping * math.exp(min(x, LARGEST_EXPONENT)))
+        return Point(x, growth, spring, friction, psi, psi - shift + b * x)
+
+    undamped = quasi_static(scene, clock=clock)
+    return Equations("quasi_dynamic", undamped.unknowns, undamped.scales, rate, point)
+
+
+def without_mass(scene: Scene, *, clock: bool) -> Equations:
+    """The form of a scene that leaves mass out: quasi-static, or quasi-dynamic where waves damp."""
+    assemble = quasi_dynamic if scene.radiation_damping > 0.0 else quasi_static
+    return assemble(scene, clock=clock)
 
 
 def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
@@ -195,8 +238,8 @@ def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
         x, friction, _slope, growth = balance(spring, psi)
         return Point(x, growth, spring, friction, psi, psi - strength(friction)[2] + b * x)
 
-    without_mass = quasi_static(scene, clock=clock)
-    return Equations("slow_manifold", without_mass.unknowns, without_mass.scales, rate, point)
+    massless = quasi_static(scene, clock=clock)
+    return Equations("slow_manifold", massless.unknowns, massless.scales, rate, point)
 
 
 def inertial(scene: Scene) -> Equations:

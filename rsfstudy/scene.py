@@ -48,6 +48,10 @@ class Scene:
         Instantaneous displacement of the load point in D_c.
     inertia : bool
         Whether the slider has mass.
+    radiation_damping : float
+        eta V_*/sigma_*: stress that waves carry away at V_* (quasi-dynamic motion, instead of
+        mass). Zero leaves the effect out; T V_*/(2 pi D_c) times the stiffness is the impedance of
+        spring and mass.
     period : float
         Period of free oscillation T in s; with `reference_rate` it sets inertia and the instability
         norm.
@@ -73,6 +77,7 @@ class Scene:
     load_velocity_ratio: float | None = None
     displacement_step: float = 0.0
     inertia: bool = False
+    radiation_damping: float = 0.0
     period: float = 5.0
     reference_rate: float = 1.17e-8
     instability_norm: float = 5e-4
@@ -87,6 +92,7 @@ class Scene:
             self._set_number(name, positive=True)
         self._set_number("instability_norm", positive=True)
         self._set_number("displacement_step")
+        self._set_number("radiation_damping")
         if self.load_velocity_ratio is not None:
             self._set_number("load_velocity_ratio")
         self._check_effects()
@@ -142,6 +148,15 @@ class Scene:
             )
 
     def _check_meaning(self) -> None:
+        if self.radiation_damping < 0.0:
+            raise InvalidValue("radiation_damping", self.radiation_damping, "must be 0 or greater")
+        if self.radiation_damping > 0.0 and self.inertia:
+            raise InvalidValue(
+                "radiation_damping",
+                self.radiation_damping,
+                "stands in for mass, and this scene has mass",
+                remedy="Leave one of them out.",
+            )
         if self.b_over_a <= 1.0:
             raise InvalidValue(
                 "b_over_a",
@@ -213,6 +228,7 @@ class Scene:
             "inclined_driving": self.normal_stress == "variable",
             "linker_dieterich": bool(self.alpha),
             "inertia": self.inertia,
+            "radiation_damping": self.radiation_damping > 0.0,
         }
         return tuple(name for name, acts in present.items() if acts)
 

@@ -18,7 +18,7 @@ from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
-REGIMES = ("quasi_static", "slow_manifold", "inertial")
+REGIMES = ("quasi_static", "slow_manifold", "inertial", "quasi_dynamic")
 #: Points stored per integration step: enough for a smooth curve.
 _POINTS_PER_STEP = 4
 

@@ -67,6 +67,13 @@ _QUANTITIES = (
     Quantity(
         "displacement_step", r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
     ),
+    Quantity(
+        "radiation_damping",
+        r"$\eta V_*/\sigma_*$",
+        "1",
+        "stress that waves carry away at V_star",
+        "sigma_*",
+    ),
     Quantity("period", "$T$", "s", "period of free oscillation"),
     Quantity("reference_rate", "$V_*/D_c$", "s-1", "reference slip rate over slip distance"),
     Quantity("instability_norm", r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable"),
@@ -144,7 +151,12 @@ _QUANTITIES = (
         "1",
         "critical stiffness over that at V_star",
     ),
-    Quantity("rise_by_mass", "", "1", "fraction by which mass raises the critical stiffness"),
+    Quantity(
+        "rise_by_dynamics",
+        "",
+        "1",
+        "fraction by which mass raises, or radiation lowers, the critical stiffness",
+    ),
     Quantity(
         "stabilising_velocity",
         "$V_0/V_*$",

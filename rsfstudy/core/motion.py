@@ -15,8 +15,8 @@ from rsfstudy.equations import (
     Equations,
     Point,
     inertial,
-    quasi_static,
     slow_manifold,
+    without_mass,
 )
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
@@ -68,7 +68,7 @@ def motion(
         check_start(scene)
         start = (scene.spring_stress_step, 0.0)
     if not scene.inertia:
-        equations, state = quasi_static(scene, clock=clock), _start(*start, clock)
+        equations, state = without_mass(scene, clock=clock), _start(*start, clock)
         yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
         return
     slow, fast = slow_manifold(scene, clock=clock), inertial(scene)

@@ -52,6 +52,8 @@ class Cycle:
         Time from one maximum of spring stress to the next.
     highest, lowest, at_peak : float
         Deviation of spring stress at its maximum, its minimum, and at peak slip rate.
+    sliding : float
+        Deviation of frictional stress at peak slip rate.
     slowest, fastest : float
         Extremes of ln(V/V_*).
     landed, rested : Point
@@ -65,6 +67,7 @@ class Cycle:
     highest: float
     lowest: float
     at_peak: float
+    sliding: float
     slowest: float
     fastest: float
     landed: Point
@@ -176,8 +179,8 @@ class LimitCycle(Measure):
         values["healing_exponent"] = (
             healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan
         )
-        stress = scene.mu_star + cycle.at_peak
-        values["residual_friction"] = stress / (1.0 + scene.cot_phi * cycle.at_peak)
+        stress = scene.mu_star + cycle.sliding
+        values["residual_friction"] = stress / (1.0 + scene.cot_phi * cycle.sliding)
         values["drop_asymmetry"] = (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest)
         values["events_until_repeat"], values["work_per_cycle"] = float(count), float(work)
         orbit = along_path(list(_orbit(scene, cycle.end, accuracy, meter)), self.phases)
@@ -275,6 +278,7 @@ class _Watch:
             highest=turning.spring,
             lowest=self._arrested.spring,
             at_peak=self._fastest.spring,
+            sliding=self._fastest.friction,
             slowest=self._rested.log_rate,
             fastest=self._fastest.log_rate,
             landed=self._landed or self._rested,

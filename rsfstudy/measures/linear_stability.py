@@ -15,7 +15,15 @@ from scipy.optimize import brentq
 from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import Equations, inertial, quasi_static, slow_manifold, strength_of
+from rsfstudy.effects import radiation_damping
+from rsfstudy.equations import (
+    Equations,
+    inertial,
+    radiated,
+    slow_manifold,
+    strength_of,
+    without_mass,
+)
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
@@ -53,7 +61,7 @@ class LinearStability(Measure):
             "critical_stiffness_from_growth",
             "critical_stiffness_explicit",
             "relative_critical_stiffness",
-            "rise_by_mass",
+            "rise_by_dynamics",
             "steady_friction",
             "steady_normal_stress",
         )
@@ -83,6 +91,18 @@ class LinearStability(Measure):
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
         parameters = (load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0)
         massless, rise = steady_state.critical_stiffness(*parameters), 0.0
+        if scene.radiation_damping > 0.0:
+            damping = scene.radiation_damping * scene.load_velocity
+            damped = radiation_damping.critical_stiffness(
+                massless, damping, mu_ss, scene.alpha or 0.0, cot_phi
+            )
+            if damped <= 0.0:
+                return Outcome(
+                    Status.STABLE_AT_ANY_STIFFNESS,
+                    values,
+                    f"at eta V = {damping:.3g} sigma_* radiation damps every perturbation",
+                )
+            rise = damped / massless - 1.0
         if scene.inertia:
             norm = scene.load_velocity * scene.inertial_time
             rise = steady_state.rise_by_mass(massless, norm, mu_ss, sigma_ss, scene.a, cot_phi)
@@ -103,7 +123,7 @@ class LinearStability(Measure):
                 "critical_stiffness_explicit": steady_state.critical_stiffness_explicit(*parameters)
                 * (1.0 + rise),
                 "relative_critical_stiffness": closed / scene.critical_stiffness,
-                "rise_by_mass": rise,
+                "rise_by_dynamics": rise,
                 **values,
             },
         )
@@ -113,8 +133,9 @@ def _threshold(scene: Scene, near: float, meter: Meter) -> float:
     """Stiffness at which perturbations of steady sliding neither grow nor decay."""
     load = scene.log_load_rate
     mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
-    spring = steady_state.steady_shear_stress(mu_ss, scene.mu_star, scene.cot_phi)
-    psi = strength_of(scene)(spring)[0] - scene.a * load
+    friction = steady_state.steady_shear_stress(mu_ss, scene.mu_star, scene.cot_phi)
+    psi = strength_of(scene)(friction)[0] - scene.a * load
+    spring = friction + radiated(scene, load)
     with_mass = scene.inertia and scene.load_velocity * scene.inertial_time > _MASS_SHOWS
     around = near / scene.critical_stiffness
 
@@ -135,7 +156,7 @@ def growth(scene: Scene, spring: float, psi: float) -> float:
 
     Its determinant is positive for every stiffness, so the trace alone decides.
     """
-    assemble = slow_manifold if scene.inertia else quasi_static
+    assemble = slow_manifold if scene.inertia else without_mass
     jacobian = _jacobian(assemble(scene, clock=False), (spring, psi))
     return math.fsum(jacobian[i][i] for i in range(2))
 

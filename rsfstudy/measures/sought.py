@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import log_rate_at, strength_of
+from rsfstudy.equations import log_rate_at, radiated, strength_of
 from rsfstudy.measures.swing import swing
 from rsfstudy.measures.touching import displacement_on_path, rate_step_misfit
 from rsfstudy.scene import Scene
@@ -256,5 +256,5 @@ class DisplacementSteps(Steps):
         if strength(reach)[0] < norm:
             return reach / scene.stiffness
         self.jumps_to_norm = True
-        stress = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
-        return stress / scene.stiffness
+        friction = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
+        return (friction + radiated(scene, scene.log_norm_rate)) / scene.stiffness

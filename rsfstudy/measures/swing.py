@@ -10,7 +10,8 @@ from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.motion import check_start, motion
 from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.equations import quasi_static, strength_of
+from rsfstudy.effects import radiation_damping
+from rsfstudy.equations import radiated, strength_of, without_mass
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
@@ -90,7 +91,8 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
         return _held(scene, accuracy, meter)
     steady = _steady(scene)
     norm = scene.log_norm_rate
-    if scene.normal_stress == "constant" and abs(steady.margin) < accuracy.rtol:
+    damped = scene.radiation_damping > 0.0
+    if scene.normal_stress == "constant" and abs(steady.margin) < accuracy.rtol and not damped:
         top = _top_of_closed_orbit(scene, accuracy, meter)
         if not scene.inertia or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return Swing(top >= norm, top - norm)
@@ -128,7 +130,7 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     instead of around an orbit that may lead down to 1e-40 V_* and lose all digits on the way.
     """
     check_start(scene)
-    equations, start = quasi_static(scene, clock=False), (scene.spring_stress_step, 0.0)
+    equations, start = without_mass(scene, clock=False), (scene.spring_stress_step, 0.0)
     rising = equations.point(start, equations.rate(0.0, start)).growth > 0.0
     path = steps(equations, start, accuracy.solver, meter, backward=not rising)
     return _first_peak(path, scene.log_norm_rate)
@@ -222,13 +224,16 @@ def _steady(scene: Scene) -> _Steady:
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
     mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
-    spring = steady_state.steady_shear_stress(mu_ss, scene.mu_star, cot_phi)
+    friction = steady_state.steady_shear_stress(mu_ss, scene.mu_star, cot_phi)
     critical = steady_state.critical_stiffness(
         load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0
     )
+    critical = radiation_damping.critical_stiffness(
+        critical, scene.radiation_damping * math.exp(load), mu_ss, scene.alpha or 0.0, cot_phi
+    )
     return _Steady(
         load,
-        spring,
-        strength_of(scene)(spring)[0] - scene.a * load,
-        scene.stiffness / critical - 1.0,
+        friction + radiated(scene, load),
+        strength_of(scene)(friction)[0] - scene.a * load,
+        scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf,
     )

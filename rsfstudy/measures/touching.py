@@ -14,7 +14,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.equations import Point, log_rate_at, quasi_static, strength_of
+from rsfstudy.equations import Point, log_rate_at, radiated, strength_of, without_mass
 from rsfstudy.laws import evolution_of
 from rsfstudy.scene import Scene
 
@@ -34,8 +34,8 @@ def touching_point(scene: Scene) -> tuple[float, float] | None:
     a, b, x = scene.a, scene.b, scene.log_norm_rate
     pull = scene.stiffness * math.expm1(scene.log_load_rate - x)
 
-    def acceleration(spring: float) -> float:
-        value, slope, shift = strength(spring)
+    def acceleration(friction: float) -> float:
+        value, slope, shift = strength(friction)
         return slope * pull - evolution(x, value - shift - a * x, b)
 
     reach = 2.0 * b * abs(x) + scene.stiffness
@@ -44,8 +44,8 @@ def touching_point(scene: Scene) -> tuple[float, float] | None:
         lowest = max(lowest, -(1.0 - 1e-6) / scene.cot_phi)
     if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
         return None
-    spring = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
-    return spring, strength(spring)[0] - a * x
+    friction = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
+    return friction + radiated(scene, x), strength(friction)[0] - a * x
 
 
 def start_of_path(
@@ -82,7 +82,7 @@ def start_of_path(
         round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125)
     )  # work of an eighth-order method
     try:
-        backward = steps(quasi_static(scene, clock=False), start, tolerance, path, backward=True)
+        backward = steps(without_mass(scene, clock=False), start, tolerance, path, backward=True)
         for number, step in enumerate(backward):
             if number == 0 and step.after.log_rate > step.before.log_rate:
                 return None
@@ -94,7 +94,8 @@ def start_of_path(
     except Halt:
         return None
     finally:
-        meter.charge("quasi_static", path.spent)
+        for regime, spent in path.by_regime.items():
+            meter.charge(regime, spent)
     raise AssertionError("steps() never ends by itself")
 
 
@@ -112,7 +113,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
     """
     spring = scene.spring_stress_step
     begin = log_rate_at(scene, spring, 0.0)
-    rates = quasi_static(scene, clock=False)
+    rates = without_mass(scene, clock=False)
     growth = rates.point((spring, 0.0), rates.rate(0.0, (spring, 0.0))).growth
     if growth == 0.0:
         return None

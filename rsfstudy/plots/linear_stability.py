@@ -60,7 +60,7 @@ def draw_mass(dataset: xr.Dataset, axes: Axes) -> Axes:
         for mass, style in zip(dataset["mass"].values[1:], ("--", "-", ":"), strict=False):
             row = dataset.sel(mass=mass, phi=phi)
             first = number == 0
-            rise = row["rise_by_mass"].where(row["rise_by_mass"] > 0.0)
+            rise = row["rise_by_dynamics"].where(row["rise_by_dynamics"] > 0.0)
             axes.plot(rate, rise, style, color=f"C{number}", label=str(mass) if first else None)
             seen = row["critical_stiffness_from_growth"] / massless.sel(phi=phi) - 1.0
             axes.plot(rate, seen.where(seen > 1e-8), ".", color=f"C{number}", markersize=3)

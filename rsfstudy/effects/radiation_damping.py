@@ -1,0 +1,94 @@
+"""Radiation damping: waves carry stress away in proportion to slip rate (quasi-dynamic motion)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+_MOST_ITERATIONS = 60
+_SETTLED = 1e-15
+
+#: g -> (strength, d strength/dg, Psi - Theta)
+Strength = Callable[[float], tuple[float, float, float]]
+
+
+def radiated(log_rate: float, damping: float) -> float:
+    """Stress that waves carry away, over sigma_*: ``eta (V - V_*)``, so that it vanishes at V_*.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    damping : float
+        eta V_*/sigma_*; for an elastic half-space eta = G/(2 c_s).
+
+    References
+    ----------
+    Rice (1993), J. Geophys. Res. 98, 9885-9907.
+    """
+    return damping * math.expm1(log_rate)
+
+
+def balanced_rate(
+    spring: float, psi: float, strength: Strength, a: float, damping: float
+) -> tuple[float, float]:
+    """ln(V/V_*) at which friction and radiation together balance the spring, and the frictional
+    stress there.
+
+    Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
+    V and the right side grows, so there is one root; at constant normal stress their difference is
+    convex, and starting from an upper bound makes Newton's method monotone.
+
+    Parameters
+    ----------
+    spring : float
+        Deviation f of spring stress from tau_*, over sigma_*.
+    psi : float
+        State freed of normal stress.
+    strength : callable
+        ``g -> (strength, slope, shift)`` of the scene.
+    a : float
+        Direct effect parameter.
+    damping : float
+        eta V_*/sigma_*.
+    """
+    # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
+    x = (strength(spring + damping)[0] - psi) / a
+    if x > 0.0:
+        x = min(x, math.log(max(a * x / damping, 1.0)))
+    for _ in range(_MOST_ITERATIONS):
+        friction = spring - radiated(x, damping)
+        value, slope, _shift = strength(friction)
+        change = (value - psi - a * x) / (a + slope * damping * math.exp(x))
+        # a step far to the right would overflow; the root is never that far
+        x += min(change, 1.0)
+        if abs(change) <= _SETTLED * (1.0 + abs(x)):
+            break
+    return x, spring - radiated(x, damping)
+
+
+def critical_stiffness(
+    undamped: float,
+    load_damping: float,
+    mu_ss: float,
+    alpha: float,
+    cot_phi: float,
+) -> float:
+    """Critical stiffness with radiation damping, times D_c/sigma_*: ``K_cr - eta V D/E``.
+
+    D = 1 - mu_ss cot(phi) and E = D + alpha cot(phi).
+
+    Perturbations of steady sliding obey ``(a sigma + eta V E) p**2 + [E K + eta V D - (b-a) sigma]
+    p + D K = 0`` per time D_c/V. Zero or less means that sliding is stable at every stiffness.
+
+    Parameters
+    ----------
+    undamped : float
+        The same without damping.
+    load_damping : float
+        eta V/sigma_* at the load point velocity.
+    mu_ss, alpha, cot_phi : float
+        Steady-state friction; normal stress effect; cotangent of the driving angle.
+    """
+    steadiness = 1.0 - mu_ss * cot_phi
+    return undamped - load_damping * steadiness / (steadiness + alpha * cot_phi)

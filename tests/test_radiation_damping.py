@@ -1,0 +1,191 @@
+"""Radiation damping: its balance, its limits, its critical stiffness, and a second formulation."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import follow
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from rsfstudy import Scene, equations, steady_state
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.effects import radiation_damping
+from rsfstudy.equations import quasi_dynamic, strength_of
+from rsfstudy.errors import InvalidValue
+from rsfstudy.laws import evolution_of
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.status import Status
+
+#: Impedance of spring and mass of the paper's slider, K T V_*/(2 pi D_c).
+IMPEDANCE = Scene().stiffness * Scene().inertial_time
+
+
+@given(
+    spring=st.floats(-0.7, 1.0),
+    psi=st.floats(-1.0, 1.0),
+    log_damping=st.floats(-30.0, 2.0),
+    alpha=st.floats(0.0, 1.0),
+    constant=st.booleans(),
+)
+def test_friction_and_radiation_balance_the_spring(spring, psi, log_damping, alpha, constant):
+    scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
+    damping, strength = math.exp(log_damping), strength_of(scene)
+    x, friction = radiation_damping.balanced_rate(spring, psi, strength, scene.a, damping)
+    # rounding of the stresses, and of x times the slope of radiation in x
+    radiated = damping * math.expm1(x)
+    scale = 1.0 + abs(spring) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
+    assert spring - radiated == pytest.approx(friction, abs=1e-14 * scale)
+    assert strength(friction)[0] == pytest.approx(scene.a * x + psi, abs=1e-13 * scale)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("of", ["load_velocity_ratio", "displacement_step"])
+def test_at_zero_strength_it_is_the_effect_absent(law, of):
+    scene = Scene(law=law)
+    critical = CriticalStep(of=of)
+    absent, faint = (
+        critical(scene.with_(radiation_damping=damping), Accuracy()).values[critical.headline]
+        for damping in (0.0, 1e-17)
+    )
+    assert faint == pytest.approx(absent, rel=1e-8)
+
+
+@given(
+    log_damping=st.floats(-25.0, 0.0),
+    log_rate=st.floats(-3.0, 3.0),
+    phi=st.floats(50.0, 85.0),
+    alpha=st.floats(0.0, 1.0),
+    law=st.sampled_from(["slip", "slowness"]),
+)
+def test_critical_stiffness_is_the_threshold_of_growth(log_damping, log_rate, phi, alpha, law):
+    scene = Scene(
+        law=law,
+        load_velocity_ratio=math.exp(log_rate),
+        radiation_damping=math.exp(log_damping),
+        phi=phi,
+        alpha=alpha,
+    )
+    outcome = LinearStability()(scene, Accuracy())
+    if outcome.status is Status.OK:
+        found = outcome.values["critical_stiffness_from_growth"]
+        # the difference of two numbers of the size of the undamped one
+        undamped = steady_state.critical_stiffness(
+            log_rate, scene.mu_star, scene.a, scene.b, scene.cot_phi, alpha
+        )
+        assert found == pytest.approx(outcome.values["critical_stiffness"], abs=1e-6 * undamped)
+    else:
+        assert outcome.status is Status.STABLE_AT_ANY_STIFFNESS
+
+
+def test_critical_stiffness_at_the_reference_rate():
+    """K_cr = [(b - a) - eta D]/E, D = 1 - mu_* cot(phi), E = D + alpha cot(phi)."""
+    scene = Scene(radiation_damping=0.003)
+    steadiness = 1.0 - scene.mu_star * scene.cot_phi
+    expected = (scene.b - scene.a - 0.003 * steadiness) / (steadiness + scene.alpha * scene.cot_phi)
+    found = LinearStability()(scene, Accuracy()).values["critical_stiffness"]
+    assert found == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
+def test_a_second_formulation_in_time_agrees(law, effects):
+    """Through a rupture and its arrest: time as the clock, ln V as an unknown, Radau.
+
+    a dx + dPsi = strength'(g) dg with g = f - eta (V - 1), df = K (V_0 - V) dt.
+    """
+    scene = Scene(
+        law=law,
+        stiffness_ratio=0.8,
+        load_velocity_ratio=2.0,
+        radiation_damping=1e-4,
+        **effects,
+    )
+    strength, evolution = strength_of(scene), evolution_of(law)
+    damping = scene.radiation_damping
+
+    def rate(_time, y):
+        spring, x = y
+        v = math.exp(x)
+        value, slope, shift = strength(spring - damping * (v - 1.0))
+        loading = scene.stiffness * (scene.load_velocity - v)
+        weakening = v * evolution(x, value - scene.a * x - shift, scene.b)
+        return [loading, (slope * loading - weakening) / (scene.a + slope * damping * v)]
+
+    highest = []
+
+    def until(step):
+        highest.append(step)
+        return step.before.growth > 0.0 >= step.after.growth
+
+    follow(scene, 1e-9, until)
+    peak = highest[-1].point_at(highest[-1].locate(lambda point: point.growth))
+
+    def turning(_time, y):
+        return rate(_time, y)[1]
+
+    turning.direction, turning.terminal = -1, True
+    found = solve_ivp(
+        rate, (0.0, 1e3), (0.0, 0.0), "Radau", rtol=1e-10, atol=1e-12, events=turning
+    ).y_events[0]
+    spring, x = found[0]
+    assert peak.log_rate == pytest.approx(x, abs=1e-7)
+    assert peak.spring == pytest.approx(spring, abs=1e-8)
+
+
+def test_growth_is_the_derivative_of_the_slip_rate():
+    system = quasi_dynamic(Scene(radiation_damping=0.01, load_velocity_ratio=2.0), clock=False)
+    state = np.array([0.03, -0.01])
+    rates = np.array(system.rate(0.0, state))
+    ahead, behind = (system.point(state + h * rates, rates) for h in (1e-6, -1e-6))
+    growth = (ahead.log_rate - behind.log_rate) / 2e-6
+    assert system.point(state, rates).growth == pytest.approx(growth, rel=1e-7)
+
+
+def test_stronger_damping_makes_slower_ruptures():
+    rates = []
+    for damping in (0.1 * IMPEDANCE, IMPEDANCE, 10.0 * IMPEDANCE):
+        scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, radiation_damping=damping)
+        outcome = LimitCycle(phases=2)(scene, Accuracy(1e-5))
+        assert outcome.status is Status.OK
+        rates.append(outcome.values["max_log10_slip_rate"])
+    assert (np.diff(rates) < -0.5).all()
+
+
+def test_damped_cycles_do_not_overshoot():
+    """With mass the drop in deceleration is nearly that in acceleration (slip law); with damping
+    there is hardly any.
+    """
+    fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "normal_stress": "constant"}
+    cycles = [
+        LimitCycle(phases=2)(Scene(**fields, **effect), Accuracy()).values["static_stress_drop"]
+        for effect in ({"inertia": True}, {"radiation_damping": IMPEDANCE})
+    ]
+    assert 0.4 < cycles[1] / cycles[0] < 0.65
+
+
+def test_unknowns_and_absence(monkeypatch):
+    """Two unknowns; a scene without it never calls it."""
+    assert quasi_dynamic(Scene(radiation_damping=0.1), clock=False).unknowns == ("spring", "psi")
+
+    def forbidden(*_arguments):
+        raise AssertionError("called")
+
+    monkeypatch.setattr(equations.radiation_damping, "balanced_rate", forbidden)
+    follow(Scene(load_velocity_ratio=1.2), 1e-5, lambda step: step.end > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"radiation_damping": -1.0}, "must be 0 or greater"),
+        ({"radiation_damping": 0.1, "inertia": True}, "stands in for mass"),
+        ({"radiation_damping": math.nan}, "must be finite"),
+    ],
+)
+def test_wrong_scenes_are_refused(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**fields)
