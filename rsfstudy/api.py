@@ -36,7 +36,7 @@ def studies() -> dict[str, Study]:
 
 
 def run(
-    study: str | Study,
+    study: str | Path | Study,
     *,
     workers: int = 2,
     client: Any = None,
@@ -51,8 +51,8 @@ def run(
 
     Parameters
     ----------
-    study : str or Study
-        A named study, or one of your own.
+    study : str, Path or Study
+        A named study, the path of a file that declares one, or a study of your own.
     workers : int
         Worker processes of a Dask cluster made for this run; 0 computes in this process.
     client : distributed.Client, optional
@@ -83,7 +83,7 @@ def run(
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
-    declared = catalogue.load(study) if isinstance(study, str) else study
+    declared = study if isinstance(study, Study) else catalogue.load(str(study))
     if rtol is not None:
         declared = replace(declared, accuracy=replace(declared.accuracy, rtol=rtol))
     if overrides:
@@ -139,6 +139,8 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
         If there is no such file, or it was not written by rsfstudy.
     """
     path = Path(name)
+    if path.suffix == ".py":
+        name = catalogue.load(str(path)).name
     return store.read(path if path.suffix == ".nc" else Path(output) / f"{name}.nc")
 
 

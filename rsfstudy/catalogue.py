@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure
 from rsfstudy.study import Study
 
 #: Where the files of `studies/` are installed.
@@ -51,22 +52,29 @@ def _run(path: Path) -> ModuleType:
     """
     if not path.is_file():
         raise InvalidValue("study", str(path), "is no file")
+    path = path.resolve()
     spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
+    sys.path.insert(0, str(path.parent))  # a file may have helpers beside it
     try:
         spec.loader.exec_module(module)
     except InvalidValue as error:
         raise error.at(f"{path}{_line(error, path)}") from error
     except SyntaxError as error:
-        raise InvalidValue("study", str(path), f"line {error.lineno}: {error.msg}") from error
+        place = f"{error.filename or path}, line {error.lineno}"
+        raise InvalidValue("study", str(path), f"{place}: {error.msg}") from error
     except (Exception, SystemExit) as error:
         rule = f"raises {type(error).__name__}{_line(error, path)}: {error}"
         raise InvalidValue("study", str(path), rule) from error
     finally:
-        del sys.modules[spec.name]
+        sys.modules.pop(spec.name, None)
+        sys.path.remove(str(path.parent))
+    for found in vars(module).values():
+        if isinstance(found, type) and found.__module__ == spec.name and issubclass(found, Measure):
+            found.source = path.read_text()
     return module
 
 
@@ -84,4 +92,7 @@ def _declared_in(module: ModuleType, name: str) -> Study:
     study = getattr(module, "study", None)
     if not isinstance(study, Study):
         raise InvalidValue("study", name, "declares no study", remedy="Write study = Study(...).")
+    if study.name in names():
+        rule = f"calls its study {study.name!r}, the name of a named study: their files would mix"
+        raise InvalidValue("study", name, rule, remedy="Give it a name of its own.")
     return study

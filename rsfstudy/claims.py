@@ -113,15 +113,16 @@ def verdicts(
 ) -> pd.DataFrame:
     """A table of claims, one row each.
 
-    Claims hold for a study as declared: where a fixed value of the scene was changed (`overrides`
-    that are no dimension or coordinate along one), they are not applicable.
+    Claims hold for a study as declared. Where a fixed value of the scene was changed (`overrides`
+    that are no dimension or coordinate along one), they are not applicable; nor are claims on what
+    was reduced along an axis that was changed.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [name for name in overrides if name not in along]
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)
-        if moved_base:
+        if moved_base or not _keeps(dataset, claim.variable, overrides):
             verdict = NOT_APPLICABLE
         rows.append(
             {
@@ -142,13 +143,26 @@ def verdicts(
     return pd.DataFrame(rows)
 
 
+def _keeps(dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]) -> bool:
+    """Whether a variable still has every dimension that was changed."""
+    changed = {str(d) for n in overrides if n in dataset.coords for d in dataset[n].dims}
+    return variable not in dataset or changed <= set(dataset[variable].dims)
+
+
 def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float:
     """The one number at these coordinate values; KeyError where there is no such place."""
     values = dataset[variable]
     for name, wanted in where.items():
         coordinate = dataset[name]
+        text = coordinate.dtype.kind in "OUST"
+        if text != isinstance(wanted, str):
+            raise KeyError(name)
+        if coordinate.ndim == 0:
+            if coordinate.item() != wanted:
+                raise KeyError(name)
+            continue
         (dimension,) = coordinate.dims
-        if isinstance(wanted, str):
+        if text:
             matches = np.flatnonzero(coordinate.values == wanted)
         else:
             matches = np.flatnonzero(np.isclose(coordinate.values, wanted, rtol=1e-9, atol=0.0))

@@ -39,7 +39,7 @@ FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_for_b_over_a_of_e": ClosedForm(
         "V_0/V_* = exp(k/k_cr) a/(b-a)",
         ("b_over_a", "stiffness_ratio"),
-        lambda b_over_a, ratio: math.exp(ratio) / (b_over_a - 1.0),
+        lambda b_over_a, ratio: math.exp(min(ratio, 700.0)) / (b_over_a - 1.0),
         "Gu et al. (1984), slip law, constant normal stress, b/a = e; exact at k = k_cr only",
     ),
     "displacement_step": ClosedForm(

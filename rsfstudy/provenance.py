@@ -5,6 +5,7 @@ command.
 from __future__ import annotations
 
 import hashlib
+import inspect
 import platform
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from rsfstudy.measures import Measure
 from rsfstudy.study import Study
 
 _PACKAGE = Path(__file__).parent
@@ -45,12 +47,25 @@ def fingerprint(study: Study) -> dict[str, Any]:
     return {
         "study": f"{study.name} version {study.version}",
         "measure": study.measure.describe(),
+        "own_code": _own_code(type(study.measure)),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
+        "methods": list(study.accuracy.methods),
         "physics": physics_digest(),
         "numpy": version("numpy"),
         "scipy": version("scipy"),
     }
+
+
+def _own_code(measure: type[Measure]) -> str:
+    """Digest of the source of a measure that is not part of the package."""
+    if measure.__module__.startswith(f"{_PACKAGE.name}."):
+        return "none"
+    try:
+        source = measure.source or inspect.getsource(measure)
+    except (OSError, TypeError):
+        return "unknown"
+    return hashlib.sha256(source.encode()).hexdigest()[:16]
 
 
 def provenance(command: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pathlib import Path
 import xarray as xr
 
 from rsfstudy import provenance, store
-from rsfstudy.errors import RunError
+from rsfstudy.errors import InvalidValue, RsfStudyError, RunError
 from rsfstudy.journal import Finished, Journal, cell_key
 from rsfstudy.lattice import assemble
 from rsfstudy.reduce import reduced
@@ -89,6 +89,7 @@ def run(
         When interrupted; what is finished is kept in ``NAME.partial.nc`` and in the journal.
     """
     plan = Plan(study, list(study.scenes()))
+    _rehearse(plan)
     with contextlib.ExitStack() as stack:
         journal = None
         if output is not None:
@@ -135,6 +136,19 @@ def _batch_size(cells: int, typical_work: int, workers: int) -> int:
 def _dataset(plan: Plan, command: str) -> xr.Dataset:
     dataset = assemble(plan.study, plan.scenes, plan.outcomes(), provenance.provenance(command))
     return reduced(dataset, tuple(plan.study.reductions))
+
+
+def _rehearse(plan: Plan) -> None:
+    """Apply the reductions to the lattice as it is before anything is computed."""
+    lattice = assemble(plan.study, plan.scenes, {}, provenance.provenance("rehearsal"))
+    for reduction in plan.study.reductions:
+        try:
+            lattice = reduced(lattice, (reduction,))
+        except RsfStudyError:
+            raise
+        except Exception as error:
+            rule = f"does not fit this lattice: {type(error).__name__}: {error}"
+            raise InvalidValue("reduction", reduction.name, rule) from error
 
 
 def _interrupted(plan: Plan, output: Path | None, command: str, error: BaseException) -> RunError:

@@ -28,6 +28,7 @@ class Status(IntEnum):
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
     UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
+    NO_STEP = 13, "the scene has no step to respond to"
     STABLE_AT_ANY_STIFFNESS = 12, "radiation damps every perturbation however soft the spring"
 
     # failures, from here on

@@ -204,7 +204,10 @@ _QUANTITIES = (
         "second over first peak of ln V above the load point velocity: 1 where oscillations repeat",
     ),
     Quantity(
-        "peak_lowering", "", "1", "what mass takes off the decimal logarithm of the peak slip rate"
+        "peak_lowering",
+        "",
+        "1",
+        "decimal logarithm of the peak slip rate with mass, less that without",
     ),
     Quantity(
         "paths_parting",

@@ -12,7 +12,7 @@ RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
 
 
 def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str) -> Claim:
-    """C11: quasi-static slip stays bounded, each peak lower than the one before."""
+    """C11: quasi-static slip stays bounded, its second peak lower than its first."""
     return Claim(
         id="C11",
         statement=f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: decays",
@@ -60,8 +60,7 @@ study = Study(
         "without mass too; at constant normal stress and k = k_cr oscillations repeat for "
         "ever. Bounded is not slow: after large steps mass limits the slip rate, and the motion "
         "with mass leaves the quasi-static one. At variable normal stress and k = k_cr the two "
-        "join again after the rupture; on stiffer springs, and at constant normal stress, an "
-        "offset of stress remains."
+        "join again after the largest steps; elsewhere an offset of stress remains."
     ),
     base=Scene(law="slowness", b_over_a=2.0, alpha=0.56),
     axes=[

@@ -44,7 +44,7 @@ study = Study(
         "instability norm. For the slip law and a load point held it is D_c a/(b-a) at every "
         "stiffness, at constant normal stress and in the limit of a large norm; variable normal "
         "stress moves it little. A load point that moves on lowers it, the more the softer the "
-        "spring. The slowness law takes two to eight times the displacement; where a spring is "
+        "spring. The slowness law takes 1.7 to 8 times the displacement; where a spring is "
         "stiff, only one that takes the slip rate to the norm by itself."
     ),
     base=Scene(),
@@ -73,7 +73,7 @@ study = Study(
         near(
             CONSTANT,
             2.0,
-            0.03,
+            2e-3,
             "an infinite norm is approached more slowly when stiff",
         ),
         near(WEAK, 1.0, 0.03, CLOSE),

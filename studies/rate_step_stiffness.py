@@ -23,7 +23,7 @@ def slowness(stiffness_ratio: float, published: float, tolerance: float, digits:
         where={"law": "slowness", "case": STRONG, "stiffness_ratio": stiffness_ratio},
         published=published,
         tolerance=tolerance,
-        reason=f"printed to {digits}",
+        reason=f"printed to {digits}; our norm is inferred from it, see instability_norm",
     )
 
 
@@ -87,10 +87,11 @@ study = Study(
             source=f"{PAPER}, section 3.1, Fig. 6",
             variable="lowering",
             where={"law": "slip", "case": WEAK, "stiffness_ratio": 1.0},
-            relation="below",
-            published=0.06,
-            tolerance=0.0,
-            reason="half of the difference at alpha = 0.56",
+            published=0.0,
+            tolerance=0.02,
+            reason="'very close'; about the width of the symbols of the figure",
+            expected="differs",
+            because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
         ),
         eq_11(1.0, 1.0, 1e-4, "exact; the finite norm lowers it by less than 1e-4"),
         eq_11(1.1, 0.99, 0.006, UNDERESTIMATED),

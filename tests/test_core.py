@@ -145,7 +145,7 @@ def test_error_of_the_slow_manifold_goes_with_the_fourth_power_of_the_norm():
     )
     exact, _drop, number = REFERENCES["slip"]
     errors = {
-        norm: abs(cycle(scene, 1e-9, number, Switched(1e-9, 10**7, norm))[0] / exact - 1.0)
+        norm: abs(cycle(scene, 1e-9, number, Switched(1e-9, 10**7, norm=norm))[0] / exact - 1.0)
         for norm in (0.02, 0.04)
     }
     for norm, error in errors.items():

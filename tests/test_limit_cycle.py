@@ -166,3 +166,18 @@ def test_stiffer_cycles_are_smaller():
     ]
     assert drops == sorted(drops, reverse=True)
     assert math.isfinite(drops[0])
+
+
+@pytest.mark.parametrize(
+    ("law", "load", "drop"), [("slip", 120.0, 0.0560), ("slowness", 110.0, 0.1107)]
+)
+def test_cycles_near_their_onset_are_waited_for(law, load, drop):
+    """phi = 50, 0.8 k_cr: stick-slip ends at 139.5 V_*; before that, cycles shrink slowly to a
+    limit.
+    """
+    scene = Scene(law=law, phi=50.0, stiffness_ratio=0.8, load_velocity_ratio=load, inertia=True)
+    outcome = LimitCycle(phases=2)(scene, Accuracy(1e-6))
+    assert outcome.status is Status.OK
+    assert outcome.values["static_stress_drop"] == pytest.approx(drop, abs=1e-4)
+    beyond = LimitCycle(phases=2)(scene.with_(load_velocity_ratio=145.0), Accuracy(1e-6))
+    assert beyond.status is Status.NO_LIMIT_CYCLE

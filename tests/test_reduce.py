@@ -341,3 +341,38 @@ def test_where_paths_part_and_merge():
     assert float(apart.paths_offset) == pytest.approx(0.1, abs=1e-2)
     same = loops(0.0).isel(inertia=[0, 0]).assign_coords(inertia=[0, 1])
     assert np.isnan(reduced(same, (parting,)).paths_parting)
+
+
+def test_one_answer_is_no_spread():
+    values = np.array([[np.nan, 2.0, np.nan, np.nan, np.nan], X])
+    spread = Spread(name="spread", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    result = reduced(lattice(values), (spread,))
+    assert np.isnan(result.spread[0])
+    assert result.spread_points.values.tolist() == [1, 5]
+
+
+def test_reductions_of_reductions_keep_to_their_dimensions():
+    dataset = lattice([X, 3.0 * X]).expand_dims(law=["slip", "slowness"]).copy()
+    slope = ProportionalFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    spread = Difference(name="apart", of="slope", along="case", reference="reference")
+    result = reduced(dataset.assign_coords(number=("law", [1.0, 2.0])), (slope, spread))
+    assert result.apart.dims == ("law", "case")
+    again = reduced(result, (Spread(name="s", of="slope", on="number"),))
+    assert again.s.dims == ("case",)
+
+
+def test_claims_on_what_was_reduced_along_a_changed_axis_do_not_apply():
+    dataset = reduced(lattice(1.0 + X), (FIT,))
+    claim = Claim(
+        id="C",
+        statement="",
+        source="",
+        variable="zeta",
+        where={},
+        published=1.0,
+        tolerance=0.1,
+        reason="",
+    )
+    (as_declared,) = verdicts(dataset, [claim], {}).verdict
+    (changed,) = verdicts(dataset, [claim], {"b_over_a": [2.0]}).verdict
+    assert (as_declared, changed) == ("reproduced", "not applicable")

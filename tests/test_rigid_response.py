@@ -89,7 +89,7 @@ def test_variable_normal_stress_separates_large_down_steps_of_the_slowness_law()
 
 
 def test_steps_without_a_response_are_named():
-    assert RigidResponse()(Scene(), Accuracy()).status is Status.NO_STEADY_STATE
+    assert RigidResponse()(Scene(), Accuracy()).status is Status.NO_STEP
     beyond = Scene(load_velocity_ratio=1e-35)
     assert RigidResponse()(beyond, Accuracy()).status is Status.NO_STEADY_STATE
     assert friction_after_step(Scene(), 0.0) == pytest.approx(0.0, abs=1e-15)
@@ -99,3 +99,16 @@ def test_steps_without_a_response_are_named():
 def test_responses_need_slip_and_points(fields):
     with pytest.raises(InvalidValue, match="must be at least"):
         RigidResponse(**fields)
+
+
+def test_numbers_do_not_depend_on_the_points_that_are_kept():
+    few, many = (
+        RigidResponse(points=points)(Scene(load_velocity_ratio=10.0), Accuracy()).values
+        for points in (2, 201)
+    )
+    assert few["stress_left_at_unit_slip"] == many["stress_left_at_unit_slip"]
+
+
+@pytest.mark.parametrize("rate", [1e-16, 1e-8, 1e8])
+def test_the_closed_form_keeps_its_digits(rate):
+    assert response(rate, law="slowness", **CONSTANT)["closed_form_misfit"] < 1e-8

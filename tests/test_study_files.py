@@ -7,7 +7,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import catalogue
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import DataError, InvalidValue
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -94,3 +94,33 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InvalidValue, match="is no file"):
         catalogue.load(str(tmp_path / "nothing.py"))
+
+
+def test_a_measure_that_was_edited_does_not_reuse_its_old_cells(tmp_path):
+    run = {"output": tmp_path, "progress": False, "workers": 0}
+    rsfstudy.run(written(tmp_path, OWN_MEASURE), **run)
+    edited = OWN_MEASURE.replace('"stiffness": scene.stiffness', '"stiffness": 2 * scene.stiffness')
+    with pytest.raises(DataError, match="own_code"):
+        rsfstudy.run(written(tmp_path, edited), **run)
+    dataset = rsfstudy.run(written(tmp_path, edited), fresh=True, **run)
+    assert float(dataset.stiffness[0]) == 2.0 * rsfstudy.Scene(phi=55).stiffness
+
+
+def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):
+    (tmp_path / "my_angles.py").write_text("angles = [55, 65]")
+    helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")
+    assert catalogue.load(written(tmp_path, helped)).size == 2
+    taken = DECLARATION.replace('"mine"', '"stress_drop"')
+    with pytest.raises(InvalidValue, match="the name of a named study"):
+        catalogue.load(written(tmp_path, taken))
+
+
+def test_a_reduction_that_does_not_fit_is_told_before_anything_is_computed(tmp_path):
+    unfit = DECLARATION.replace(
+        "measure=",
+        'reductions=[LinearFit(name="s", of="critical_displacement", on="log_load")], measure=',
+    )
+    unfit = "from rsfstudy.reduce import LinearFit\n" + unfit
+    with pytest.raises(InvalidValue, match="must be a coordinate along one dimension"):
+        rsfstudy.run(written(tmp_path, unfit), output=tmp_path, progress=False)
+    assert not list(tmp_path.glob("*.sqlite"))

@@ -43,3 +43,7 @@ def test_an_answer_the_tolerance_decides_says_so():
 def test_a_norm_below_the_loading_is_no_question():
     outcome = Triggered()(Scene(load_velocity_ratio=1e5, instability_norm=5e-4), Accuracy())
     assert outcome.status is Status.NORM_BELOW_LOADING_RATE
+
+
+def test_no_step_triggers_nothing():
+    assert answer(load_velocity_ratio=1.0) == (0.0, 0.0)

@@ -23,6 +23,8 @@ class Accuracy:
         steps).
     budget : int
         Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
+    methods : tuple of (str, str)
+        Regimes and the SciPy integrators that serve them, where not the default one.
 
     Raises
     ------
@@ -32,6 +34,7 @@ class Accuracy:
 
     rtol: float = DEFAULT_RTOL
     budget: int = DEFAULT_BUDGET
+    methods: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         if not TIGHTEST_RTOL <= self.rtol <= LOOSEST_RTOL:

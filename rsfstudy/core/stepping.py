@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.integrate import DOP853
+from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
 from rsfstudy.equations import Equations, Point
 from rsfstudy.status import Status
 
 Vector = np.ndarray
+
+#: SciPy's integrators, by name.
+METHODS: Mapping[str, type[OdeSolver]] = {
+    method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
+}
+DEFAULT_METHOD = "DOP853"
 
 #: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
 _LONGEST_STEP = 1e9
@@ -29,21 +35,36 @@ class Halt(Exception):
 
 @dataclass
 class Meter:
-    """Counts the right-hand sides of one measurement, by regime, and ends it when its budget is
+    """What one measurement spends, by regime, with which integrators; ends it when its budget is
     spent.
+
+    Attributes
+    ----------
+    budget : int
+        Right-hand sides it may evaluate.
+    methods : mapping of str to str
+        Name of the SciPy integrator of a regime; `DEFAULT_METHOD` where none is named.
+    by_regime : dict
+        Right-hand sides evaluated so far.
+    spent, steps, jacobians : int
+        Right-hand sides in all (those of numerical Jacobians too), steps, and Jacobians.
     """
 
     budget: int
+    methods: Mapping[str, str] = field(default_factory=dict)
     by_regime: dict[str, int] = field(default_factory=dict)
+    spent: int = 0
+    steps: int = 0
+    jacobians: int = 0
 
-    @property
-    def spent(self) -> int:
-        """Right-hand sides evaluated so far."""
-        return sum(self.by_regime.values())
+    def method_of(self, regime: str) -> type[OdeSolver]:
+        """The integrator of a regime."""
+        return METHODS[self.methods.get(regime, DEFAULT_METHOD)]
 
     def charge(self, regime: str, evaluations: int) -> None:
         """Add evaluations; raises `Halt` once more than the budget is spent."""
         self.by_regime[regime] = self.by_regime.get(regime, 0) + evaluations
+        self.spent += evaluations
         if self.spent > self.budget:
             raise Halt(
                 Status.WORK_BUDGET_SPENT,
@@ -137,11 +158,14 @@ def steps(
     """
     regime = equations.regime
 
+    method = meter.method_of(regime)
+
     def rate(clock: float, unknowns: Vector) -> list[float]:
+        meter.charge(regime, 1)
         return equations.rate(clock, unknowns.tolist())
 
-    def started(unknowns: Vector) -> DOP853:
-        return DOP853(
+    def started(unknowns: Vector) -> OdeSolver:
+        return method(
             rate,
             0.0,
             unknowns,
@@ -151,26 +175,27 @@ def steps(
             max_step=_LONGEST_STEP,
         )
 
-    solver, counted = started(np.asarray(state, dtype=float)), 0
-    before = equations.point(solver.y.tolist(), solver.f.tolist())
+    solver, jacobians = started(np.asarray(state, dtype=float)), 0
+    before = equations.point(solver.y.tolist(), _rates(solver, rate))
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
         # checked
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             failure = solver.step()
-        meter.charge(regime, solver.nfev - counted)
-        counted = solver.nfev
+        meter.steps += 1
+        meter.jacobians += solver.njev - jacobians
+        jacobians = solver.njev
         if solver.status == "failed":
-            if solver.t == 0.0:
+            if solver.t == 0.0 or regime == "rigid":  # whose clock is slip
                 raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
-            solver, counted = started(solver.y), 0
+            solver, jacobians = started(solver.y), 0
             continue
         unknowns = solver.y.tolist()
         if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
             raise Halt(
                 Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}"
             )
-        after = equations.point(unknowns, solver.f.tolist())
+        after = equations.point(unknowns, _rates(solver, rate))
         yield Step(
             equations,
             float(solver.t_old),
@@ -178,14 +203,19 @@ def steps(
             before,
             after,
             solver.y,
-            _dense(solver, meter, regime),
+            _dense(solver),
             meter,
         )
-        counted = solver.nfev
         before = after
 
 
-def _dense(solver: DOP853, meter: Meter, regime: str) -> Callable[[], Callable[[float], Vector]]:
+def _rates(solver: OdeSolver, rate: Callable[[float, Vector], list[float]]) -> list[float]:
+    """Rates of the unknowns where the solver stands; most have just computed them."""
+    known = getattr(solver, "f", None)
+    return rate(solver.t, solver.y) if known is None else known.tolist()
+
+
+def _dense(solver: OdeSolver) -> Callable[[], Callable[[float], Vector]]:
     """The step's interpolant, built once and only if asked for; it must be asked for before the
     next step.
     """
@@ -193,9 +223,7 @@ def _dense(solver: DOP853, meter: Meter, regime: str) -> Callable[[], Callable[[
 
     def interpolant() -> Callable[[float], Vector]:
         if not built:
-            already = solver.nfev
             built.append(solver.dense_output())
-            meter.charge(regime, solver.nfev - already)
         return built[0]
 
     return interpolant

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-_MOST_ITERATIONS = 60
+_MOST_ITERATIONS = 200
 _SETTLED = 1e-15
 
 #: g -> (strength, d strength/dg, Psi - Theta)
@@ -36,8 +36,8 @@ def balanced_rate(
     stress there.
 
     Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
-    V and the right side grows, so there is one root; at constant normal stress their difference is
-    convex, and starting from an upper bound makes Newton's method monotone.
+    V and the right side grows, so there is one root, which bisection keeps in its bracket where
+    Newton's steps would leave it.
 
     Parameters
     ----------
@@ -53,17 +53,18 @@ def balanced_rate(
         eta V_*/sigma_*.
     """
     # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
-    x = (strength(spring + damping)[0] - psi) / a
-    if x > 0.0:
-        x = min(x, math.log(max(a * x / damping, 1.0)))
+    low, high = -math.inf, (strength(spring + damping)[0] - psi) / a
+    # a good guess where radiation takes most of the stress
+    x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
     for _ in range(_MOST_ITERATIONS):
         friction = spring - radiated(x, damping)
         value, slope, _shift = strength(friction)
-        change = (value - psi - a * x) / (a + slope * damping * math.exp(x))
-        # a step far to the right would overflow; the root is never that far
-        x += min(change, 1.0)
+        missing = value - psi - a * x
+        low, high = (x, high) if missing > 0.0 else (low, x)
+        change = missing / (a + slope * damping * math.exp(x))
         if abs(change) <= _SETTLED * (1.0 + abs(x)):
             break
+        x = x + change if low < x + change <= high else 0.5 * (max(low, high - 1e3) + high)
     return x, spring - radiated(x, damping)
 
 

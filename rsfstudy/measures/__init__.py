@@ -48,6 +48,8 @@ class Measure:
 
     #: File and registry name.
     name: ClassVar[str]
+    #: Source of a measure of the user's own, where it cannot be looked up.
+    source: ClassVar[str] = ""
 
     @property
     def headline(self) -> str:
@@ -82,7 +84,7 @@ class Measure:
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""
-        meter = Meter(accuracy.budget)
+        meter = Meter(accuracy.budget, dict(accuracy.methods))
         try:
             found = self.find(scene, accuracy, meter)
         except Halt as halt:

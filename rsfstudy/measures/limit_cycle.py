@@ -22,14 +22,15 @@ from rsfstudy.core.timeline import OBSERVED, along_path, elapsed, sampled, timed
 from rsfstudy.equations import Point
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.swing import settles
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
 LN10 = math.log(10.0)
 
-#: Swings of ln V below this are steady sliding, and events that shrink this often are on their way
-#: to it.
-_STEADY, _SHRINKING = 1e-3, 60
+#: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
+#: it.
+_STEADY, _SHRINKING = 1e-3, 30
 #: Displacement in D_c that sets off a motion where the scene has no step.
 _NUDGE = 0.1
 
@@ -101,7 +102,7 @@ class LimitCycle(Measure):
     """
 
     phases: int = 400
-    events: int = 100
+    events: int = 300
     name: ClassVar[str] = "limit_cycle"
 
     def __post_init__(self) -> None:
@@ -191,7 +192,7 @@ def _still_to_come(change: np.ndarray, before: np.ndarray | None) -> np.ndarray:
     """How far the numbers may still be from those of the limit, from their last two changes."""
     if before is None:
         return change
-    contraction = min(float(change.max()) / max(float(before.max()), 1e-300), 0.95)
+    contraction = min(float(change.max()) / max(float(before.max()), 1e-300), 0.999)
     return change * max(contraction / (1.0 - contraction), 0.1)
 
 
@@ -209,14 +210,26 @@ def cycles(
         cycle = watch.see(step, now)
         if cycle is not None:
             swings.append(cycle.fastest - cycle.slowest)
-            shrinking = len(swings) > _SHRINKING and (np.diff(swings[-_SHRINKING:]) < 0.0).all()
-            if swings[-1] < _STEADY or (shrinking and swings[-1] < 0.5 * swings[0]):
+            if swings[-1] < _STEADY or (settles(scene) and _dies_down(swings)):
                 yield None
                 return
             yield cycle
         elif watch.at_rest(step):
             yield None
             return
+
+
+def _dies_down(swings: list[float]) -> bool:
+    """Whether swings that shrink, time after time, are headed for nothing rather than for a cycle.
+
+    Geometrically extrapolated from the last three; near the onset of stick-slip cycles shrink
+    slowly to a finite limit.
+    """
+    if len(swings) <= _SHRINKING or not (np.diff(swings[-_SHRINKING:]) < 0.0).all():
+        return False
+    before, now = swings[-3] - swings[-2], swings[-2] - swings[-1]
+    still_to_come = now * now / (before - now) if before > now else math.inf
+    return swings[-1] - still_to_come < 0.1 * swings[-1]
 
 
 class _Watch:

@@ -78,14 +78,14 @@ class RigidResponse(Measure):
         log_rate = scene.log_load_rate
         lowest = steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, scene.cot_phi)
         if log_rate == 0.0:
-            return Outcome(Status.NO_STEADY_STATE, message="V = V_* is no step")
+            return Outcome(Status.NO_STEP, message="V = V_* is no step")
         if log_rate <= lowest:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
         start = friction_after_step(scene, log_rate)
         steady = _steady_stress(scene, log_rate)
         level = steady + (start - steady) / math.e
-        distance, rows = self._follow(scene, start, level, accuracy.solver, meter)
-        loose, _rows = self._follow(scene, start, level, 10.0 * accuracy.solver, meter)
+        distance, left, rows = self._follow(scene, start, level, accuracy.solver, meter)
+        loose, _left, _rows = self._follow(scene, start, level, 10.0 * accuracy.solver, meter)
         slip = self.inner_coordinates["slip"]
         exponential = steady + (start - steady) * np.exp(-slip)
         departs = (rows[:, 0] - exponential) / (start - steady)
@@ -97,7 +97,7 @@ class RigidResponse(Measure):
                 "direct_stress_change": start,
                 **_asymmetry(scene, log_rate),
                 "steady_stress_change": steady,
-                "stress_left_at_unit_slip": float(np.interp(1.0, slip, rows[:, 0])) - steady,
+                "stress_left_at_unit_slip": left - steady,
                 "closed_form_misfit": _closed_form_misfit(scene, slip, rows[:, 0]),
                 "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
@@ -108,21 +108,25 @@ class RigidResponse(Measure):
 
     def _follow(
         self, scene: Scene, start: float, level: float, tolerance: float, meter: Meter
-    ) -> tuple[float, np.ndarray]:
-        """Slip at which stress passes the level, and (stress, state) at the points."""
+    ) -> tuple[float, float, np.ndarray]:
+        """Slip at which stress passes the level, stress after D_c, and (stress, state) at the
+        points.
+        """
         at = self.inner_coordinates["slip"]
         rows: list[tuple[float, float]] = []
-        distance = math.nan
+        distance = left = math.nan
         equations = rigid(scene, scene.log_load_rate)
         for step in steps(equations, [start], tolerance, meter):
             passes = (step.before.friction - level) * (step.after.friction - level) <= 0.0
             if passes and math.isnan(distance):
                 distance = step.locate(lambda point: point.friction - level)
+            if step.start < 1.0 <= step.end:
+                left = step.point_at(1.0).friction
             while len(rows) < len(at) and at[len(rows)] <= step.end:
                 point = step.point_at(float(at[len(rows)]))
                 rows.append((point.friction, point.imbalance - scene.b * scene.log_load_rate))
             if len(rows) == len(at) and not math.isnan(distance):
-                return distance, np.array(rows)
+                return distance, left, np.array(rows)
         raise Halt(Status.INTEGRATION_FAILED, "a response ended by itself")
 
 
@@ -138,7 +142,7 @@ def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> f
         return math.nan
     rate = scene.log_load_rate
     evolving = {
-        "slowness": np.log1p(math.expm1(rate) * np.exp(-slip)),
+        "slowness": np.log(-np.expm1(-slip) + np.exp(rate - slip)),
         "slip": rate * np.exp(-slip),
     }
     if scene.law not in evolving:

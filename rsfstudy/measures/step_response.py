@@ -75,6 +75,8 @@ class StepResponse(Measure):
         """Follow the motion, and once more at a looser tolerance for the error of its peaks."""
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
+        if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
+            return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
         peaks, rows = self._follow(scene, accuracy, meter)
         coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
         again, _rows = self._follow(scene, coarse, meter)

@@ -78,9 +78,8 @@ def start_of_path(
     start = touching_point(scene)
     if start is None:
         return None
-    path = Meter(
-        round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125)
-    )  # work of an eighth-order method
+    # work of an eighth-order method
+    path = Meter(round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125), meter.methods)
     try:
         backward = steps(without_mass(scene, clock=False), start, tolerance, path, backward=True)
         for number, step in enumerate(backward):

@@ -19,9 +19,9 @@ _MASS = {0: "quasi-static", 1: "with mass"}
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Quasi-static motions after the smallest and the largest step (Fig. 8)."""
-    softest = _softest(dataset)
+    softest = _softest(dataset).sortby("load_velocity_ratio").sortby("inertia").isel(inertia=0)
     for number, end in enumerate((-1, 0)):
-        cell = softest.isel(load_velocity_ratio=end, inertia=0)
+        cell = softest.isel(load_velocity_ratio=end)
         axes.plot(
             cell["log10_slip_rate"],
             cell["frictional_stress"],
@@ -30,12 +30,12 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
             label=rf"$V_0 = {float(cell['load_velocity_ratio']):g}\,V_*$",
         )
     _steady(softest, axes)
-    return _finish(axes, f"Quasi-static, {_which(softest)}")
+    return _finish(axes, f"{_MASS[int(softest['inertia'])]}, {_which(softest)}".capitalize())
 
 
 def draw_mass(dataset: xr.Dataset, axes: Axes) -> Axes:
     """With mass and without it, after the largest step (Fig. 12)."""
-    softest = _softest(dataset).isel(load_velocity_ratio=-1)
+    softest = _softest(dataset).sortby("load_velocity_ratio").isel(load_velocity_ratio=-1)
     for number, mass in enumerate(softest["inertia"].values):
         cell = softest.isel(inertia=number)
         axes.plot(
@@ -76,21 +76,22 @@ def draw_peaks(dataset: xr.Dataset, axes: Axes) -> Axes:
                     fillstyle="full" if mass else "none",
                     markersize=4,
                     linewidth=0.9,
-                    label=f"{stress}, {stiffness:g} $k_{{cr}}$" if mass else None,
+                    label=f"{stress}, {stiffness:g} $k_{{cr}}$, {_MASS[int(mass)]}",
                 )
     axes.set_xscale("log")
     axes.set_ylim(0.0, 16.0)
     axes.set_xlabel(quantity("load_velocity_ratio").symbol)
     axes.set_ylabel(rf"Highest {quantity('log10_slip_rate').symbol}")
     axes.set_title("Peaks: filled with mass, open without", fontsize="medium")
-    axes.legend(fontsize="x-small")
+    axes.legend(fontsize="xx-small")
     axes.grid(alpha=0.3)
     return axes
 
 
 def draw_decay(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Peak after peak without mass, after the smallest step: decaying, or periodic."""
-    rows = dataset.isel(load_velocity_ratio=0, inertia=0)
+    rows = dataset.sortby("load_velocity_ratio").sortby("inertia")
+    rows = rows.isel(load_velocity_ratio=0, inertia=0)
     for number, stress in enumerate(dataset["normal_stress"].values):
         for stiffness, marker in zip(dataset["stiffness_ratio"].values, "os^v", strict=False):
             row = rows.sel(normal_stress=stress, stiffness_ratio=stiffness)
@@ -106,7 +107,9 @@ def draw_decay(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.set_xlabel("Number of the peak")
     axes.set_ylabel(quantity("peak_log10_slip_rate").symbol)
     rate = float(rows["load_velocity_ratio"])
-    axes.set_title(rf"Peaks without mass, $V_0 = {rate:g}\,V_*$", fontsize="medium")
+    axes.set_title(
+        rf"Peaks, {_MASS[int(rows['inertia'])]}, $V_0 = {rate:g}\,V_*$", fontsize="medium"
+    )
     axes.legend(fontsize="x-small")
     axes.grid(alpha=0.3)
     return axes
@@ -117,7 +120,8 @@ PANELS = (draw, draw_mass, draw_peaks, draw_decay)
 
 def _softest(dataset: xr.Dataset) -> xr.Dataset:
     """The softest spring, and variable normal stress where the lattice has it."""
-    return dataset.isel(normal_stress=-1, stiffness_ratio=0)
+    stress = "variable" if "variable" in dataset["normal_stress"].values else "constant"
+    return dataset.sortby("stiffness_ratio").sel(normal_stress=stress).isel(stiffness_ratio=0)
 
 
 def _which(cell: xr.Dataset) -> str:

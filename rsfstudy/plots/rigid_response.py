@@ -25,8 +25,8 @@ def _panel(dataset: xr.Dataset, axes: Axes, law: int, stress: int) -> Axes:
     future = cell["mu_star"] + cell["steady_stress_change"]
     left = (cell["shear_stress"] - future) / cell["a"]
     for rate in cell["load_velocity_ratio"].values:
-        decades = math.log10(rate)
-        if abs(decades - round(decades)) > 1e-9:
+        decades = math.log10(rate) if rate > 0.0 else 0.0
+        if round(decades) == 0 or abs(decades - round(decades)) > 1e-9:
             continue  # steps between decades are there for their numbers
         axes.plot(
             cell["slip"],

@@ -39,6 +39,12 @@ def failed(status: xr.DataArray) -> xr.DataArray:
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
+def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
+    """Where failed cells refuse a result: along these dimensions and those `of` has lost."""
+    bad = failed(dataset["status"])
+    return bad.any([d for d in bad.dims if d in along or d not in dataset[of].dims])
+
+
 def dimension_of(dataset: xr.Dataset, on: str) -> str:
     """The one dimension a coordinate lies along.
 
@@ -54,6 +60,8 @@ def dimension_of(dataset: xr.Dataset, on: str) -> str:
             "must be a coordinate along one dimension",
             choices=[str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != on],
         )
+    if dataset[on].dtype.kind not in "iuf":
+        raise InvalidValue("on", on, "must be a coordinate of numbers")
     return str(dataset[on].dims[0])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from rsfstudy.reduce.base import Reduction, dimension_of, failed
+from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Boundary(Reduction):
             Where `on` is no coordinate along one dimension.
         """
         dimension = dimension_of(dataset, self.on)
-        values = dataset[self.of].where(~failed(dataset["status"]).any(dimension))
+        values = dataset[self.of].where(~refused(dataset, self.of, dimension))
         found = xr.apply_ufunc(
             self._bracket,
             values,
@@ -130,7 +130,7 @@ class Inverse(Reduction):
         dimension = dimension_of(dataset, self.on)
         if dataset.sizes[dimension] < 4:
             return xr.Dataset()
-        values = dataset[self.of].where(~failed(dataset["status"]).any(dimension))
+        values = dataset[self.of].where(~refused(dataset, self.of, dimension))
         found, error = xr.apply_ufunc(
             _inverse,
             values,
@@ -164,19 +164,20 @@ def _inverse(
     values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float]:
     known = np.isfinite(values) & (values > 0.0) & (on > 0.0)
-    x, y = np.log(on[known]), np.log(values[known])
+    x, y = _ascending(np.log(on[known]), np.log(values[known]))
     if np.isnan(level) or level <= 0.0 or x.size < 4:
         return np.nan, np.nan
     fine = _reaches(x, y, np.log(level))
-    coarse = _reaches(x[::2], y[::2], np.log(level))
+    sparse = sorted({*range(0, x.size, 2), x.size - 1})
+    coarse = _reaches(x[sparse], y[sparse], np.log(level))
     ends = [_reaches(x, y, np.log(level) + d) for d in (-uncertainty, uncertainty)]
-    error = abs(fine - coarse) + max(abs(fine - end) for end in ends)
+    error = abs(fine - coarse) + float(np.max(np.abs(fine - np.array(ends))))
     return float(np.exp(fine)), float(np.exp(fine) * error)
 
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
     """The one place where the interpolant through the points is at the level; NaN where not one."""
-    roots = PchipInterpolator(*_ascending(x, y)).solve(level, extrapolate=False)
+    roots = PchipInterpolator(x, y).solve(level, extrapolate=False)
     return float(roots[0]) if len(roots) == 1 else np.nan
 
 

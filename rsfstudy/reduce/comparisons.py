@@ -11,7 +11,7 @@ import xarray as xr
 
 from rsfstudy.closed_forms import FORMS
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Reduction, dimension_of, failed, within
+from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class RelativeDifference(Reduction):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare along `along`; nothing if the lattice has no reference point."""
         values = dataset[self.of]
-        if self.reference not in dataset[self.along].values:
+        if self.along not in values.dims or self.reference not in dataset[self.along].values:
             return xr.Dataset()
         difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
         note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
@@ -122,7 +122,7 @@ class Spread(Reduction):
     Parameters
     ----------
     name : str
-        Name of the result.
+        Name of the result; ``<name>_points``, the number of values, comes with it.
     of : str
         Variable to compare.
     on : str
@@ -143,7 +143,13 @@ class Spread(Reduction):
             return xr.Dataset()
         values = support[self.of]
         spread = values.max(dimension) - values.min(dimension)
-        spread = spread.where(~failed(support["status"]).any(dimension))
+        answered = values.notnull().sum(dimension)
+        spread = spread.where(~refused(support, self.of, dimension) & (answered > 1))
         span = "" if self.within is None else f" from {self.within[0]:g} to {self.within[1]:g}"
         note = f"largest less smallest {self.of} over {self.on}{span}"
-        return xr.Dataset({self.name: spread.assign_attrs(comment=note)})
+        return xr.Dataset(
+            {
+                self.name: spread.assign_attrs(comment=note),
+                f"{self.name}_points": answered.astype("int32").assign_attrs(comment=note),
+            }
+        )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy.reduce.base import Reduction, dimension_of, failed, within
+from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class _Fit(Reduction):
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        refused = failed(support["status"]).any(dimension)
-        known = (count >= self.unknowns) & ~refused
+        bad = refused(support, self.of, dimension)
+        known = (count >= self.unknowns) & ~bad
         result = xr.Dataset(
             {
                 self.name: slope.where(known),
@@ -78,7 +78,7 @@ class _Fit(Reduction):
         span = span.format(*(self.within or ()), on=self.on)
         for name in result:
             result[name].attrs["comment"] = f"least squares of {self.law()} over {span}"
-            if bool(refused.any()):
+            if bool(bad.any()):
                 result[name].attrs["refused"] = (
                     "cells within the fitted range failed or are missing"
                 )

@@ -44,12 +44,13 @@ class Parting(Reduction):
         """Compare the two points of `along`; nothing unless there are two."""
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
-        refused = failed(dataset["status"]).any(self.along)
+        dataset = dataset.sortby(self.along)  # without the effect first
+        bad = failed(dataset["status"]).any(self.along)
         core = [self.along, "phase"]
         parting, merging, offset = xr.apply_ufunc(
             self._compare,
-            dataset["log10_slip_rate"].where(~refused),
-            dataset[self.of].where(~refused),
+            dataset["log10_slip_rate"].where(~bad),
+            dataset[self.of].where(~bad),
             input_core_dims=[core, core],
             output_core_dims=[[], [], []],
             vectorize=True,

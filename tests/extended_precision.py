@@ -1,0 +1,270 @@
+"""References for what accuracy costs: another formulation, another integrator, 64-bit mantissas.
+
+The paper's own unknowns, stress deviation f, x = ln(V/V_*) and Theta, instead of the state freed of
+normal stress; extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) of order 14 in
+`numpy.longdouble`, instead of SciPy's Runge-Kutta in double. The slow manifold serves up to a slip
+rate norm w, with an error of the order of w**4 that two values of w remove (Richardson).
+
+``python tests/extended_precision.py`` prints the references of `studies/_references.py` (minutes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+L = np.longdouble
+State = np.ndarray
+Rates = Callable[[State], State]
+
+_A, _MU = L("0.0145"), L("0.76")
+_INERTIAL_TIME = L(5) * L("1.17e-8") / (2 * np.arccos(L(-1)))
+_SEQUENCE = (2, 4, 6, 8, 10, 12, 14)
+
+
+@dataclass(frozen=True)
+class Slider:
+    """The slider of the paper; angles as cotangents, laws by name."""
+
+    law: str
+    cot_phi: np.longdouble
+    alpha: np.longdouble
+    stiffness: np.longdouble
+    load: np.longdouble
+    b: np.longdouble
+    a: np.longdouble = _A
+    mu: np.longdouble = _MU
+    inertial_time: np.longdouble = _INERTIAL_TIME
+
+    def evolution(self, x: np.longdouble, theta: np.longdouble) -> np.longdouble:
+        """Change of the state per unit of slip at constant normal stress."""
+        if self.law == "slip":
+            return -(theta + self.b * x)
+        return self.b * np.expm1(-(theta / self.b + x))
+
+    def friction(self, x: np.longdouble, theta: np.longdouble) -> np.longdouble:
+        """Deviation of frictional stress: (a x + Theta)/(1 - F c)."""
+        excess = self.a * x + theta
+        return excess / (1 - (self.mu + excess) * self.cot_phi)
+
+    def slow(self, state: State) -> State:
+        """(f, Theta, t) per slip and load point displacement, on the slow manifold."""
+        f, theta = state[0], state[1]
+        g = self.slow_friction(f, self.rate_at(f, theta), theta)
+        x = self.rate_at(g, theta)
+        _growth, loading, evolving = self._slow_growth(g, x, theta)
+        return np.array([loading, evolving, 1 / (np.exp(x) + self.load)])
+
+    def slow_friction(
+        self, f: np.longdouble, x: np.longdouble, theta: np.longdouble
+    ) -> np.longdouble:
+        """Frictional stress on the slow manifold: f - K w (w + w_0) dx/ds."""
+        growth = self._slow_growth(f, x, theta)[0]
+        v, scale = np.exp(x), self.stiffness * self.inertial_time**2
+        return f - scale * v * (v + self.load) * growth
+
+    def rate_at(self, g: np.longdouble, theta: np.longdouble) -> np.longdouble:
+        return (g * (1 - self.mu * self.cot_phi) / (1 + self.cot_phi * g) - theta) / self.a
+
+    def _slow_growth(
+        self, g: np.longdouble, x: np.longdouble, theta: np.longdouble
+    ) -> tuple[np.longdouble, np.longdouble, np.longdouble]:
+        """dx, df and dTheta per slip and load point displacement, quasi-statically."""
+        c, v = self.cot_phi, np.exp(x)
+        share, s = v / (v + self.load), 1 + c * g
+        loading = self.stiffness * (self.load - v) / (v + self.load)
+        evolving = share * self.evolution(x, theta) - self.alpha * c * loading / s
+        return ((1 - self.mu * c) / s**2 * loading - evolving) / self.a, loading, evolving
+
+    def fast(self, state: State) -> State:
+        """(f, x, Theta) per inertial time."""
+        f, x, theta = state
+        w = np.exp(x) * self.inertial_time
+        excess = self.a * x + theta
+        support = 1 - (self.mu + excess) * self.cot_phi
+        growth = (f - excess / support) / (self.stiffness * w)
+        coupling = self.alpha * self.cot_phi / support
+        evolving = (w * self.evolution(x, theta) - coupling * self.a * growth) / (1 + coupling)
+        return np.array([self.stiffness * (self.load * self.inertial_time - w), growth, evolving])
+
+
+def step(rates: Rates, state: State, first: State, size: np.longdouble) -> tuple[State, float]:
+    """One extrapolated step, and its error over the scales of the unknowns."""
+    rows: list[State] = []
+    table: list[State] = []
+    for count in _SEQUENCE:
+        h = size / count
+        before, now = state, state + h * first
+        for _ in range(count - 1):
+            before, now = now, before + 2 * h * rates(now)
+        table = [(before + now + h * rates(now)) / 2, *table]
+        for j in range(1, len(table)):
+            ratio = (L(count) / _SEQUENCE[len(table) - 1 - j]) ** 2
+            table[j] = table[j - 1] + (table[j - 1] - table[j]) / (ratio - 1)
+        rows.append(table[-1])
+    return rows[-1], float((np.abs(rows[-1] - rows[-2]) / (1 + np.abs(rows[-1]))).max())
+
+
+def path(
+    rates: Rates, state: State, tolerance: float
+) -> Iterator[tuple[State, State, np.longdouble]]:
+    """Steps: the states before and after, and the size."""
+    size = L("1e-3")
+    while True:
+        first = rates(state)
+        while True:
+            ahead, error = step(rates, state, first, size)
+            if error <= tolerance:
+                break
+            shrink = 0.8 * (tolerance / error) ** (1 / 13) if np.isfinite(error) else 0.2
+            size = size * L(max(0.2, shrink))
+        yield state, ahead, size
+        state = ahead
+        size = size * L(min(3.0, 0.8 * (tolerance / max(error, 1e-40)) ** (1 / 13)))
+
+
+def locate(
+    rates: Rates, state: State, size: np.longdouble, what: Callable[[State], np.longdouble]
+) -> tuple[np.longdouble, State]:
+    """Part of a step after which ``what(state)`` vanishes, by the secant method on step sizes."""
+    first = rates(state)
+    low, high = L(0), size
+    at_low, at_high = what(state), what(step(rates, state, first, size)[0])
+    side = 0
+    for _ in range(200):
+        middle = (low * at_high - high * at_low) / (at_high - at_low)
+        found = step(rates, state, first, middle)[0]
+        value = what(found)
+        if value == 0 or abs(high - low) <= L("1e-18") * abs(size) or abs(value) < L("1e-18"):
+            return middle, found
+        if value * at_low > 0:
+            low, at_low = middle, value
+            at_high = at_high / 2 if side == 1 else at_high
+            side = 1
+        else:
+            high, at_high = middle, value
+            at_low = at_low / 2 if side == -1 else at_low
+            side = -1
+    return middle, found
+
+
+class Motion:
+    """Cycles of a slider: slow manifold up to a slip rate norm, the full equations above."""
+
+    def __init__(self, slider: Slider, norm: float, tolerance: float) -> None:
+        self.slider, self.tolerance = slider, tolerance
+        self.switch = np.log(L(norm) / slider.inertial_time)
+        self.load = np.log(slider.load)
+        self.began = self.top = self.lowest = self.at_peak = L(0)
+        self.events = 0
+
+    def numbers(self, count: int) -> np.ndarray:
+        """Recurrence interval, static and dynamic drop of the given cycle."""
+        state = np.array([L(0), L(0), L(0)])
+        while True:
+            state, done = self._slow(state, count)
+            if done:
+                interval = state[2] - self.began
+                return np.array([interval, self.top - self.lowest, self.top - self.at_peak])
+            state = self._fast(state)
+
+    def _slow_rate(self, y: State) -> np.longdouble:
+        return self.slider.rate_at(y[0], y[1])
+
+    def _slow(self, state: State, count: int) -> tuple[State, bool]:
+        rates, load = self.slider.slow, self.load
+        for before, after, size in path(rates, state, self.tolerance):
+            x0, x1 = self._slow_rate(before), self._slow_rate(after)
+            if (x0 - load) * (x1 - load) <= 0:
+                turning = locate(rates, before, size, lambda y: self._slow_rate(y) - load)[1]
+                self.lowest = min(self.lowest, turning[0])
+                if x0 < load:
+                    if self.events == count:
+                        return turning, True
+                    self.events, self.began = self.events + 1, turning[2]
+                    self.top = self.lowest = turning[0]
+            if x1 >= self.switch:
+                return locate(rates, before, size, lambda y: self._slow_rate(y) - self.switch)[
+                    1
+                ], False
+        raise AssertionError
+
+    def _fast(self, start: State) -> State:
+        slider, load = self.slider, self.load
+        x = slider.rate_at(start[0], start[1])
+        friction = slider.slow_friction(start[0], x, start[1])
+        state = np.array([start[0], slider.rate_at(friction, start[1]), start[1]])
+        elapsed, falls = L(0), False
+        for before, after, size in path(slider.fast, state, self.tolerance):
+            elapsed = elapsed + size
+            growth = slider.fast(before)[1], slider.fast(after)[1]
+            if growth[0] > 0 >= growth[1]:
+                self.at_peak = locate(slider.fast, before, size, lambda y: slider.fast(y)[1])[1][0]
+                falls = True
+            if before[1] > load >= after[1]:
+                turning = locate(slider.fast, before, size, lambda y: y[1] - load)[1]
+                self.lowest = min(self.lowest, turning[0])
+            # at rest: what slip the approach to the slow manifold still takes is below rounding
+            below = slider.rate_at(after[0], after[2])
+            slip = slider.stiffness * (np.exp(after[1]) * slider.inertial_time) ** 2
+            if falls and slip * abs(after[1] - below) < L("1e-20") and after[1] < self.switch - 3:
+                return np.array([after[0], after[2], start[2] + elapsed * slider.inertial_time])
+        raise AssertionError
+
+
+def cycle(slider: Slider, norm: float, count: int) -> dict[str, tuple[str, str]]:
+    """Numbers of a cycle, the error of the switch removed, and by how much that moved them."""
+    coarse, fine = (Motion(slider, w, 1e-16).numbers(count) for w in (norm, norm / 2))
+    best = fine + (fine - coarse) / 15
+    names = ("recurrence_interval", "static_stress_drop", "dynamic_stress_drop")
+    return {
+        name: (np.format_float_positional(value, 17), f"{float(moved):.1e}")
+        for name, value, moved in zip(names, best, np.abs(best - fine), strict=True)
+    }
+
+
+def critical_velocity(slider: Slider, norm: float) -> np.longdouble:
+    """Critical V_0/V_* without mass: forward in time, by the height of the only peak.
+
+    Bisection between motions that pass the norm and motions that turn before it.
+    """
+    log_norm = np.log(L(norm) / slider.inertial_time)
+
+    def reaches(load: np.longdouble) -> bool:
+        loaded = replace(slider, load=load, inertial_time=L(0))
+        highest = L(0)
+        for _before, after, _size in path(loaded.slow, np.array([L(0), L(0), L(0)]), 1e-16):
+            x = loaded.rate_at(after[0], after[1])
+            if x >= log_norm:
+                return True
+            highest = max(highest, x)
+            if x < highest - L("0.5"):
+                return False
+        raise AssertionError
+
+    low, high = L(1) + L("0.1"), L(40)
+    for _ in range(62):
+        middle = (low + high) / 2
+        low, high = (low, middle) if reaches(middle) else (middle, high)
+    return middle
+
+
+def paper(law: str, *, constant: bool, ratio: str = "0.8", load: str = "2") -> Slider:
+    """The slider of Figs. 9 and 10: b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*."""
+    cot = L(0) if constant else 1 / np.sqrt(L(3))
+    alpha = L(0) if constant else L("0.56")
+    critical = _A / (1 - cot * (_MU - alpha))
+    return Slider(law, cot, alpha, L(ratio) * critical, L(load), 2 * _A)
+
+
+if __name__ == "__main__":
+    for constant in (True, False):
+        stress = "constant" if constant else "variable"
+        for law in ("slip", "slowness"):
+            still = paper(law, constant=constant, ratio="1.25")
+            print(law, stress, "critical velocity, 1.25 k_cr", critical_velocity(still, 5e-4))
+            for norm in (0.02, 0.01):
+                found = cycle(paper(law, constant=constant), norm, 4 if law == "slip" else 14)
+                print(law, stress, "cycle, switch at", norm, found, flush=True)
