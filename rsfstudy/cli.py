@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -96,12 +97,12 @@ def show(name: str, settings: tuple[str, ...]) -> None:
     table.add_row("gives", ", ".join(study.measure.variables))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
-    work = len(set(scenes)) * study.measure.typical_work
-    seconds = runner.estimated_seconds(study, len(set(scenes)))
+    work, seconds = runner.estimated_cost(study)
     table.add_row("cells", f"{study.size}, of which {len(set(scenes))} differ")
     table.add_row(
         "cost",
-        f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {DEFAULT_RTOL:g}",
+        f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol "
+        f"{study.accuracy.rtol:g}",
     )
     terminal.console.print(table)
 
@@ -134,14 +135,17 @@ def run(
         raise click.UsageError("--serial and --scheduler exclude each other")
     status = OK
     with _client(scheduler) as client:
-        for study in _named(name, every):
+        for named in _named(name, every):
+            study = _overridden(named, settings)
+            if rtol is not None:
+                study = replace(study, accuracy=replace(study.accuracy, rtol=rtol))
+                _announce(study)
             dataset = api.run(
-                _overridden(study, settings),
+                study,
                 workers=0 if serial else workers,
                 client=client,
                 output=output,
                 fresh=fresh,
-                rtol=rtol,
                 progress=not quiet,
                 command=runner.command_line(),
             )
@@ -224,6 +228,17 @@ def _setting(text: str) -> tuple[str, Any]:
     if ":" in values:
         raise InvalidValue("--set", text, "must read start:stop:count, two numbers and a count")
     return name.strip(), _value(parts[0])
+
+
+def _announce(study: Study) -> None:
+    """Say what an accuracy will cost, before it does."""
+    work, seconds = runner.estimated_cost(study)
+    terminal.console.print(
+        f"{study.name} at rtol {study.accuracy.rtol:g}: {study.accuracy.relative_work:.2g} times "
+        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, {seconds:.0f} s on "
+        "one core",
+        highlight=False,
+    )
 
 
 def _value(text: str) -> Any:

@@ -79,7 +79,8 @@ def _coordinates(study: Study, scenes: Sequence[Scene]) -> dict[str, Any]:
     for name, (source, formula) in DERIVED.items():
         if source in coords:
             dims, values, _attrs = coords[source]
-            coords[name] = (dims, np.vectorize(formula, otypes=[float])(values), _about(name))
+            derived = [formula(value) for value in np.ravel(values).tolist()]
+            coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name))
     for name, values in study.measure.inner_coordinates.items():
         coords[name] = (name, values, _about(name))
     return coords

@@ -164,9 +164,13 @@ def _interrupted(plan: Plan, output: Path | None, command: str, error: BaseExcep
     return RunError(f"{text} and kept in {path}; the same command goes on from there.")
 
 
-def estimated_seconds(study: Study, cells: int) -> float:
-    """What this many cells usually take on one core at the default accuracy, in s."""
-    return cells * study.measure.typical_work * _SECONDS_PER_RHS
+def estimated_cost(study: Study) -> tuple[int, float]:
+    """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
+    core.
+    """
+    cells = len(set(study.scenes()))
+    work = cells * study.measure.typical_work * study.accuracy.relative_work
+    return round(work), work * _SECONDS_PER_RHS
 
 
 def command_line() -> str:

@@ -96,7 +96,11 @@ def _until(scene: Scene, step: Step, duration: float) -> Step:
     """The part of a step that ends this long after its regime began."""
     if elapsed(scene, step, step.end) <= duration:
         return step
-    clock = brentq(lambda c: elapsed(scene, step, c) - duration, step.start, step.end)
+    # clocks of slip are as short as slip is slow
+    finest = 1e-15 * abs(step.end - step.start)
+    clock = brentq(
+        lambda c: elapsed(scene, step, c) - duration, step.start, step.end, xtol=finest, rtol=1e-15
+    )
     return step.until(float(clock))
 
 

@@ -340,6 +340,44 @@ _QUANTITIES = (
         "static_slope_scaled", "$f(k)$", "1", "slope of static stress drop over (a-b) sigma_star"
     ),
     Quantity("dynamic_slope_scaled", "", "1", "slope of dynamic stress drop over (a-b) sigma_star"),
+    # what effects cost
+    Quantity("unknowns", "", "1", "unknowns of the equations between ruptures"),
+    Quantity("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
+    Quantity("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
+    Quantity("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
+    Quantity(
+        "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
+    ),
+    Quantity("drop_lost_without_mass", "", "1", "fraction of the static drop lost, against mass"),
+    Quantity(
+        "drop_lost_without_coupling",
+        "",
+        "1",
+        "fraction of the static drop lost, against inclined driving with alpha",
+    ),
+    Quantity("work_saved", "", "1", "fraction of the right-hand sides per cycle saved"),
+    # what accuracy costs
+    Quantity("integrator", "", "", "integrator: throughout, or between ruptures and in them"),
+    Quantity("answer", "", "1", "the known answer"),
+    Quantity("ended_as", "", "1", "status the measure ended with, as its flag value"),
+    Quantity("requested_digits", "", "1", "decimal digits asked for: -log10(rtol)"),
+    Quantity("achieved_digits", "", "1", "decimal digits reached: -log10 of the measured error"),
+    Quantity("measured_error", "", "1", "error against an independent reference"),
+    Quantity("error_estimate", "", "1", "the run's own estimate of its error"),
+    Quantity("run_evaluations", "", "1", "right-hand sides, those of numerical Jacobians included"),
+    Quantity("run_steps", "", "1", "steps taken"),
+    Quantity("run_jacobians", "", "1", "Jacobians evaluated"),
+    Quantity("run_time", "", "s", "wall time, median of interleaved repeats"),
+    Quantity("run_failed", "", "1", "whether the run failed"),
+    Quantity("digits", "", "1", "correct decimal digits wanted"),
+    Quantity("proportionality", "", "1", "slope of achieved against requested digits"),
+    Quantity("cheapest_integrator", "", "", "integrator with the least right-hand sides"),
+    Quantity("cheapest_work", "", "1", "its right-hand sides"),
+    Quantity("cheapest_default_work", "", "1", "right-hand sides of the default integrator"),
+    Quantity("cheapest_default_time", "", "s", "wall time of the default integrator"),
+    Quantity("cheapest_default_request", "", "1", "digits to ask for with the default integrator"),
+    Quantity("cheapest_relative", "", "1", "work of an integrator over that of the default one"),
+    Quantity("cheapest_ratio", "", "1", "work of the default integrator over the least"),
     # every lattice
     Quantity("status", "", "", "outcome of the cell"),
     Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),
@@ -366,7 +404,7 @@ _COUNTS = ("points", "crossings")
 DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
         "load_velocity_ratio",
-        lambda ratio: math.log(ratio) if ratio > 0.0 else -math.inf,
+        lambda ratio: -math.inf if ratio == 0.0 else math.log(ratio),
     ),
     "a_over_b_minus_a": ("b_over_a", lambda b_over_a: 1.0 / (b_over_a - 1.0)),
 }

@@ -3,7 +3,8 @@
 The paper's own unknowns, stress deviation f, x = ln(V/V_*) and Theta, instead of the state freed of
 normal stress; extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) of order 14 in
 `numpy.longdouble`, instead of SciPy's Runge-Kutta in double. The slow manifold serves up to a slip
-rate norm w, with an error of the order of w**4 that two values of w remove (Richardson).
+rate norm w, at constant normal stress with an error of the order of w**4 that two values of w
+remove (Richardson).
 
 ``python tests/extended_precision.py`` prints the references of `studies/_references.py` (minutes).
 """
@@ -21,6 +22,7 @@ Rates = Callable[[State], State]
 
 _A, _MU = L("0.0145"), L("0.76")
 _INERTIAL_TIME = L(5) * L("1.17e-8") / (2 * np.arccos(L(-1)))
+_NONE = L(0)
 _SEQUENCE = (2, 4, 6, 8, 10, 12, 14)
 
 
@@ -162,7 +164,8 @@ class Motion:
 
     def numbers(self, count: int) -> np.ndarray:
         """Recurrence interval, static and dynamic drop of the given cycle."""
-        state = np.array([L(0), L(0), L(0)])
+        nudge = self.slider.stiffness / 10 if self.slider.load == 1 else L(0)
+        state = np.array([nudge, L(0), L(0)])
         while True:
             state, done = self._slow(state, count)
             if done:
@@ -206,10 +209,14 @@ class Motion:
             if before[1] > load >= after[1]:
                 turning = locate(slider.fast, before, size, lambda y: y[1] - load)[1]
                 self.lowest = min(self.lowest, turning[0])
-            # at rest: what slip the approach to the slow manifold still takes is below rounding
+            # at rest: what slip the approach to the slow manifold still takes is below rounding,
+            # and so is what Theta still changes with normal stress
             below = slider.rate_at(after[0], after[2])
+            below = slider.rate_at(slider.slow_friction(after[0], below, after[2]), after[2])
             slip = slider.stiffness * (np.exp(after[1]) * slider.inertial_time) ** 2
-            if falls and slip * abs(after[1] - below) < L("1e-20") and after[1] < self.switch - 3:
+            settled = abs(after[1] - below) < L("1e-12") or slider.cot_phi == 0
+            left = slip * abs(after[1] - below) < L("1e-20")
+            if falls and settled and left and after[1] < self.switch - 3:
                 return np.array([after[0], after[2], start[2] + elapsed * slider.inertial_time])
         raise AssertionError
 
@@ -228,43 +235,99 @@ def cycle(slider: Slider, norm: float, count: int) -> dict[str, tuple[str, str]]
 def critical_velocity(slider: Slider, norm: float) -> np.longdouble:
     """Critical V_0/V_* without mass: forward in time, by the height of the only peak.
 
-    Bisection between motions that pass the norm and motions that turn before it.
+    Bisection between motions whose first peak passes the norm and motions whose first peak does
+    not.
     """
     log_norm = np.log(L(norm) / slider.inertial_time)
 
     def reaches(load: np.longdouble) -> bool:
         loaded = replace(slider, load=load, inertial_time=L(0))
-        highest = L(0)
-        for _before, after, _size in path(loaded.slow, np.array([L(0), L(0), L(0)]), 1e-16):
-            x = loaded.rate_at(after[0], after[1])
-            if x >= log_norm:
+
+        def growth(y: State) -> np.longdouble:
+            x = loaded.rate_at(y[0], y[1])
+            return loaded._slow_growth(y[0], x, y[1])[0]
+
+        for before, after, size in path(loaded.slow, np.array([L(0), L(0), L(0)]), 1e-16):
+            if loaded.rate_at(after[0], after[1]) >= log_norm:
                 return True
-            highest = max(highest, x)
-            if x < highest - L("0.5"):
-                return False
+            if growth(before) > 0 >= growth(after):
+                peak = locate(loaded.slow, before, size, growth)[1]
+                return bool(loaded.rate_at(peak[0], peak[1]) >= log_norm)
         raise AssertionError
 
-    low, high = L(1) + L("0.1"), L(40)
-    for _ in range(62):
-        middle = (low + high) / 2
+    low, high = L(1) + L("1e-3"), L(200)
+    for _ in range(66):
+        middle = np.sqrt(low * high)
         low, high = (low, middle) if reaches(middle) else (middle, high)
     return middle
 
 
 def paper(law: str, *, constant: bool, ratio: str = "0.8", load: str = "2") -> Slider:
     """The slider of Figs. 9 and 10: b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*."""
-    cot = L(0) if constant else 1 / np.sqrt(L(3))
-    alpha = L(0) if constant else L("0.56")
-    critical = _A / (1 - cot * (_MU - alpha))
-    return Slider(law, cot, alpha, L(ratio) * critical, L(load), 2 * _A)
+    if constant:
+        return slider(law, ratio=ratio, load=load)
+    return slider(law, ratio=ratio, load=load, cot_phi=1 / np.sqrt(L(3)), alpha="0.56")
+
+
+def slider(
+    law: str = "slip",
+    *,
+    ratio: str = "1",
+    load: str = "2",
+    cot_phi: np.longdouble = _NONE,
+    alpha: str = "0",
+    a: str = "0.0145",
+    b_over_a: str = "2",
+    period: str = "5",
+) -> Slider:
+    """A slider by the parameters its users state."""
+    direct, state = L(a), L(alpha)
+    critical = direct * (L(b_over_a) - 1) / (1 - cot_phi * (_MU - state))
+    return Slider(
+        law,
+        cot_phi,
+        state,
+        L(ratio) * critical,
+        L(load),
+        direct * L(b_over_a),
+        direct,
+        inertial_time=_INERTIAL_TIME * L(period) / 5,
+    )
+
+
+#: Critical velocities of `hard_cases`: what differs from the slip law at k = k_cr, b/a = 2.
+_SIXTY = {"cot_phi": 1 / np.sqrt(L(3)), "alpha": "0.56"}
+_STEEP = 1 / np.tan(np.arctan(_MU) + L("0.01") * np.arccos(L(-1)) / 180)
+HARD_STEPS = {
+    "lambda = 0.01": {"b_over_a": "1.01"},
+    "lambda = 20": {"b_over_a": "21"},
+    "a = 1e-4": {**_SIXTY, "a": "1e-4"},
+    "a = 0.1": {**_SIXTY, "a": "0.1"},
+    "alpha = 0": {**_SIXTY, "alpha": "0"},
+    "alpha = mu_*": {**_SIXTY, "alpha": "0.76"},
+    "alpha = 1": {**_SIXTY, "alpha": "1"},
+    "phi = atan(mu_*) + 0.01": {"cot_phi": _STEEP, "alpha": "0.56"},
+    "T = 1e-6 s": {**_SIXTY, "period": "1e-6"},
+    "T = 1e4 s": {**_SIXTY, "period": "1e4"},
+}
+#: Limit cycles of `hard_cases`, slip law, constant normal stress.
+HARD_CYCLES = {
+    "k = 0.99 k_cr": {"ratio": "0.99"},
+    "V_0 = V_*": {"ratio": "0.8", "load": "1"},
+    "T = 1e-6 s": {"ratio": "0.8", "period": "1e-6"},
+    "T = 1e4 s": {"ratio": "0.8", "period": "1e4"},
+}
 
 
 if __name__ == "__main__":
-    for constant in (True, False):
-        stress = "constant" if constant else "variable"
-        for law in ("slip", "slowness"):
-            still = paper(law, constant=constant, ratio="1.25")
-            print(law, stress, "critical velocity, 1.25 k_cr", critical_velocity(still, 5e-4))
-            for norm in (0.02, 0.01):
-                found = cycle(paper(law, constant=constant), norm, 4 if law == "slip" else 14)
-                print(law, stress, "cycle, switch at", norm, found, flush=True)
+    for ratio in ("1.25", "1"):
+        for constant in (True, False):
+            still = paper("slip", constant=constant, ratio=ratio)
+            print(ratio, constant, "critical velocity", critical_velocity(still, 5e-4), flush=True)
+    for law, count in (("slip", 4), ("slowness", 14)):
+        for norm in (0.02, 0.01):
+            print(law, "switch at", norm, cycle(paper(law, constant=True), norm, count), flush=True)
+    for label, fields in HARD_STEPS.items():
+        print(label, "critical velocity", critical_velocity(slider(**fields), 5e-4), flush=True)
+    for label, fields in HARD_CYCLES.items():
+        print(label, cycle(slider(**fields), 0.02, 8), flush=True)

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,15 +15,27 @@ import xarray as xr
 import rsfstudy
 from rsfstudy import catalogue, plots, vocabulary
 from rsfstudy.status import Status
+from rsfstudy.study import Study
 
 FLAGS = {"status", "regime", "inertia"}
+
+
+def declared(name: str) -> Study:
+    """The study; that of costs with the integrators its verdicts turn on, each timed once."""
+    study = catalogue.load(name)
+    if name == "accuracy_cost":
+        few = replace(
+            study.measure, integrators=("DOP853", "RK45", "Radau, mass always"), repeats=1
+        )
+        study = replace(study, measure=few)
+    return study
 
 
 @pytest.fixture(scope="module", params=catalogue.names())
 def result(request, tmp_path_factory):
     """The default lattice of each study, on two workers, and where its file is."""
     output = tmp_path_factory.mktemp(request.param)
-    dataset = rsfstudy.run(request.param, output=output, progress=False)
+    dataset = rsfstudy.run(declared(request.param), output=output, progress=False)
     return dataset, output / f"{request.param}.nc"
 
 
@@ -90,9 +103,9 @@ def test_the_compliance_checker_reports_no_error(result):
 
 
 def test_the_declaration_in_the_file_is_the_study(result):
-    declared = json.loads(result[0].attrs["declaration"])
-    described = catalogue.load(result[1].stem).describe()
-    assert declared == json.loads(json.dumps(described))
+    found = json.loads(result[0].attrs["declaration"])
+    described = declared(result[1].stem).describe()
+    assert found == json.loads(json.dumps(described))
 
 
 def test_every_number_carries_status_error_and_work(result):
@@ -121,17 +134,17 @@ def test_a_partial_figure_says_so(result):
 
 
 def test_a_plot_outside_of_the_package_is_never_imported(result):
-    declared = json.loads(result[0].attrs["declaration"])
-    declared["plot"] = "os"
-    foreign = result[0].assign_attrs(declaration=json.dumps(declared))
+    foreign = json.loads(result[0].attrs["declaration"])
+    foreign["plot"] = "os"
+    dataset = result[0].assign_attrs(declaration=json.dumps(foreign))
     with pytest.raises(rsfstudy.errors.InvalidValue, match="plot = 'os': is unknown"):
-        plots.figure(foreign)
+        plots.figure(dataset)
 
 
 def test_the_plain_plot_draws_any_lattice(result):
-    declared = json.loads(result[0].attrs["declaration"])
-    declared["plot"] = "lines"
-    figure = plots.figure(result[0].assign_attrs(declaration=json.dumps(declared)))
+    foreign = json.loads(result[0].attrs["declaration"])
+    foreign["plot"] = "lines"
+    figure = plots.figure(result[0].assign_attrs(declaration=json.dumps(foreign)))
     assert figure.axes[0].lines
 
 

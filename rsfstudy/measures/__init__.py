@@ -84,12 +84,16 @@ class Measure:
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""
+        return self.metered(scene, accuracy)[0]
+
+    def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
+        """The same, with what it spent."""
         meter = Meter(accuracy.budget, dict(accuracy.methods))
         try:
             found = self.find(scene, accuracy, meter)
         except Halt as halt:
             found = Outcome(halt.status, message=str(halt))
-        return Outcome(found.status, found.values, found.message, meter.spent)
+        return Outcome(found.status, found.values, found.message, meter.spent), meter
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""

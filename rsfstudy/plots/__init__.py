@@ -23,7 +23,7 @@ Panel = Callable[[xr.Dataset, Axes], Axes]
 
 NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
-#: Size of one panel in inches.
+#: Size of one panel in inches; a module may state its own as ``PANEL``.
 _PANEL = (6.4, 4.8)
 
 
@@ -35,10 +35,11 @@ def figure(dataset: xr.Dataset) -> Figure:
     InvalidValue
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
     """
-    panels = getattr(_module(dataset), "PANELS", (None,))
+    module = _module(dataset)
+    panels, size = getattr(module, "PANELS", (None,)), getattr(module, "PANEL", _PANEL)
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
-    found = Figure(figsize=(_PANEL[0] * columns, _PANEL[1] * rows), layout="constrained")
+    found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):
         draw(dataset, found.add_subplot(rows, columns, number), panel)
     return found

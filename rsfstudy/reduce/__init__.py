@@ -14,10 +14,12 @@ from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.fits import LinearFit, ProportionalFit
 from rsfstudy.reduce.paths import Parting
+from rsfstudy.reduce.work import Cheapest
 from rsfstudy.vocabulary import quantity
 
 __all__ = [
     "Boundary",
+    "Cheapest",
     "Difference",
     "Inverse",
     "LinearFit",
@@ -40,4 +42,8 @@ def reduced(dataset: xr.Dataset, reductions: tuple[Reduction, ...]) -> xr.Datase
             scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
             values.attrs = {"long_name": about.long_name, "units": about.units, **scale, **own}
             dataset = dataset.assign({name: values})
+            for coordinate in values.dims:
+                if coordinate in dataset.coords and not dataset[coordinate].attrs:
+                    about = quantity(str(coordinate))
+                    dataset[coordinate].attrs = {"long_name": about.long_name, "units": about.units}
     return dataset

@@ -1,0 +1,73 @@
+"""A case that breaks ordinary slider codes, and whether what must come out does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Meter
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.problem import Problem, posed_by
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class HardCase(Measure):
+    """Solves the problem a scene poses and holds the outcome against the known answer.
+
+    ``ok`` where it ends as it must and, if the answer is a number, the error is within the
+    outcome's own estimate; ``unverified`` otherwise.
+
+    Parameters
+    ----------
+    problems : tuple of Problem
+        One for each scene of the lattice.
+    """
+
+    problems: tuple[Problem, ...] = ()
+    name: ClassVar[str] = "hard_case"
+
+    @property
+    def headline(self) -> str:
+        return "measured_error"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        names = ("measured_error", "measured_error_error", "error_estimate", "answer", "ended_as")
+        return dict.fromkeys(names, ())
+
+    @property
+    def typical_work(self) -> int:
+        return 15_000
+
+    def describe(self) -> dict[str, Any]:
+        """The measure as plain data."""
+        return {"name": self.name, "problems": [problem.describe() for problem in self.problems]}
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Measure, and compare."""
+        problem = posed_by(scene, self.problems)
+        outcome, spent = problem.measure.metered(scene, accuracy)
+        meter.by_regime, meter.spent = spent.by_regime, spent.spent
+        found = {"ended_as": float(outcome.status)}
+        if outcome.status is not problem.status:
+            why = f"ended as {outcome.status.label}, not {problem.status.label}: {outcome.message}"
+            return Outcome(Status.UNVERIFIED, found, why)
+        if problem.answer is None:
+            exact = {"measured_error": 0.0, "measured_error_error": 0.0}
+            return Outcome(Status.OK, found | exact, outcome.message)
+        error, estimate = problem.error_of(outcome), problem.estimate_of(outcome)
+        found |= {
+            "measured_error": error,
+            "measured_error_error": problem.uncertainty,
+            "error_estimate": estimate,
+            "answer": problem.answer,
+        }
+        if not error <= estimate + problem.uncertainty or math.isnan(error):
+            why = f"error {error:.2g} beyond its estimate {estimate:.2g}"
+            return Outcome(Status.UNVERIFIED, found, why)
+        return Outcome(Status.OK, found)

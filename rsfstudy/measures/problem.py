@@ -1,0 +1,94 @@
+"""A problem whose answer is known: a scene, a measure, a number and where that comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A scene with a known answer.
+
+    Parameters
+    ----------
+    scene : Scene
+    measure : Measure
+        What is asked of it.
+    quantity : str
+        The number of the measure that is known.
+    answer : float, optional
+        Its value; None where the answer is a status.
+    status : Status
+        How the measure must end.
+    scale : float
+        What errors are relative to; by default the answer.
+    uncertainty : float
+        Error of the answer itself, over `scale`.
+    source : str
+        Where the answer comes from.
+    """
+
+    scene: Scene
+    measure: Measure
+    quantity: str
+    answer: float | None = None
+    status: Status = Status.OK
+    scale: float = 0.0
+    uncertainty: float = 0.0
+    source: str
+
+    def error_of(self, outcome: Outcome) -> float:
+        """Error of an outcome, over the scale."""
+        assert self.answer is not None
+        return abs(self._number(outcome) - self.answer) / self._scale
+
+    def estimate_of(self, outcome: Outcome) -> float:
+        """The outcome's own estimate of its error, over the scale."""
+        return float(outcome.values[f"{self.quantity}_error"]) / self._scale
+
+    def _number(self, outcome: Outcome) -> float:
+        return float(outcome.values[self.quantity])
+
+    @property
+    def _scale(self) -> float:
+        assert self.answer is not None
+        return self.scale or abs(self.answer)
+
+    def describe(self) -> dict[str, Any]:
+        """The problem as plain data."""
+        return {
+            "scene": self.scene.as_dict(),
+            "measure": self.measure.describe(),
+            "quantity": self.quantity,
+            "answer": self.answer,
+            "status": self.status.label,
+            "scale": self._scale if self.answer is not None else None,
+            "uncertainty": self.uncertainty,
+            "source": self.source,
+        }
+
+
+def posed_by(scene: Scene, problems: Sequence[Problem]) -> Problem:
+    """The problem of this scene.
+
+    Raises
+    ------
+    InvalidValue
+        Where none has it: an axis or a fixed value was changed.
+    """
+    for problem in problems:
+        if problem.scene == scene:
+            return problem
+    raise InvalidValue(
+        "scene",
+        scene.as_dict(),
+        "has no known answer",
+        remedy="Choose among the points of the axis; other values have no reference.",
+    )

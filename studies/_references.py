@@ -1,0 +1,57 @@
+"""Numbers known to more digits than anything measured, and how they were made.
+
+Cycles and the critical step come from `tests/extended_precision.py`: the paper's own unknowns
+instead of ours, extrapolated midpoint steps in 64-bit mantissas instead of SciPy's, the error of
+leaving the slow manifold removed by Richardson extrapolation. Two such computations, with the
+switch at slip rate norms of 0.02 and 0.01, agree to the uncertainty given here. The others are
+closed forms, evaluated to 30 digits.
+"""
+
+EXTENDED = "other unknowns, extrapolation method, 64-bit mantissas (tests/extended_precision.py)"
+
+#: Slip law, constant normal stress, b/a = 2, k = 1.25 k_cr, norm 5e-4, without mass: critical
+#: V_0/V_*, by bisection between motions; bisection ends at 1e-18.
+CRITICAL_VELOCITY = 2.633547063232728405
+
+#: The same at k = k_cr.
+AT_CRITICAL_STIFFNESS = 1.999949384410229389
+
+#: Limit cycles of b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*, T = 5 s: (value, relative uncertainty).
+SLIP_RECURRENCE = (27.39031822963788684, 4e-12)
+SLIP_STATIC_DROP = (0.58233021615674673, 4e-12)
+SLIP_DYNAMIC_DROP = (0.32111568137986111, 4e-13)
+SLOWNESS_RECURRENCE = (23.93999870907226927, 4e-13)
+
+#: Slowness law, constant normal stress, k = k_cr, b/a = 2: log10 of the peak slip rate after a step
+#: to 20 V_*, from the conserved quantity Omega - ln Omega + lambda (w - ln w).
+CONSERVED = "conserved quantity of the slowness law at k = k_cr (Ranjith and Rice 1999)"
+PEAK_AFTER_20 = 8.853655123157110332821499968933
+
+#: Slowness law, constant normal stress, V = 200 V_*: slip until 1/e of the stress change is left,
+#: ln[(V - 1)/(V**(1/e) - 1)] (eq. 17a).
+EVOLUTION_DISTANCE = 3.497775839483122296584238615316
+
+#: Slip law, k = k_cr, b/a = 2, norm 5e-4 unless said otherwise: critical V_0/V_*; `hard_cases`.
+HARD_STEPS = {
+    "lambda = 0.01": 10.417946435269350385,
+    "lambda = 20": 1.0500000000000000005,
+    "a = 1e-4": 1.6346486284913022678,
+    "a = 0.1": 1.8560075513444289114,
+    "alpha = 0": 2.0584491076835686255,
+    "alpha = mu_*": 1.5819027890637589848,
+    "alpha = 1": 1.5093326843902126111,
+    "phi = atan(mu_*) + 0.01": 1.0052116124727816295,
+    "T = 1e-6 s": 1.6602536274751297222,
+    "T = 1e4 s": 1.6386075335143061868,
+}
+
+#: Slip law, constant normal stress, b/a = 2: recurrence interval; uncertain by 4e-12.
+HARD_CYCLES = {
+    "k = 0.99 k_cr": 20.19254266647416257,
+    "V_0 = V_*": 56.59980667862398402,
+    "T = 1e-6 s": 47.38533572445342311,
+    "T = 1e4 s": 17.26640860590658854,
+}
+
+#: Slowness law, constant normal stress, k = k_cr, b/a = 2: log10 of the peak after a step to 200.
+PEAK_AFTER_200 = 87.02666189007507609300213265385

@@ -1,0 +1,284 @@
+"""Hard cases: what breaks ordinary slider codes, each with what must come out."""
+
+import math
+
+from rsfstudy.claims import Claim
+from rsfstudy.measures import Measure
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.hard_case import HardCase
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.problem import Problem
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+from rsfstudy.study import Axis, Study
+
+from . import _references as known
+
+Fields = dict[str, str | float | bool]
+CASES: dict[str, tuple[Fields, Problem]] = {}
+
+CONSTANT: Fields = {"normal_stress": "constant"}
+SLOWNESS: Fields = {"law": "slowness", "normal_stress": "constant"}
+CYCLE: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+EXACT = "closed form"
+
+step, triggered = CriticalStep(), Triggered()
+cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
+
+
+def number(
+    label: str,
+    measure: Measure,
+    quantity: str,
+    answer: float,
+    source: str,
+    fields: Fields,
+    **more: float,
+) -> None:
+    """A case with a number to come out."""
+    problem = Problem(
+        scene=Scene(**fields),  # type: ignore[arg-type]
+        measure=measure,
+        quantity=quantity,
+        answer=answer,
+        source=source,
+        **more,  # type: ignore[arg-type]
+    )
+    CASES[label] = (fields, problem)
+
+
+def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
+    """A case that must end with a status."""
+    problem = Problem(
+        scene=Scene(**fields),  # type: ignore[arg-type]
+        measure=measure,
+        quantity=measure.headline,
+        status=status,
+        source="the physics",
+    )
+    CASES[label] = (fields, problem)
+
+
+def critical(label: str, fields: Fields) -> None:
+    """A critical step of the slip law by the independent computation."""
+    answer = known.HARD_STEPS[label]
+    number(
+        label,
+        step,
+        "critical_velocity_ratio",
+        answer,
+        known.EXTENDED,
+        fields,
+        scale=answer - 1.0,
+        uncertainty=1e-15,
+    )
+
+
+def recurs(label: str, name: str, fields: Fields) -> None:
+    """A limit cycle of the slip law by the independent computation."""
+    answer = known.HARD_CYCLES[label]
+    number(name, cycle, "recurrence_interval", answer, known.EXTENDED, fields, uncertainty=4e-12)
+
+
+# rates and steps beyond what numbers hold
+number(
+    "200-fold step, peak at 10^87 V_*",
+    peaks,
+    "max_log10_slip_rate",
+    known.PEAK_AFTER_200,
+    known.CONSERVED,
+    {**SLOWNESS, "load_velocity_ratio": 200.0},
+    scale=1.0,
+)
+number(
+    "20-fold step, neutral orbit",
+    peaks,
+    "max_log10_slip_rate",
+    known.PEAK_AFTER_20,
+    known.CONSERVED,
+    {**SLOWNESS, "load_velocity_ratio": 20.0},
+    scale=1.0,
+)
+ends(
+    "1000-fold step, peak beyond 10^120 V_*",
+    peaks,
+    Status.SLIP_RATE_UNBOUNDED,
+    {**SLOWNESS, "load_velocity_ratio": 1000.0},
+)
+number(
+    "rigid, V = 1e12 V_*",
+    RigidResponse(slip=60.0),
+    "evolution_distance",
+    math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)),
+    EXACT,
+    {**SLOWNESS, "load_velocity_ratio": 1e12},
+)
+number(
+    "rigid, mu_ss = -0.03",
+    RigidResponse(),
+    "evolution_distance",
+    1.0,
+    EXACT,
+    {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e24},
+)
+# at and around the critical stiffness
+for sign in (-1, 1):
+    for off in (1e-8, 1e-3):
+        number(
+            f"k_cr by growth, k = (1 {sign * off:+g}) k_cr",
+            LinearStability(),
+            "critical_stiffness",
+            Scene().critical_stiffness,
+            EXACT,
+            {"stiffness_ratio": 1.0 + sign * off},
+        )
+        number(
+            f"tiny step, k = (1 {sign * off:+g}) k_cr",
+            triggered,
+            "unstable",
+            float(sign < 0),
+            "linear theory: every orbit grows below k_cr, and decays above",
+            {**CONSTANT, "stiffness_ratio": 1.0 + sign * off, "load_velocity_ratio": 1.0 + 1e-3},
+            scale=1.0,
+        )
+number(
+    "critical step, k = (1 + 1e-8) k_cr",
+    step,
+    "critical_velocity_ratio",
+    known.AT_CRITICAL_STIFFNESS,
+    "that at k_cr: the boundary moves by as much as k",
+    {**CONSTANT, "stiffness_ratio": 1.0 + 1e-8},
+    uncertainty=3e-8,
+)
+# every step is unstable there, by a growth of 1e-8 an orbit that no motion can show
+ends(
+    "critical step, k = (1 - 1e-8) k_cr",
+    step,
+    Status.UNVERIFIED,
+    {**CONSTANT, "stiffness_ratio": 1.0 - 1e-8},
+)
+ends(
+    "any step, k = (1 - 1e-3) k_cr",
+    step,
+    Status.UNSTABLE_AT_ANY_STEP,
+    {**CONSTANT, "stiffness_ratio": 1.0 - 1e-3},
+)
+recurs("k = 0.99 k_cr", "cycle at 0.99 k_cr", {**CONSTANT, **CYCLE, "stiffness_ratio": 0.99})
+recurs(
+    "V_0 = V_*", "cycle from a nudge, V_0 = V_*", {**CONSTANT, **CYCLE, "load_velocity_ratio": 1.0}
+)
+# parameters at the ends of their ranges
+critical("lambda = 0.01", {**CONSTANT, "b_over_a": 1.01})
+critical("lambda = 20", {**CONSTANT, "b_over_a": 21.0})
+critical("a = 1e-4", {"a": 1e-4})
+critical("a = 0.1", {"a": 0.1})
+critical("alpha = 0", {"alpha": 0.0})
+critical("alpha = mu_*", {"alpha": 0.76})
+critical("alpha = 1", {"alpha": 1.0})
+STEEPEST = math.degrees(math.atan(0.76)) + 0.01
+critical("phi = atan(mu_*) + 0.01", {"phi": STEEPEST})
+critical("T = 1e-6 s", {"period": 1e-6})
+critical("T = 1e4 s", {"period": 1e4})
+recurs("T = 1e-6 s", "cycle, T = 1e-6 s", {**CONSTANT, **CYCLE, "period": 1e-6})
+recurs("T = 1e4 s", "cycle, T = 1e4 s", {**CONSTANT, **CYCLE, "period": 1e4})
+# where there is no answer but a name
+ends(
+    "no steady state below some V",
+    RigidResponse(),
+    Status.NO_STEADY_STATE,
+    {"phi": STEEPEST, "load_velocity_ratio": 0.9},
+)
+ends(
+    "a slider that locks",
+    peaks,
+    Status.LOCKED,
+    {"phi": STEEPEST, "load_velocity_ratio": 0.5},
+)
+ends(
+    "cycle where k_cr has fallen",
+    cycle,
+    Status.NO_LIMIT_CYCLE,
+    {**CYCLE, "phi": 50.0, "load_velocity_ratio": 1000.0},
+)
+ends(
+    "norm beyond the inertial peak",
+    step,
+    Status.NORM_UNREACHABLE,
+    {"inertia": True, "instability_norm": 1e3},
+)
+ends(
+    "norm below the loading rate",
+    triggered,
+    Status.NORM_BELOW_LOADING_RATE,
+    {"load_velocity_ratio": 1e5},
+)
+ends("slip law without mass", peaks, Status.SLIP_RATE_UNBOUNDED, {"load_velocity_ratio": 20.0})
+ends(
+    "step past zero shear stress",
+    triggered,
+    Status.SHEAR_STRESS_REVERSED,
+    {"displacement_step": -47.0},
+)
+ends(
+    "step past zero normal stress",
+    triggered,
+    Status.NORMAL_STRESS_LOST,
+    {"displacement_step": -106.0},
+)
+number(
+    "step of 1e-14",
+    triggered,
+    "unstable",
+    0.0,
+    "linear theory: it decays",
+    {"load_velocity_ratio": 1.0 + 1e-14, "stiffness_ratio": 1.1},
+    scale=1.0,
+)
+number(
+    "2361-fold step",
+    step,
+    "critical_velocity_ratio",
+    2361.10,
+    "printed in the paper as ~2361, section 4; last digit by a prototype",
+    {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5},
+    uncertainty=3e-6,
+)
+ends(
+    "mass against every stiffness",
+    LinearStability(),
+    Status.UNSTABLE_AT_ANY_STIFFNESS,
+    {"inertia": True, "period": 1e8, "load_velocity_ratio": 100.0},
+)
+
+study = Study(
+    name="hard_cases",
+    title="Cases that break ordinary slider codes, and what comes out",
+    summary=(
+        "Slip rates from 1e-40 to 1e87 V_*, critical stiffness to eight digits, parameters at the "
+        "ends of their ranges, masses from none to overwhelming, and loading that friction "
+        "cannot follow. Each case ends with the number an independent computation or a closed "
+        "form gives, within its own error estimate, or with the status that names the reason."
+    ),
+    base=Scene(),
+    axes=[Axis("hard_case", {label: fields for label, (fields, _problem) in CASES.items()})],
+    measure=HardCase(problems=tuple(problem for _fields, problem in CASES.values())),
+    claims=[
+        Claim(
+            id="H1",
+            statement=f"{label}: as it must be",
+            source="hard_cases",
+            variable="status",
+            where={"hard_case": label},
+            published=float(Status.OK),
+            tolerance=0.0,
+            reason="ok: the number within its own error estimate, or the status that must come out",
+        )
+        for label in CASES
+    ],
+    plot="hard_cases",
+    references=["Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"],
+)

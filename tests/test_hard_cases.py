@@ -1,0 +1,195 @@
+"""Hard cases stay stable: over random scenes, over a thousand cycles, over a million slip times at
+rest; and a wrong answer is never called right.
+"""
+
+import math
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import rsfstudy
+from rsfstudy import Scene, catalogue
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.stepping import Meter
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.effect_cost import EffectCost
+from rsfstudy.measures.hard_case import HardCase
+from rsfstudy.measures.limit_cycle import LimitCycle, cycles
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.status import Status
+
+STUDY = catalogue.load("hard_cases")
+PROBLEMS = dict(zip(STUDY.axes[0].labels, STUDY.measure.problems, strict=True))
+
+
+def outcome(label: str, **changes):
+    problem = replace(PROBLEMS[label], **changes)
+    return HardCase(problems=(problem,))(problem.scene, Accuracy())
+
+
+def test_a_wrong_number_is_unverified():
+    right = PROBLEMS["alpha = 0"].answer
+    assert outcome("alpha = 0").status is Status.OK
+    wrong = outcome("alpha = 0", answer=right * (1.0 + 1e-6))
+    assert wrong.status is Status.UNVERIFIED
+    assert "beyond its estimate" in wrong.message
+
+
+def test_a_wrong_status_is_unverified():
+    wrong = outcome("a slider that locks", status=Status.NO_LIMIT_CYCLE)
+    assert wrong.status is Status.UNVERIFIED
+    assert "ended as locked, not no_limit_cycle" in wrong.message
+
+
+#: Work beyond five times the usual, and why.
+DEAR = {
+    "200-fold step, peak at 10^87 V_*": "two loops from 10^-85 to 10^87 V_*",
+    "tiny step, k = (1 -0.001) k_cr": "a growth of 1e-3 an orbit, followed up to the norm",
+    "critical step, k = (1 - 1e-8) k_cr": "a growth that no motion can show is sought by motions",
+    "phi = atan(mu_*) + 0.01": "k_cr falls so steeply that only motions tell the boundary",
+    "norm beyond the inertial peak": "ruptures up to the largest step, none of which is enough",
+}
+
+
+def test_work_stays_bounded():
+    """Boundaries within 5 x 4,000 right-hand sides, cycles within 5 x 3,000 each; the others are
+    listed with the reason.
+    """
+    dear = {
+        label
+        for label, problem in PROBLEMS.items()
+        if problem.measure(problem.scene, Accuracy()).rhs_evaluations > 20_000
+    }
+    assert dear <= set(DEAR)
+
+
+def test_a_thousand_cycles_do_not_drift():
+    scene = Scene(
+        normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
+    )
+    intervals = []
+    for cycle in cycles(scene, Accuracy(1e-6, budget=10**7), Meter(10**7), None):
+        intervals.append(cycle.interval)
+        if len(intervals) == 1003:
+            break
+    settled = np.array(intervals[3:])
+    # the same to rounding of the steps, which fall elsewhere in each cycle
+    assert np.ptp(settled) < 1e-6 * settled.mean()
+    drift = np.polyfit(np.arange(len(settled)), settled, 1)[0]
+    assert abs(drift) * len(settled) < 1e-7 * settled.mean()
+
+
+@pytest.mark.parametrize(("law", "slope"), [("slowness", -2.0), ("slip", 0.0)])
+def test_a_million_slip_times_at_rest(law, slope):
+    """The load point held after a step back by 20 D_c: with the slowness law theta = t heals the
+    fault, and V falls as t**(-b/a); with the slip law the state needs slip, and V stays.
+    """
+    rest = rsfstudy.simulate(
+        Scene(law=law, normal_stress="constant", displacement_step=-20.0), duration=1e6
+    )
+    assert rest.attrs["status"] == "ok"
+    assert np.isfinite(rest.log10_slip_rate).all()
+    assert float(rest.time[-1]) == pytest.approx(1e6, rel=1e-9)
+    later = np.log10(rest.time.values[1:]), rest.log10_slip_rate.values[1:]
+    rates = np.interp([4.0, 5.0], *later)
+    assert rates[1] - rates[0] == pytest.approx(slope, abs=5e-3)
+
+
+def test_slip_rates_down_to_10_to_the_minus_41():
+    cycle = LimitCycle(phases=2)(
+        Scene(phi=50.0, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True), Accuracy()
+    )
+    assert cycle.status is Status.OK
+    assert cycle.values["min_log10_slip_rate"] < -40.0
+
+
+SCENES = {
+    "law": st.sampled_from(["slip", "slowness"]),
+    "a": st.floats(1e-4, 0.1),
+    "b_over_a": st.floats(1.05, 20.0),
+    "stiffness_ratio": st.floats(0.2, 5.0),
+    "load": st.floats(-5.0, 3.0),
+    "effects": st.one_of(
+        st.just({"normal_stress": "constant"}),
+        st.fixed_dictionaries({"alpha": st.floats(0.0, 1.0), "phi": st.floats(38.0, 89.0)}),
+    ),
+    "dynamics": st.sampled_from([{}, {"inertia": True}, {"radiation_damping": 1e-8}]),
+    "log_period": st.floats(-6.0, 4.0),
+}
+
+
+@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(
+    **SCENES,
+    measure=st.sampled_from(
+        [CriticalStep(), RigidResponse(), StepResponse(peaks=2, phases=5), LimitCycle(phases=5)]
+    ),
+)
+def test_any_scene_ends_in_numbers_or_in_a_name(
+    law, a, b_over_a, stiffness_ratio, load, effects, dynamics, log_period, measure
+):
+    """No NaN that looks fine, no warning, no exception, no hang."""
+    scene = Scene(
+        law=law,
+        a=a,
+        b_over_a=b_over_a,
+        stiffness_ratio=stiffness_ratio,
+        load_velocity_ratio=10.0**load,
+        period=10.0**log_period,
+        **effects,
+        **dynamics,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = measure(scene, Accuracy(1e-5, budget=60_000))
+    assert found.rhs_evaluations <= 60_001
+    if found.status is Status.OK:
+        for name in (measure.headline, f"{measure.headline}_error"):
+            assert math.isfinite(found.values[name]), name
+    else:
+        assert found.message
+
+
+def test_estimates_cover_the_error_of_cycles():
+    """At least 99 % of random cycles, against a tolerance 300 times tighter."""
+    random = np.random.default_rng(7)
+    covered = []
+    while len(covered) < 30:
+        scene = Scene(
+            law=str(random.choice(["slip", "slowness"])),
+            a=float(10.0 ** random.uniform(-3, -1.3)),
+            b_over_a=float(random.uniform(1.3, 3.0)),
+            stiffness_ratio=float(random.uniform(0.4, 0.9)),
+            load_velocity_ratio=float(10.0 ** random.uniform(-1, 1)),
+            phi=float(random.uniform(55, 85)),
+            alpha=float(random.uniform(0, 0.8)),
+            inertia=True,
+        )
+        loose = LimitCycle(phases=2)(scene, Accuracy(3e-6))
+        if loose.status is not Status.OK:
+            assert loose.status.is_answer or loose.status is Status.WORK_BUDGET_SPENT
+            continue
+        tight = LimitCycle(phases=2)(scene, Accuracy(1e-8))
+        for name in ("recurrence_interval", "static_stress_drop", "max_log10_slip_rate"):
+            error = abs(loose.values[name] - tight.values[name])
+            covered.append(error <= loose.values[f"{name}_error"] + tight.values[f"{name}_error"])
+    assert np.mean(covered) >= 0.99
+
+
+def test_an_effect_that_is_not_there_costs_nothing():
+    """Unknowns and regimes of each combination; without mass no right-hand side is spent on it."""
+    fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}
+    damped, massive = (
+        EffectCost()(Scene(**fields, **effect), Accuracy(1e-5)).values
+        for effect in ({"radiation_damping": 1e-10}, {"inertia": True})
+    )
+    assert damped["unknowns"] == massive["unknowns"] == 2.0
+    assert damped["share_in_rupture"] == 0.0
+    assert "unknowns_in_rupture" not in damped
+    assert massive["unknowns_in_rupture"] == 3.0
+    assert 0.2 < massive["share_in_rupture"] < 0.9
