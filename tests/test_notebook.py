@@ -21,6 +21,9 @@ STUDIES = (
 )
 
 
+pytestmark = pytest.mark.xdist_group("notebook")
+
+
 @pytest.fixture(scope="module")
 def executed(tmp_path_factory):
     outputs = tmp_path_factory.mktemp("outputs")

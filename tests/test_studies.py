@@ -25,13 +25,22 @@ def declared(name: str) -> Study:
     study = catalogue.load(name)
     if name == "accuracy_cost":
         few = replace(
-            study.measure, integrators=("DOP853", "RK45", "Radau, mass always"), repeats=1
+            study.measure,
+            integrators=("DOP853", "RK45", "Radau, mass always"),
+            digits=(4, 6, 8, 10),
+            repeats=1,
         )
         study = replace(study, measure=few)
     return study
 
 
-@pytest.fixture(scope="module", params=catalogue.names())
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.xdist_group(name))  # one run serves all its tests
+        for name in catalogue.names()
+    ],
+)
 def result(request, tmp_path_factory):
     """The default lattice of each study, on two workers, and where its file is."""
     output = tmp_path_factory.mktemp(request.param)
