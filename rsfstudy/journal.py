@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import sqlite3
+import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -135,10 +136,15 @@ def _scalar(values: np.ndarray) -> float | np.ndarray:
     return float(values) if values.ndim == 0 else values
 
 
+def _brief(value: object) -> str:
+    """A value of a fingerprint as a message has room for it."""
+    return textwrap.shorten(str(value), 70, placeholder="...")
+
+
 def _differences(theirs: str, ours: Mapping[str, Any]) -> str:
     before = json.loads(theirs)
     return "; ".join(
-        f"{name}: {before.get(name)} there, {ours.get(name)} now"
+        f"{name}: {_brief(before.get(name))} there, {_brief(ours.get(name))} now"
         for name in sorted({*before, *ours})
         if before.get(name) != ours.get(name)
     )

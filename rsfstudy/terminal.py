@@ -24,6 +24,7 @@ console = Console()
 def report(dataset: xr.Dataset, name: str, output: Path) -> int:
     """What a run ends with: slopes, claims, failures and where the files are."""
     _reductions(dataset)
+    _costs(dataset)
     moved = claims(dataset)
     failed = failures(dataset)
     work = int(dataset["rhs_evaluations"].sum())
@@ -54,6 +55,19 @@ def _reductions(dataset: xr.Dataset) -> None:
         for row in rows[wanted].itertuples(index=False):
             table.add_row(*(short(value) for value in row))
         console.print(table)
+
+
+def _costs(dataset: xr.Dataset) -> None:
+    """Where integrators were compared: the cheapest for each number of digits."""
+    if "cheapest_integrator" not in dataset:
+        return
+    numbers = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
+    frame = dataset[["cheapest_integrator", *numbers]].reset_coords(drop=True).to_dataframe()
+    table = Table("", "digits", "cheapest", "its work", "work of the default", "rtol to ask for")
+    for place, digits, name, least, work, request in frame.reset_index().itertuples(index=False):
+        asked = f"{10.0**-request:.1g}"
+        table.add_row(str(place), f"{digits:g}", name, f"{least:,.0f}", f"{work:,.0f}", asked)
+    console.print(table)
 
 
 def claims(dataset: xr.Dataset) -> int:
