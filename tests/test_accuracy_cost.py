@@ -114,6 +114,7 @@ def test_digits_reached_by_luck_do_not_count():
     assert float(found.c_default_work[0]) > 100.0
 
 
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision here")
 def test_a_reference_computed_anew():
     """One of those stored: critical velocity of a/(b-a) = 1, slip law, constant normal stress."""
     assert float(critical_velocity(slider(), 5e-4)) == pytest.approx(1.999949384410229, rel=1e-14)

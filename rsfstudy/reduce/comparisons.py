@@ -15,9 +15,8 @@ from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
 
 
 @dataclass(frozen=True)
-class RelativeDifference(Reduction):
-    """How far a variable lies below its value at a reference point of one dimension: ``1 -
-    of/of_reference``.
+class _Against(Reduction):
+    """A variable against its value at a reference point of one dimension; members say how.
 
     Parameters
     ----------
@@ -33,47 +32,45 @@ class RelativeDifference(Reduction):
 
     along: str = ""
     reference: str | float = ""
-    kind: ClassVar[str] = "relative_difference"
+    formula: ClassVar[str]
+
+    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+        """The comparison."""
+        raise TypeError(f"{type(self).__name__} compares nothing")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare along `along`; nothing if the lattice has no reference point."""
         values = dataset[self.of]
         if self.along not in values.dims or self.reference not in dataset[self.along].values:
             return xr.Dataset()
-        difference = 1.0 - values / values.sel({self.along: self.reference}, drop=True)
-        note = f"1 - {self.of} over its value at {self.along} = {self.reference}"
-        return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
+        found = self.compare(values, values.sel({self.along: self.reference}, drop=True))
+        place = f"{self.along} = {self.reference}"
+        note = self.formula.format(of=self.of, reference=f"its value at {place}")
+        return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
 
 @dataclass(frozen=True)
-class Difference(Reduction):
-    """How far a variable lies above its value at a reference point of one dimension: ``of -
-    of_reference``.
+class RelativeDifference(_Against):
+    """How far a variable lies below its value at a reference point: ``1 - of/of_reference``."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the result.
-    of : str
-        Variable to compare.
-    along : str
-        Dimension of the reference.
-    reference : str or float
-        Label of the reference point on that dimension.
-    """
+    kind: ClassVar[str] = "relative_difference"
+    formula: ClassVar[str] = "1 - {of} over {reference}"
 
-    along: str = ""
-    reference: str | float = ""
+    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+        """1 - of/of_reference."""
+        return 1.0 - values / reference
+
+
+@dataclass(frozen=True)
+class Difference(_Against):
+    """How far a variable lies above its value at a reference point: ``of - of_reference``."""
+
     kind: ClassVar[str] = "difference"
+    formula: ClassVar[str] = "{of} less {reference}"
 
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare along `along`; nothing if the lattice has no reference point."""
-        values = dataset[self.of]
-        if self.along not in values.dims or self.reference not in dataset[self.along].values:
-            return xr.Dataset()
-        difference = values - values.sel({self.along: self.reference}, drop=True)
-        note = f"{self.of} less its value at {self.along} = {self.reference}"
-        return xr.Dataset({self.name: difference.assign_attrs(comment=note)})
+    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+        """Of - of_reference."""
+        return values - reference
 
 
 @dataclass(frozen=True)
