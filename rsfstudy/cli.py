@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -204,15 +204,18 @@ def _declared(name: str, settings: tuple[str, ...]) -> Study:
 
 
 def _overridden(study: Study, settings: tuple[str, ...]) -> Study:
-    overrides = dict(_setting(text) for text in settings)
+    labels = {label for axis in study.axes for label in axis.labels or ()}
+    overrides = dict(_setting(text, labels) for text in settings)
     return study.with_(**overrides) if overrides else study
 
 
-def _setting(text: str) -> tuple[str, Any]:
-    """One ``AXIS=VALUES``: a single value, a comma list, or start:stop:count."""
+def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
+    """One ``AXIS=VALUES``: a label, a single value, a comma list, or start:stop:count."""
     name, equals, values = text.partition("=")
     if not equals or not name.strip() or not values.strip():
         raise InvalidValue("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
+    if values.strip() in labels:
+        return name.strip(), [values.strip()]
     parts = [part.strip() for part in values.split(",")]
     if len(parts) > 1:
         return name.strip(), [_value(part) for part in parts if part]

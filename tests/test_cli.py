@@ -169,8 +169,15 @@ def test_results_that_are_not_there_are_status_1(tmp_path):
     ],
 )
 def test_settings(text, values):
-    assert cli._setting(text)[1] == values
+    assert cli._setting(text, ())[1] == values
 
 
 def test_help_needs_no_results():
     assert CliRunner().invoke(cli.cli, ["--help"]).exit_code == 0
+
+
+def test_a_label_may_hold_commas_and_colons(tmp_path):
+    label = "rigid, V = 1e12 V_*"
+    ran = call("run", "hard_cases", "--set", f"hard_case={label}", "--output", tmp_path, "--serial")
+    assert ran.returncode == 0, ran.stderr
+    assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
