@@ -100,7 +100,10 @@ def run(
             _compute_missing(plan, mapper, journal, workers, progress)
         except (KeyboardInterrupt, RunError) as error:
             raise _interrupted(plan, output, command, error) from error
-    dataset = _dataset(plan, command)
+    try:
+        dataset = _dataset(plan, command)
+    except Exception as error:
+        raise _unreduced(plan, output, command, error) from error
     if output is not None:
         store.write(dataset, output / f"{study.name}.nc")
         (output / f"{study.name}.partial.nc").unlink(missing_ok=True)
@@ -149,6 +152,17 @@ def _rehearse(plan: Plan) -> None:
         except Exception as error:
             rule = f"does not fit this lattice: {type(error).__name__}: {error}"
             raise InvalidValue("reduction", reduction.name, rule) from error
+
+
+def _unreduced(plan: Plan, output: Path | None, command: str, error: Exception) -> RunError:
+    """The error of a run whose cells are all there but cannot be reduced; the cells are kept."""
+    text = f"{plan.study.name}: cannot be reduced ({type(error).__name__}: {error})"
+    if output is None:
+        return RunError(f"{text}.")
+    path = output / f"{plan.study.name}.unreduced.nc"
+    lattice = assemble(plan.study, plan.scenes, plan.outcomes(), provenance.provenance(command))
+    store.write(lattice, path)
+    return RunError(f"{text}; its cells are in {path}, without reductions.")
 
 
 def _interrupted(plan: Plan, output: Path | None, command: str, error: BaseException) -> RunError:

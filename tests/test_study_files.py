@@ -7,7 +7,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import catalogue
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, RunError
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -124,3 +124,33 @@ def test_a_reduction_that_does_not_fit_is_told_before_anything_is_computed(tmp_p
     with pytest.raises(InvalidValue, match="must be a coordinate along one dimension"):
         rsfstudy.run(written(tmp_path, unfit), output=tmp_path, progress=False)
     assert not list(tmp_path.glob("*.sqlite"))
+
+
+def test_cells_that_cannot_be_reduced_are_kept(tmp_path):
+    """A reduction that fits the empty lattice and fails on the numbers loses nothing."""
+    failing = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+import xarray as xr
+
+from rsfstudy.reduce import Reduction
+
+
+@dataclass(frozen=True)
+class Failing(Reduction):
+    kind: ClassVar[str] = "failing"
+
+    def __call__(self, dataset):
+        if dataset[self.of].notnull().any():
+            raise ZeroDivisionError("on numbers")
+        return xr.Dataset()
+
+"""
+    unfit = DECLARATION.replace(
+        "measure=", 'reductions=[Failing(name="s", of="critical_displacement")], measure='
+    )
+    with pytest.raises(RunError, match="ZeroDivisionError: on numbers.*without reductions"):
+        rsfstudy.run(written(tmp_path, failing + unfit), output=tmp_path, progress=False, workers=0)
+    kept = rsfstudy.open(tmp_path / "mine.unreduced.nc")
+    assert kept.critical_displacement.notnull().all()
