@@ -37,7 +37,7 @@ def _bars(dataset: xr.Dataset, axes: Axes, name: str, label: str, scale: float) 
             text = f" {value:.4g}" if np.isfinite(value) else " no cycle"
             axes.text(value if value > 0.0 else 0.0, y, text, va="center", fontsize="xx-small")
     axes.set_yticks(at, [f"{c}\n{d}" for c, d in rows], fontsize="xx-small")
-    axes.invert_yaxis()
+    axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.margins(x=0.15)
     axes.set_xlabel(label)
     axes.set_ylabel("Effects")

@@ -32,6 +32,7 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.set_xscale("log")
     axes.set_xlim(_FLOOR, 10.0)
     axes.set_xlabel("Error")
+    axes.legend(fontsize="x-small", loc="lower right")
     return _cases(dataset, axes, "What comes out: measured error and estimate, or status")
 
 
