@@ -13,8 +13,11 @@ EXTENDED = "other unknowns, extrapolation method, 64-bit mantissas (tests/extend
 #: V_0/V_*, by bisection between motions; bisection ends at 1e-18.
 CRITICAL_VELOCITY = 2.633547063232728405
 
-#: The same at k = k_cr.
-AT_CRITICAL_STIFFNESS = 1.999949384410229389
+#: The same at k = (1 + 1e-8) k_cr.
+JUST_ABOVE_CRITICAL_STIFFNESS = 1.9999494063490342617
+
+#: Slowness law, alpha = 0.56, phi = 60 degrees, b/a = e, k = 1.5 k_cr: the paper's ~2361 V_*.
+CRITICAL_VELOCITY_OF_SECTION_4 = 2361.0972350083046758
 
 #: Limit cycles of b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*, T = 5 s: (value, relative uncertainty).
 SLIP_RECURRENCE = (27.39031822963788684, 4e-12)

@@ -134,43 +134,42 @@ number(
     {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e24},
 )
 # at and around the critical stiffness
-for sign in (-1, 1):
-    for off in (1e-8, 1e-3):
-        number(
-            f"k_cr by growth, k = (1 {sign * off:+g}) k_cr",
-            LinearStability(),
-            "critical_stiffness",
-            Scene().critical_stiffness,
-            EXACT,
-            {"stiffness_ratio": 1.0 + sign * off},
-        )
-        number(
-            f"tiny step, k = (1 {sign * off:+g}) k_cr",
-            triggered,
-            "unstable",
-            float(sign < 0),
-            "linear theory: every orbit grows below k_cr, and decays above",
-            {**CONSTANT, "stiffness_ratio": 1.0 + sign * off, "load_velocity_ratio": 1.0 + 1e-3},
-            scale=1.0,
-        )
 number(
-    "critical step, k = (1 + 1e-8) k_cr",
+    "critical step, k = (1 +1e-08) k_cr",
     step,
     "critical_velocity_ratio",
-    known.AT_CRITICAL_STIFFNESS,
-    "that at k_cr: the boundary moves by as much as k",
+    known.JUST_ABOVE_CRITICAL_STIFFNESS,
+    known.EXTENDED,
     {**CONSTANT, "stiffness_ratio": 1.0 + 1e-8},
-    uncertainty=3e-8,
+    scale=known.JUST_ABOVE_CRITICAL_STIFFNESS - 1.0,
 )
+for off in (-1e-3, 1e-3):
+    number(
+        f"tiny step, k = (1 {off:+g}) k_cr",
+        triggered,
+        "unstable",
+        float(off < 0.0),
+        "linear theory: every orbit grows below k_cr, and decays above",
+        {**CONSTANT, "stiffness_ratio": 1.0 + off, "load_velocity_ratio": 1.0 + 1e-3},
+        scale=1.0,
+    )
+# growth and decay of 1e-8 an orbit cannot be told apart at rtol 1e-7, and the status says so
+for off in (-1e-8, 1e-8):
+    ends(
+        f"tiny step, k = (1 {off:+g}) k_cr",
+        triggered,
+        Status.UNVERIFIED,
+        {**CONSTANT, "stiffness_ratio": 1.0 + off, "load_velocity_ratio": 1.0 + 1e-3},
+    )
 # every step is unstable there, by a growth of 1e-8 an orbit that no motion can show
 ends(
-    "critical step, k = (1 - 1e-8) k_cr",
+    "critical step, k = (1 -1e-08) k_cr",
     step,
     Status.UNVERIFIED,
     {**CONSTANT, "stiffness_ratio": 1.0 - 1e-8},
 )
 ends(
-    "any step, k = (1 - 1e-3) k_cr",
+    "any step, k = (1 -0.001) k_cr",
     step,
     Status.UNSTABLE_AT_ANY_STEP,
     {**CONSTANT, "stiffness_ratio": 1.0 - 1e-3},
@@ -250,10 +249,9 @@ number(
     "2361-fold step",
     step,
     "critical_velocity_ratio",
-    2361.10,
-    "printed in the paper as ~2361, section 4; last digit by a prototype",
+    known.CRITICAL_VELOCITY_OF_SECTION_4,
+    known.EXTENDED,
     {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5},
-    uncertainty=3e-6,
 )
 ends(
     "mass against every stiffness",
@@ -277,19 +275,6 @@ study = Study(
     claims=[
         Claim(
             id="H1",
-            statement=f"{label}: as it must be",
-            source="hard_cases",
-            variable="status",
-            where={"hard_case": label},
-            published=float(Status.OK),
-            tolerance=0.0,
-            reason="ok: the number within its own error estimate, or the status that must come out",
-        )
-        for label in CASES
-    ]
-    + [
-        Claim(
-            id="H2",
             statement=f"{label}: error below the 1e-7 asked for, switch between regimes included",
             source=known.EXTENDED,
             variable="measured_error",

@@ -50,7 +50,7 @@ def test_a_wrong_status_is_unverified():
 DEAR = {
     "200-fold step, peak at 10^87 V_*": "two loops from 10^-85 to 10^87 V_*",
     "tiny step, k = (1 -0.001) k_cr": "a growth of 1e-3 an orbit, followed up to the norm",
-    "critical step, k = (1 - 1e-8) k_cr": "a growth that no motion can show is sought by motions",
+    "critical step, k = (1 -1e-08) k_cr": "a growth that no motion can show is sought by motions",
     "phi = atan(mu_*) + 0.01": "k_cr falls so steeply that only motions tell the boundary",
     "norm beyond the inertial peak": "ruptures up to the largest step, none of which is enough",
 }

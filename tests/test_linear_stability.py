@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene, steady_state
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.equations import inertial, strength_of
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.linear_stability import LinearStability, growth
 from rsfstudy.status import Status
 
 
@@ -109,3 +109,16 @@ def test_where_mass_leaves_no_stable_stiffness():
     faster = LinearStability()(scene.with_(load_velocity_ratio=100.0), Accuracy())
     assert faster.status is Status.UNSTABLE_AT_ANY_STIFFNESS
     assert "direct effect" in faster.message
+
+
+@pytest.mark.parametrize("off", [-1e-3, -1e-8, 1e-8, 1e-3])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
+def test_growth_close_to_critical_stiffness(off, effects):
+    """At K = K_cr (1 + d), a p**2 + (E K - (b-a)) p + D K = 0 per time D_c/V_*: twice the growth
+    rate is -(b-a) d/a, and half of that per slip and load point displacement.
+    """
+    scene = Scene(stiffness_ratio=1.0 + off, **effects)
+    expected = -0.5 * (scene.b_over_a - 1.0) * off
+    # central differences are right to 6e-10 of rates of order one
+    assert growth(scene, 0.0, 0.0) == pytest.approx(expected, rel=1e-5, abs=1e-9)
+    assert growth(scene, 0.0, 0.0) * off < 0.0
