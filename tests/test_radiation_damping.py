@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from conftest import follow
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -31,6 +31,7 @@ IMPEDANCE = Scene().stiffness * Scene().inertial_time
     alpha=st.floats(0.0, 1.0),
     constant=st.booleans(),
 )
+@example(spring=1.0, psi=0.0, log_damping=0.0, alpha=0.0, constant=False)
 def test_friction_and_radiation_balance_the_spring(spring, psi, log_damping, alpha, constant):
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
     damping, strength = math.exp(log_damping), strength_of(scene)

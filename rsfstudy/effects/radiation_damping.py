@@ -37,7 +37,7 @@ def balanced_rate(
 
     Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
     V and the right side grows, so there is one root, which bisection keeps in its bracket where
-    Newton's steps would leave it.
+    Newton's steps would leave it or shrink too slowly.
 
     Parameters
     ----------
@@ -56,6 +56,7 @@ def balanced_rate(
     low, high = -math.inf, (strength(spring + damping)[0] - psi) / a
     # a good guess where radiation takes most of the stress
     x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
+    before = math.inf
     for _ in range(_MOST_ITERATIONS):
         friction = spring - radiated(x, damping)
         value, slope, _shift = strength(friction)
@@ -64,7 +65,14 @@ def balanced_rate(
         change = missing / (a + slope * damping * math.exp(x))
         if abs(change) <= _SETTLED * (1.0 + abs(x)):
             break
-        x = x + change if low < x + change <= high else 0.5 * (max(low, high - 1e3) + high)
+        # where normal stress is nearly lost, slopes are so steep that Newton's steps lead nowhere
+        slow = abs(change) > 0.5 * abs(before)
+        before = change
+        if slow or not low < x + change <= high:
+            before = math.inf
+            x = 0.5 * (max(low, high - 1e3) + high)
+        else:
+            x += change
     return x, spring - radiated(x, damping)
 
 
