@@ -11,7 +11,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import check, critical_step, limit_cycle, open, run, studies, to_si
+    from rsfstudy.api import (
+        cell,
+        check,
+        critical_step,
+        limit_cycle,
+        open,
+        rerun,
+        run,
+        studies,
+        to_si,
+    )
     from rsfstudy.scene import Scene
     from rsfstudy.study import Axis, Study
     from rsfstudy.trajectory import simulate
@@ -22,6 +32,8 @@ _HOMES = {
     "Study": "study",
     "Axis": "study",
     "run": "api",
+    "rerun": "api",
+    "cell": "api",
     "open": "api",
     "check": "api",
     "studies": "api",
@@ -35,10 +47,12 @@ __all__ = [
     "Axis",
     "Scene",
     "Study",
+    "cell",
     "check",
     "critical_step",
     "limit_cycle",
     "open",
+    "rerun",
     "run",
     "simulate",
     "studies",

@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.progress import TimeRemainingColumn as Remaining
+from rich import progress as bars
 
-from rsfstudy import catalogue, runner, store
+from rsfstudy import catalogue, restore, runner, store
+from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, serial
 from rsfstudy.claims import Claim, verdicts
+from rsfstudy.comparison import cell_number, compared
 from rsfstudy.core.accuracy import DEFAULT_RTOL, Accuracy
-from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.runner import Keeping, Progress
 from rsfstudy.scene import Scene
 from rsfstudy.study import Study
 from rsfstudy.vocabulary import quantity
-from rsfstudy.workers import Mapper, on_client, on_local_cluster, serial
+from rsfstudy.workers import on_client, on_local_cluster
 
 OUTPUT = Path("outputs")
 
@@ -44,6 +46,10 @@ def run(
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
+    time_limit: float = DEFAULT_TIME_LIMIT,
+    keep_going: bool = False,
+    despite_failures: bool = False,
+    format: str = "netcdf",
     command: str = "rsfstudy.run",
     **overrides: Any,
 ) -> xr.Dataset:
@@ -65,6 +71,14 @@ def run(
         Compute every cell anew.
     rtol : float, optional
         Accuracy of the cells.
+    time_limit : float
+        Time in s after which a worker gives a cell up; it does not bind in this process.
+    keep_going : bool
+        Go on where the first cells all fail, instead of stopping early.
+    despite_failures : bool
+        Reduce what there is where cells failed; the results say so.
+    format : {"netcdf", "zarr"}
+        One NetCDF file, or a Zarr store written in pieces, for lattices that do not fit in memory.
     command : str
         What to note in the history.
     **overrides
@@ -83,51 +97,83 @@ def run(
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
+    declared = declaration(study, rtol, overrides)
+    keeping = Keeping(
+        output=None if output is None else Path(output),
+        format=format,
+        fresh=fresh,
+        keep_going=keep_going,
+        despite_failures=despite_failures,
+        command=command,
+        declared_in="" if isinstance(study, Study) or Path(study).suffix != ".py" else str(study),
+    )
+    return _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
+
+
+def declaration(
+    study: str | Path | Study, rtol: float | None, overrides: Mapping[str, Any]
+) -> Study:
+    """A study with another accuracy and other values, checked."""
     declared = study if isinstance(study, Study) else catalogue.load(str(study))
     if rtol is not None:
         declared = replace(declared, accuracy=replace(declared.accuracy, rtol=rtol))
-    if overrides:
-        declared = declared.with_(**overrides)
-    if workers < 0:
-        raise InvalidValue("workers", workers, "must be 0 or more")
-    with _bar(declared.name, progress) as told:
-        return runner.run(
-            declared,
-            _mapper(workers, client),
-            output=None if output is None else Path(output),
-            fresh=fresh,
-            workers=max(1, workers),
-            progress=told,
-            command=command,
-        )
+    return declared.with_(**overrides) if overrides else declared
 
 
-def _mapper(processes: int, client: Any) -> Mapper:
-    if client is not None:
-        return on_client(client)
-    return on_local_cluster(processes) if processes > 0 else serial
+@dataclass(frozen=True)
+class _Workers:
+    """Where cells are computed, and whether a bar shows how far it is."""
+
+    processes: int = 2
+    client: Any = None
+    time_limit: float = DEFAULT_TIME_LIMIT
+    progress: bool = True
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
+        if not whole or self.processes < 0:
+            raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
+        if not self.time_limit > 0.0:
+            raise InvalidValue("time_limit", self.time_limit, "must be greater than 0")
+
+    def mapper(self) -> Mapper:
+        """What computes batches of cells there."""
+        if self.client is not None:
+            return on_client(self.client)
+        return on_local_cluster(self.processes) if self.processes > 0 else serial
+
+
+def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
+    task = Task(study.measure, study.accuracy, workers.time_limit)
+    ready = runner.Run(study, keeping, task, max(1, workers.processes))
+    with _bar(study.name, workers.progress) as told:
+        return ready(workers.mapper(), told)
 
 
 @contextlib.contextmanager
-def _bar(name: str, show: bool) -> Iterator[runner.Progress]:
+def _bar(name: str, show: bool) -> Iterator[Progress]:
     if not show:
         yield lambda _done, _all: None
         return
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("cells"),
-        TimeElapsedColumn(),
-        Remaining(),
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TextColumn("cells"),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
     )
-    with Progress(*columns) as bar:
-        task = bar.add_task(name, total=None)
+    bar = bars.Progress(*columns)
+    task = bar.add_task(name, total=None)
 
-        def told(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
+    def told(done: int, total: int) -> None:
+        bar.start()  # not before there is something to tell
+        bar.update(task, completed=done, total=total)
 
+    try:
         yield told
+    finally:
+        bar.stop()
 
 
 def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
@@ -141,7 +187,7 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     path = Path(name)
     if path.suffix == ".py":
         name = catalogue.load(str(path)).name
-    return store.read(path if path.suffix == ".nc" else Path(output) / f"{name}.nc")
+    return store.read(path if path.suffix in (".nc", ".zarr") else Path(output) / f"{name}.nc")
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
@@ -155,9 +201,104 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     """
     results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
     declared = store.declaration(results)
-    return verdicts(
-        results, [Claim(**claim) for claim in declared["claims"]], declared["overrides"]
+    try:
+        claims = [Claim(**claim) for claim in declared["claims"]]
+        overrides = dict(declared["overrides"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"the study declaration is damaged: {error}") from error
+    return verdicts(results, claims, overrides)
+
+
+def rerun(
+    file: str | Path,
+    *,
+    study: str | Path | None = None,
+    workers: int = 2,
+    client: Any = None,
+    output: str | Path | None = None,
+    progress: bool = True,
+) -> pd.DataFrame:
+    """Compute a results file anew from what it says of itself, and hold the numbers against it.
+
+    Parameters
+    ----------
+    file : path
+        A results file.
+    study : path, optional
+        The file that declares the study, where its measure is not part of rsfstudy; code is never
+        taken from a results file.
+    workers, client, output, progress
+        As in `run`; by default nothing is written.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a variable: how many values are identical, how many there are, the largest
+        difference. In its ``attrs``, under ``differs``, what decides a number and is not as it was.
+
+    Raises
+    ------
+    InvalidValue
+        Where the study's measure or a reduction is not part of rsfstudy.
+    DataError, RunError
+        Where the file is damaged, or the run cannot finish.
+    """
+    theirs = open(file)
+    declared = study_of(theirs, study)
+    keeping = Keeping(
+        output=None if output is None else Path(output),
+        fresh=True,
+        keep_going=True,
+        despite_failures="reduced_despite" in theirs.attrs,
+        command=f"rsfstudy.rerun {file}",
+        declared_in="" if study is None else str(study),
     )
+    ours = _computed(declared, keeping, _Workers(workers, client, progress=progress))
+    return compared(theirs, ours)
+
+
+def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
+    """The study that made a dataset: from its own declaration, or, where that does not suffice,
+    from the file that declares it.
+    """
+    declared = store.declaration(results)
+    if file is None:
+        return restore.study(declared)
+    named = catalogue.load(str(file))
+    return replace(
+        named.with_(**declared["overrides"]) if declared["overrides"] else named,
+        accuracy=restore.accuracy(declared["accuracy"]),
+    )
+
+
+def cell(
+    file: str | Path, *, study: str | Path | None = None, **place: Any
+) -> tuple[Scene, Outcome]:
+    """Compute one cell of a results file alone, in this process, letting it raise what it raises.
+
+    Parameters
+    ----------
+    file : path
+        A results file.
+    study : path, optional
+        The file that declares the study, where its measure is not part of rsfstudy.
+    **place
+        Where the cell is: the value of each dimension of the lattice, or its label.
+
+    Returns
+    -------
+    Scene, Outcome
+
+    Raises
+    ------
+    InvalidValue
+        Where there is no such cell.
+    """
+    results = open(file)
+    number = cell_number(results, place)
+    declared = study_of(results, study)
+    scene = declared.scene(number)
+    return scene, declared.measure(scene, declared.accuracy)
 
 
 def critical_step(

@@ -1,11 +1,12 @@
-"""The command line: list, show, run, check and plot named studies."""
+"""The command line: list, show, run, rerun, check and plot studies and their results."""
 
 from __future__ import annotations
 
 import contextlib
+import math
+import shlex
 import sys
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,19 @@ import xarray as xr
 from rich.console import Console
 from rich.table import Table
 
-from rsfstudy import api, catalogue, runner, terminal
-from rsfstudy.core.accuracy import DEFAULT_RTOL
+from rsfstudy import api, catalogue, terminal
+from rsfstudy.cells import DEFAULT_TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RsfStudyError
+from rsfstudy.runner import FORMATS
 from rsfstudy.study import Study
 from rsfstudy.terminal import FAILED, OK
 from rsfstudy.workers import existing_cluster
 
 WRONG_USAGE = 2
+_SPACED = "must read start:stop:count, two finite numbers and a count"
+_MOST_POINTS = 1_000_000
+_ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
+RESULTS = (".nc", ".zarr")
 
 _stderr = Console(stderr=True)
 
@@ -41,6 +47,19 @@ _set = click.option(
     metavar="AXIS=VALUES",
     help="Other values: a comma list, or start:stop:count.",
 )
+
+
+_rtol = click.option("--rtol", type=float, help="Accuracy of each cell.")
+_workers = click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=2,
+    show_default=True,
+    help="Worker processes of this machine.",
+)
+_serial = click.option("--serial", is_flag=True, help="Compute in this process.")
+_scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
+_quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -79,32 +98,15 @@ def list_studies() -> None:
 @cli.command()
 @click.argument("name")
 @_set
-def show(name: str, settings: tuple[str, ...]) -> None:
-    """Show the declaration of a study, without running it."""
-    study = _declared(name, settings)
-    scenes = list(study.scenes())
-    terminal.console.print(f"[bold]{study.name}[/bold]: {study.title}\n")
-    if study.summary:
-        terminal.console.print(study.summary + "\n")
-    table = Table("", "", box=None, show_header=False)
-    for axis in study.axes:
-        points = axis.labels or [terminal.short(row[axis.dimension]) for row in axis.rows]
-        table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
-    varied = {field for axis in study.axes for field in axis.fields}
-    fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    table.add_row("fixed", ", ".join(f"{n} = {terminal.short(v)}" for n, v in fixed.items()))
-    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in study.measure.describe().items()))
-    table.add_row("gives", ", ".join(study.measure.variables))
-    table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
-    table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
-    work, seconds = runner.estimated_cost(study)
-    table.add_row("cells", f"{study.size}, of which {len(set(scenes))} differ")
-    table.add_row(
-        "cost",
-        f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol "
-        f"{study.accuracy.rtol:g}",
-    )
-    terminal.console.print(table)
+@_rtol
+def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
+    """Show the declaration of a study, without running it; or what is in a results file, and how
+    to reproduce each cell that failed.
+    """
+    if Path(name).suffix in RESULTS:
+        return terminal.results(api.open(name), name)
+    terminal.declaration(_declared(catalogue.load(name), settings, rtol))
+    return OK
 
 
 @cli.command()
@@ -112,12 +114,28 @@ def show(name: str, settings: tuple[str, ...]) -> None:
 @_all
 @_set
 @_output
-@click.option("--workers", type=click.IntRange(1), default=2, show_default=True)
-@click.option("--serial", is_flag=True, help="Compute in this process.")
-@click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
-@click.option("--rtol", type=float, help="Accuracy of each cell.")
+@_workers
+@_serial
+@_scheduler
+@_rtol
+@click.option(
+    "--time-limit",
+    type=float,
+    default=DEFAULT_TIME_LIMIT,
+    show_default=True,
+    help="Seconds after which a worker gives a cell up.",
+)
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
-@click.option("--quiet", is_flag=True, help="No progress bar.")
+@click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")
+@click.option("--despite-failures", is_flag=True, help="Reduce what there is where cells failed.")
+@click.option(
+    "--format",
+    type=click.Choice(FORMATS),
+    default="netcdf",
+    show_default=True,
+    help="One NetCDF file, or a Zarr store written in pieces.",
+)
+@_quiet
 def run(
     name: str | None,
     every: bool,
@@ -127,31 +145,80 @@ def run(
     serial: bool,
     scheduler: str | None,
     rtol: float | None,
-    fresh: bool,
     quiet: bool,
+    **choices: Any,
 ) -> int:
     """Run a study: OUTPUT/NAME.nc, OUTPUT/NAME.png, its reductions and its claims."""
-    if serial and scheduler:
-        raise click.UsageError("--serial and --scheduler exclude each other")
     status = OK
-    with _client(scheduler) as client:
-        for named in _named(name, every):
-            study = _overridden(named, settings)
+    with _client(scheduler, serial) as client:
+        for named in _results(name, every):
+            study = _declared(catalogue.load(named), settings, rtol)
             if rtol is not None:
-                study = replace(study, accuracy=replace(study.accuracy, rtol=rtol))
-                _announce(study)
+                terminal.announce(study)
             dataset = api.run(
-                study,
+                named,
                 workers=0 if serial else workers,
                 client=client,
                 output=output,
-                fresh=fresh,
                 progress=not quiet,
-                command=runner.command_line(),
+                command=shlex.join(["rsfstudy", *sys.argv[1:]]),
+                rtol=rtol,
+                **choices,
+                **_overrides(catalogue.load(named), settings),
             )
-            _draw(dataset, output / f"{study.name}.png")
-            status = max(status, terminal.report(dataset, study.name, output))
+            files = [output / f"{study.name}.{_ENDINGS[choices['format']]}"]
+            files += _drawn(dataset, output / f"{study.name}.png")
+            status = max(status, terminal.report(dataset, study.name, files))
     return status
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--cell",
+    "place",
+    multiple=True,
+    metavar="AXIS=VALUE",
+    help="Only this cell, in this process, failing as it fails.",
+)
+@click.option(
+    "--study",
+    type=click.Path(path_type=Path),
+    help="File that declares the study, if its measure is its own.",
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Directory to keep the new results in.",
+)
+@_workers
+@_serial
+@_scheduler
+@_quiet
+def rerun(
+    file: Path,
+    place: tuple[str, ...],
+    study: Path | None,
+    output: Path | None,
+    workers: int,
+    serial: bool,
+    scheduler: str | None,
+    quiet: bool,
+) -> int:
+    """Compute a results file anew from what it says of itself, and compare every number."""
+    if place:
+        where = dict(_setting(text, ()) for text in place)
+        return terminal.outcome(*api.cell(file, study=study, **where))
+    with _client(scheduler, serial) as client:
+        table = api.rerun(
+            file,
+            study=study,
+            workers=0 if serial else workers,
+            client=client,
+            output=output,
+            progress=not quiet,
+        )
+    return terminal.agreement(table)
 
 
 @cli.command()
@@ -181,16 +248,14 @@ def plot(name: str | None, every: bool, output: Path) -> None:
     """Draw the figure of a named study's results, or of a file, beside it."""
     for what in _results(name, every):
         dataset = api.open(what, output)
-        path = Path(what).with_suffix(".png") if what.endswith(".nc") else output / f"{what}.png"
-        _draw(dataset, path)
-        terminal.console.print(f"{path}", highlight=False)
+        named = Path(what)
+        beside = named if named.suffix in RESULTS else output / f"{dataset.attrs['id']}.png"
+        path = beside.with_suffix(".png")
+        for file in _drawn(dataset, path):
+            terminal.console.print(f"{file}", highlight=False)
 
 
 # ---- what was asked for ---------------------------------------------------------------------
-
-
-def _named(name: str | None, every: bool) -> list[Study]:
-    return [catalogue.load(what) for what in _results(name, every)]
 
 
 def _results(name: str | None, every: bool) -> list[str]:
@@ -199,14 +264,13 @@ def _results(name: str | None, every: bool) -> list[str]:
     return list(catalogue.names()) if name is None else [name]
 
 
-def _declared(name: str, settings: tuple[str, ...]) -> Study:
-    return _overridden(catalogue.load(name), settings)
+def _declared(study: Study, settings: tuple[str, ...], rtol: float | None) -> Study:
+    return api.declaration(study, rtol, _overrides(study, settings))
 
 
-def _overridden(study: Study, settings: tuple[str, ...]) -> Study:
+def _overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     labels = {label for axis in study.axes for label in axis.labels or ()}
-    overrides = dict(_setting(text, labels) for text in settings)
-    return study.with_(**overrides) if overrides else study
+    return dict(_setting(text, labels) for text in settings)
 
 
 def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
@@ -220,28 +284,21 @@ def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     if len(parts) > 1:
         return name.strip(), [_value(part) for part in parts if part]
     if values.count(":") == 2:
-        start, stop, count = values.split(":")
-        try:
-            spaced = np.linspace(float(start), float(stop), int(count))
-        except ValueError as error:
-            raise InvalidValue(
-                "--set", text, "must read start:stop:count, two numbers and a count"
-            ) from error
-        return name.strip(), spaced.tolist()
+        return name.strip(), _spaced(text, *values.split(":"))
     if ":" in values:
-        raise InvalidValue("--set", text, "must read start:stop:count, two numbers and a count")
+        raise InvalidValue("--set", text, _SPACED)
     return name.strip(), _value(parts[0])
 
 
-def _announce(study: Study) -> None:
-    """Say what an accuracy will cost, before it does."""
-    work, seconds = runner.estimated_cost(study)
-    terminal.console.print(
-        f"{study.name} at rtol {study.accuracy.rtol:g}: {study.accuracy.relative_work:.2g} times "
-        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, {seconds:.0f} s on "
-        "one core",
-        highlight=False,
-    )
+def _spaced(text: str, start: str, stop: str, count: str) -> list[float]:
+    try:
+        first, last, points = float(start), float(stop), int(count)
+    except ValueError as error:
+        raise InvalidValue("--set", text, _SPACED) from error
+    if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
+        raise InvalidValue("--set", text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
+    spaced: list[float] = np.linspace(first, last, points).tolist()
+    return spaced
 
 
 def _value(text: str) -> Any:
@@ -255,7 +312,9 @@ def _value(text: str) -> Any:
 
 
 @contextlib.contextmanager
-def _client(scheduler: str | None) -> Iterator[Any]:
+def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
+    if serial and scheduler:
+        raise click.UsageError("--serial and --scheduler exclude each other")
     if scheduler is None:
         yield None
         return
@@ -263,10 +322,16 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         yield client
 
 
-def _draw(dataset: xr.Dataset, path: Path) -> None:
+def _drawn(dataset: xr.Dataset, path: Path) -> list[Path]:
+    """The figure, if it can be drawn; the results are there already."""
     from rsfstudy import plots
 
-    plots.save(dataset, path)
+    try:
+        plots.save(dataset, path)
+    except (OSError, RsfStudyError) as error:
+        _stderr.print(f"no figure: {error}", markup=False, highlight=False)
+        return []
+    return [path]
 
 
 if __name__ == "__main__":

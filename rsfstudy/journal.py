@@ -7,12 +7,13 @@ fingerprint is refused.
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
+import math
 import sqlite3
 import textwrap
-from collections.abc import Iterable, Mapping
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,20 +21,64 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import DataError
-from rsfstudy.measures import Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
 Finished = tuple[Outcome, float]
 
+#: Raised when the tables change.
+_FORMAT = 2
+_TABLES = """
+CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS cells (
+    key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
+    checksum INTEGER);
+"""
+_AT_A_TIME = 500
+_REMEDY = "Choose another --output, or start over with --fresh."
 
-def cell_key(scene: Scene) -> str:
-    """Name of a cell: a digest of the exact values of its scene."""
-    exact = {
-        name: value.hex() if isinstance(value, float) else value
-        for name, value in scene.as_dict().items()
-    }
-    return hashlib.sha256(json.dumps(exact, sort_keys=True).encode()).hexdigest()
+
+class Layout:
+    """Where the numbers of a measure stand in one row of float64."""
+
+    def __init__(self, measure: Measure) -> None:
+        sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
+        self.shapes = {n: tuple(sizes[d] for d in dims) for n, dims in measure.variables.items()}
+        stops = np.cumsum([math.prod(shape) for shape in self.shapes.values()])
+        self.width = int(stops[-1])
+        starts = [0, *stops[:-1]]
+        self.places = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
+
+    def packed(self, values: Mapping[str, Any]) -> bytes:
+        """Numbers as bytes; those that are missing become NaN."""
+        row = np.full(self.width, np.nan, dtype="<f8")
+        for name, value in values.items():
+            row[self.places[name]] = np.ravel(value)
+        return row.tobytes()
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What is known of some cells: status, message, right-hand sides, wall time, and one row of
+    numbers each.
+    """
+
+    status: np.ndarray
+    message: np.ndarray
+    work: np.ndarray
+    seconds: np.ndarray
+    numbers: np.ndarray
+
+    @classmethod
+    def pending(cls, cells: int, width: int) -> Columns:
+        """Cells of which nothing is known."""
+        return cls(
+            np.full(cells, int(Status.PENDING), dtype=np.int8),
+            np.full(cells, "", dtype=object),
+            np.zeros(cells, dtype=np.int32),
+            np.full(cells, np.nan),
+            np.full((cells, width), np.nan),
+        )
 
 
 class Journal:
@@ -41,10 +86,12 @@ class Journal:
 
     Parameters
     ----------
-    path : Path
-        The SQLite file.
+    path : Path or None
+        The SQLite file; None keeps them in memory.
     fingerprint : mapping
         All that decides the numbers of a cell but its scene, as plain data.
+    layout : Layout
+        The numbers of a cell.
     fresh : bool
         Forget what the file holds.
 
@@ -54,32 +101,35 @@ class Journal:
         If the file cannot be opened, or its fingerprint differs; the text says where.
     """
 
-    def __init__(self, path: Path, fingerprint: Mapping[str, Any], *, fresh: bool = False) -> None:
-        self._path = path
-        wanted = json.dumps(fingerprint, sort_keys=True)
+    def __init__(
+        self,
+        path: Path | None,
+        fingerprint: Mapping[str, Any],
+        layout: Layout,
+        *,
+        fresh: bool = False,
+    ) -> None:
+        self._path = path or Path("memory")
+        self._layout = layout
+        ours = {**fingerprint, "journal": _FORMAT}
+        wanted = json.dumps(ours, sort_keys=True)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if fresh:
-                path.unlink(missing_ok=True)
-            self._db = sqlite3.connect(path)
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if fresh:
+                    forget(path)
+            self._db = sqlite3.connect(":memory:" if path is None else path)
             with self._db:
-                self._db.execute("CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL)")
-                self._db.execute(
-                    "CREATE TABLE IF NOT EXISTS cells "
-                    "(key TEXT PRIMARY KEY, status TEXT, message TEXT, work INTEGER, "
-                    "seconds REAL, numbers BLOB)"
-                )
+                self._db.executescript(_TABLES)
                 row = self._db.execute("SELECT json FROM fingerprint").fetchone()
                 if row is None:
                     self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
         except (OSError, sqlite3.Error) as error:
-            raise DataError(
-                f"cannot use {path}: {error}. Choose another --output, or start over with --fresh."
-            ) from error
+            raise DataError(f"cannot use {self._path}: {error}. {_REMEDY}") from error
         if row is not None and row[0] != wanted:
             self._db.close()
             raise DataError(
-                f"{path} holds cells computed differently: {_differences(row[0], fingerprint)}. "
+                f"{self._path} holds cells computed differently: {_differences(row[0], ours)}. "
                 "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
                 "another --output (output=)."
             )
@@ -95,22 +145,7 @@ class Journal:
     ) -> None:
         self._db.close()
 
-    def finished(self, keys: Iterable[str]) -> dict[str, Finished]:
-        """Those of the cells that are finished; failures are left out, so that they are tried
-        again.
-        """
-        found: dict[str, Finished] = {}
-        for key in keys:
-            row = self._db.execute(
-                "SELECT status, message, work, seconds, numbers FROM cells WHERE key = ?", (key,)
-            ).fetchone()
-            if row is not None and Status[row[0]].is_answer:
-                with np.load(io.BytesIO(row[4]), allow_pickle=False) as numbers:
-                    values = {name: _scalar(numbers[name]) for name in numbers.files}
-                found[key] = (Outcome(Status[row[0]], values, row[1], row[2]), row[3])
-        return found
-
-    def add(self, cells: Iterable[tuple[str, Finished]]) -> None:
+    def add(self, cells: Iterable[tuple[bytes, Finished]]) -> None:
         """Record finished cells, all or none.
 
         Raises
@@ -120,20 +155,77 @@ class Journal:
         """
         rows = []
         for key, (outcome, seconds) in cells:
-            numbers = io.BytesIO()
-            arrays: dict[str, Any] = {name: np.asarray(v) for name, v in outcome.values.items()}
-            np.savez(numbers, **arrays)
-            status, work = outcome.status.name, outcome.rhs_evaluations
-            rows.append((key, status, outcome.message, work, seconds, numbers.getvalue()))
+            numbers = self._layout.packed(outcome.values)
+            row = (outcome.status.name, outcome.message, outcome.rhs_evaluations, seconds, numbers)
+            rows.append((key, *row, _checksum(row)))
         try:
             with self._db:
-                self._db.executemany("INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?)", rows)
+                self._db.executemany(
+                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+                )
         except sqlite3.Error as error:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
+    def answered(self, keys: np.ndarray) -> np.ndarray:
+        """Whether each cell has an answer; failures have none, so that they are tried again."""
+        answers = {s.name for s in Status if s.is_answer}
+        found = np.zeros(len(keys), dtype=bool)
+        for start, rows in self._rows(keys, "status"):
+            for place, key in enumerate(keys[start : start + _AT_A_TIME]):
+                found[start + place] = rows.get(key.tobytes(), ("",))[0] in answers
+        return found
 
-def _scalar(values: np.ndarray) -> float | np.ndarray:
-    return float(values) if values.ndim == 0 else values
+    def read(self, keys: np.ndarray) -> Columns:
+        """What is known of some cells, in this order.
+
+        Raises
+        ------
+        DataError
+            If a row is not what was written.
+        """
+        columns = Columns.pending(len(keys), self._layout.width)
+        what = "status, message, work, seconds, numbers, checksum"
+        for start, rows in self._rows(keys, what):
+            for cell, key in enumerate(keys[start : start + _AT_A_TIME], start):
+                row = rows.get(key.tobytes())
+                if row is None:
+                    continue
+                *known, checksum = row
+                if _checksum(known) != checksum:
+                    raise DataError(
+                        f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
+                    )
+                status, message, work, seconds, numbers = known
+                columns.status[cell] = Status[status]
+                columns.message[cell], columns.work[cell] = message, work
+                columns.seconds[cell] = math.nan if seconds is None else seconds
+                columns.numbers[cell] = np.frombuffer(numbers, dtype="<f8")
+        return columns
+
+    def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[int, dict[bytes, Any]]]:
+        """Rows by key, for some keys at a time, with the place where those begin."""
+        for start in range(0, len(keys), _AT_A_TIME):
+            wanted = {key.tobytes() for key in keys[start : start + _AT_A_TIME]}
+            marks = ", ".join("?" * len(wanted))
+            try:
+                rows = self._db.execute(
+                    f"SELECT key, {what} FROM cells WHERE key IN ({marks})", list(wanted)
+                ).fetchall()
+            except sqlite3.Error as error:
+                raise DataError(f"{self._path} is damaged: {error}. {_REMEDY}") from error
+            yield start, {key: row for key, *row in rows}
+
+
+def forget(path: Path) -> None:
+    """Remove a journal, and what SQLite left beside it of a write that was cut short."""
+    for file in (path, path.with_name(f"{path.name}-journal")):
+        file.unlink(missing_ok=True)
+
+
+def _checksum(row: Iterable[Any]) -> int:
+    status, message, work, seconds, numbers = row
+    known = math.nan if seconds is None else seconds
+    return zlib.crc32(f"{status}\0{message}\0{work}\0{known!r}\0".encode() + bytes(numbers))
 
 
 def _brief(value: object) -> str:
@@ -142,7 +234,10 @@ def _brief(value: object) -> str:
 
 
 def _differences(theirs: str, ours: Mapping[str, Any]) -> str:
-    before = json.loads(theirs)
+    try:
+        before = dict(json.loads(theirs))
+    except ValueError:
+        return "its fingerprint is damaged"
     return "; ".join(
         f"{name}: {_brief(before.get(name))} there, {_brief(ours.get(name))} now"
         for name in sorted({*before, *ours})

@@ -1,69 +1,96 @@
-"""From outcomes of cells to one self-describing dataset."""
+"""From what is known of the cells to one self-describing dataset."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.measures import Outcome
-from rsfstudy.scene import FIELDS, Scene
+from rsfstudy.journal import Columns, Layout
+from rsfstudy.scene import FIELDS
 from rsfstudy.status import Status
 from rsfstudy.study import Study
-from rsfstudy.vocabulary import DERIVED, quantity
+from rsfstudy.vocabulary import DERIVED, coverage, quantity
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
+_COMMENT = (
+    "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
+    "V_*; the attribute scale of a variable says which."
+)
+#: What only the one who runs a study can say, in the environment: RSFSTUDY_LICENSE and so on.
+_CREDITS = ("creator_name", "creator_email", "institution", "license", "acknowledgement")
 
 
-def assemble(
-    study: Study,
-    scenes: Sequence[Scene],
-    outcomes: Mapping[int, tuple[Outcome, float]],
-    provenance: Mapping[str, Any],
-) -> xr.Dataset:
+def assemble(study: Study, columns: Columns, provenance: Mapping[str, Any]) -> xr.Dataset:
     """The lattice of a study.
 
     Parameters
     ----------
     study : Study
-    scenes : sequence of Scene
-        The scene of each cell, in row-major order.
-    outcomes : mapping of int to (Outcome, float)
-        Outcome and wall time in s by cell number; cells that are missing are `pending`.
+    columns : Columns
+        What is known of each cell, in row-major order.
     provenance : mapping
         What else decided the numbers, as plain data.
     """
-    dataset = xr.Dataset(coords=_coordinates(study, scenes))
-    dims, shape = study.dimensions, study.shape
+    dataset = xr.Dataset(variables(study, columns, study.shape), coordinates(study))
+    return dataset.assign_attrs(attributes(study, _known(columns), provenance))
+
+
+def _known(columns: Columns) -> int:
+    return int((columns.status != int(Status.PENDING)).sum())
+
+
+def variables(
+    study: Study, columns: Columns, shape: tuple[int, ...]
+) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """Variables of some cells: those of the measure, and how each cell ended.
+
+    Parameters
+    ----------
+    study : Study
+    columns : Columns
+        What is known of the cells, in row-major order.
+    shape : tuple of int
+        Lengths of the dimensions the cells fill.
+    """
+    layout, dims = Layout(study.measure), study.dimensions
+    found = {}
     for name, inner in study.measure.variables.items():
-        inner_shape = tuple(len(study.measure.inner_coordinates[d]) for d in inner)
-        values = np.full((study.size, *inner_shape), np.nan)
-        for cell, (outcome, _wall) in outcomes.items():
-            values[cell] = outcome.values.get(name, np.nan)
-        dataset[name] = ((*dims, *inner), values.reshape(*shape, *inner_shape), _about(name))
-    for name, values in _bookkeeping(study.size, outcomes).items():
-        dataset[name] = (dims, values.reshape(shape), _about(name))
-    dataset["status"].attrs |= {
-        "flag_values": np.array([int(s) for s in Status], dtype=np.int8),
-        "flag_meanings": " ".join(s.label for s in Status),
-        "comment": "; ".join(f"{s.label}: {s.meaning}" for s in Status),
+        values = columns.numbers[:, layout.places[name]].reshape(shape + layout.shapes[name])
+        found[name] = ((*dims, *inner), values, _about(name))
+    kept = {
+        "status": columns.status,
+        "rhs_evaluations": columns.work,
+        "wall_time": columns.seconds,
+        "message": columns.message,
     }
+    for name, values in kept.items():
+        found[name] = (dims, values.reshape(shape), _about(name))
+    found["status"][2].update(
+        flag_values=np.array([int(s) for s in Status], dtype=np.int8),
+        flag_meanings=" ".join(s.label for s in Status),
+        comment="; ".join(f"{s.label}: {s.meaning}" for s in Status),
+    )
+    for name, (_dims, _values, about) in found.items():
+        about["coverage_content_type"] = coverage(name)
     for name in study.measure.variables:
-        companions = [n for n in (f"{name}_error", "status") if n in dataset and n != name]
-        dataset[name].attrs["ancillary_variables"] = " ".join(companions)
-    dataset.attrs = _attributes(study, outcomes, provenance)
-    return dataset
+        companions = [n for n in (f"{name}_error", "status") if n in found and n != name]
+        found[name][2]["ancillary_variables"] = " ".join(companions)
+    return found
 
 
-def _coordinates(study: Study, scenes: Sequence[Scene]) -> dict[str, Any]:
+def coordinates(study: Study) -> dict[Any, Any]:
     """Dimension coordinates, what follows from them, and the fixed values as scalars."""
     strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:]
-    coords: dict[str, Any] = {}
+    coords: dict[Any, Any] = {}
+    sample = []
     for axis, stride in zip(study.axes, strides, strict=True):
-        along = scenes[: int(stride) * len(axis) : int(stride)]
+        along = [study.scene(i * int(stride)) for i in range(len(axis))]
+        sample += along
         if axis.labels is not None:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
@@ -73,7 +100,7 @@ def _coordinates(study: Study, scenes: Sequence[Scene]) -> dict[str, Any]:
             varied = _array(own or [getattr(scene, name) for scene in along])
             coords[name] = (axis.dimension, varied, _about(name))
     for name in FIELDS:
-        present = {getattr(scene, name) for scene in scenes} - {None}
+        present = {getattr(scene, name) for scene in sample} - {None}
         if name not in coords and len(present) == 1:
             coords[name] = ((), _array([present.pop()])[0], _about(name))
     for name, (source, formula) in DERIVED.items():
@@ -97,17 +124,6 @@ def _array(values: list[Any]) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _bookkeeping(size: int, outcomes: Mapping[int, tuple[Outcome, float]]) -> dict[str, np.ndarray]:
-    status = np.full(size, int(Status.PENDING), dtype=np.int8)
-    work = np.zeros(size, dtype=np.int32)
-    wall = np.full(size, np.nan)
-    message = np.full(size, "", dtype=object)
-    for cell, (outcome, seconds) in outcomes.items():
-        status[cell], work[cell] = int(outcome.status), outcome.rhs_evaluations
-        wall[cell], message[cell] = seconds, outcome.message
-    return {"status": status, "rhs_evaluations": work, "wall_time": wall, "message": message}
-
-
 def _about(name: str) -> dict[str, Any]:
     about = quantity(name)
     attrs: dict[str, Any] = {"long_name": about.long_name}
@@ -120,26 +136,29 @@ def _about(name: str) -> dict[str, Any]:
     return attrs
 
 
-def _attributes(
-    study: Study,
-    outcomes: Mapping[int, tuple[Outcome, float]],
-    provenance: Mapping[str, Any],
-) -> dict[str, Any]:
-    done = len(outcomes)
-    complete = done == study.size
+def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Root attributes of a lattice of which so many cells are known: what it is, where it comes
+    from, whether it is complete, and the whole declaration.
+    """
+    complete = known == study.size
     when, version = provenance["time"], provenance["versions"]["rsfstudy"]
     return {
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
+        "comment": _COMMENT,
         "Conventions": CONVENTIONS,
+        "project": "rsfstudy",
+        "naming_authority": "rsfstudy",
+        "processing_level": "numerical model results, and what they are reduced to",
         "id": study.name,
         "source": f"rsfstudy {version}, numerical model of a spring-slider",
         "history": f"{when} {provenance['command']}",
         "references": "; ".join(study.references) or "none",
         "date_created": when,
         "product_version": str(study.version),
-        "completeness": "complete" if complete else f"partial: {done} of {study.size} cells",
+        "completeness": "complete" if complete else f"partial: {known} of {study.size} cells",
         "declaration": json.dumps(study.describe()),
         "provenance": json.dumps(dict(provenance)),
+        **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
     }

@@ -4,8 +4,10 @@ command.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
+import os
 import platform
 import subprocess
 import sys
@@ -42,6 +44,12 @@ def physics_digest() -> str:
     return digest.hexdigest()[:16]
 
 
+@functools.cache
+def code() -> dict[str, str]:
+    """Versions of everything that decides the number of a cell, whatever the study."""
+    return {"physics": physics_digest(), "numpy": version("numpy"), "scipy": version("scipy")}
+
+
 def fingerprint(study: Study) -> dict[str, Any]:
     """All that decides the number of a cell but its scene."""
     return {
@@ -50,10 +58,8 @@ def fingerprint(study: Study) -> dict[str, Any]:
         "own_code": _own_code(type(study.measure)),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
-        "methods": list(study.accuracy.methods),
-        "physics": physics_digest(),
-        "numpy": version("numpy"),
-        "scipy": version("scipy"),
+        "methods": [list(pair) for pair in study.accuracy.methods],
+        **code(),
     }
 
 
@@ -68,18 +74,29 @@ def _own_code(measure: type[Measure]) -> str:
     return hashlib.sha256(source.encode()).hexdigest()[:16]
 
 
-def provenance(command: str) -> dict[str, Any]:
-    """Where and when a run was made, and by which versions."""
+def provenance(study: Study, command: str, declared_in: str = "") -> dict[str, Any]:
+    """Where, when and from what a run was made, and by which versions.
+
+    Parameters
+    ----------
+    study : Study
+    command : str
+        What the user typed.
+    declared_in : str
+        The file that declares the study, if it is no named one.
+    """
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
+        "declared_in": declared_in,
         "versions": {
             "python": platform.python_version(),
             **{name: _version(name) for name in _DEPENDENCIES},
         },
-        "physics": physics_digest(),
+        "fingerprint": fingerprint(study),
         "git": _git(),
-        "machine": f"{platform.system()} {platform.machine()}",
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",
         "byte_order": sys.byteorder,
     }
 

@@ -1,198 +1,253 @@
-"""Runs a study: plans its cells, maps them over Dask workers or in this process, keeps what is
-finished.
+"""Runs a study: plans its cells, has those computed that are not known yet, keeps what is
+finished, and assembles, reduces and writes the dataset.
 """
 
 from __future__ import annotations
 
 import contextlib
 import math
-import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
-from rsfstudy import provenance, store
-from rsfstudy.errors import InvalidValue, RsfStudyError, RunError
-from rsfstudy.journal import Finished, Journal, cell_key
+from rsfstudy import pieces, provenance, store
+from rsfstudy.cells import Mapper, Task
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, RunError
+from rsfstudy.journal import Columns, Journal, Layout
 from rsfstudy.lattice import assemble
+from rsfstudy.plan import Plan, scattered
 from rsfstudy.reduce import reduced
-from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.study import Study
-from rsfstudy.workers import Mapper
 
-#: Typical time of one right-hand side in s, and the time a task should last.
-_SECONDS_PER_RHS, _SECONDS_PER_TASK = 6e-6, 0.3
+#: Typical time of one right-hand side in s, the time a task should last, and the most cells it may
+#: hold: as many are lost with the machine.
+_SECONDS_PER_RHS, _SECONDS_PER_TASK, _LARGEST_BATCH = 6e-6, 0.3, 2000
+#: A run ends early where so many cells have failed before any is answered.
+_HOPELESS = 10
+
+FORMATS = ("netcdf", "zarr")
 
 Progress = Callable[[int, int], None]
 
 
-@dataclass
-class Plan:
-    """The cells of a study: each different scene once, and what is known of it."""
+@dataclass(frozen=True, kw_only=True)
+class Keeping:
+    """What a run keeps, and what it does about failures.
 
-    study: Study
-    scenes: list[Scene]
-    keys: list[str] = field(init=False)
-    finished: dict[str, Finished] = field(default_factory=dict)
+    Parameters
+    ----------
+    output : Path or None
+        Directory of the results and of the journal of finished cells; None writes nothing.
+    format : {"netcdf", "zarr"}
+        One NetCDF file, or a Zarr store that is written in pieces.
+    fresh : bool
+        Forget the journal and compute every cell anew.
+    keep_going : bool
+        Go on where the first cells all fail.
+    despite_failures : bool
+        Reduce what there is where cells failed.
+    command, declared_in : str
+        What the user typed, for the history, and the file that declares the study, if it is no
+        named one.
+    """
+
+    output: Path | None = None
+    format: str = "netcdf"
+    fresh: bool = False
+    keep_going: bool = False
+    despite_failures: bool = False
+    command: str = "rsfstudy.run"
+    declared_in: str = ""
 
     def __post_init__(self) -> None:
-        self.keys = [cell_key(scene) for scene in self.scenes]
-
-    def missing(self) -> dict[str, Scene]:
-        """Scenes still to be computed."""
-        every = dict(zip(self.keys, self.scenes, strict=True))
-        return {key: scene for key, scene in every.items() if key not in self.finished}
-
-    def outcomes(self) -> dict[int, Finished]:
-        """What is known, by cell number."""
-        return {i: self.finished[key] for i, key in enumerate(self.keys) if key in self.finished}
+        if self.format not in FORMATS:
+            raise InvalidValue("format", self.format, "is unknown", choices=FORMATS)
+        if self.format == "zarr":
+            pieces.check_installed()
+            if self.output is None:
+                raise InvalidValue("output", None, "must name a directory for a Zarr store")
 
 
-def run(
-    study: Study,
-    mapper: Mapper,
-    *,
-    output: Path | None,
-    fresh: bool = False,
-    workers: int = 1,
-    progress: Progress = lambda _done, _all: None,
-    command: str = "rsfstudy.run",
-) -> xr.Dataset:
-    """Compute the cells of a study that are not known yet, and assemble and reduce its dataset.
+class Run:
+    """One run of a study.
 
     Parameters
     ----------
     study : Study
-    mapper : callable
-        Where cells are computed: `workers.serial`, or what `workers.on_client` gives.
-    output : Path or None
-        Directory of ``NAME.nc`` and of the journal of finished cells; None writes nothing.
-    fresh : bool
-        Compute every cell anew.
+    keeping : Keeping
     workers : int
         How many cells are computed at a time, to size the tasks.
-    progress : callable
-        Told the number of finished cells and of all.
-    command : str
-        What the user typed, for the history.
+    time_limit : float, optional
+        Time in s a cell may take on a worker.
 
     Raises
     ------
     InvalidValue
-        For a declaration with a cell that makes no scene, before anything is computed.
-    DataError
-        If results cannot be kept, or the journal holds cells computed differently.
-    RunError
-        When interrupted; what is finished is kept in ``NAME.partial.nc`` and in the journal.
+        For a declaration with a cell that makes no scene, or reductions that do not fit its
+        lattice, before anything is computed.
     """
-    plan = Plan(study, list(study.scenes()))
-    _rehearse(plan)
-    with contextlib.ExitStack() as stack:
-        journal = None
-        if output is not None:
-            path = output / f"{study.name}.cells.sqlite"
-            journal = stack.enter_context(Journal(path, provenance.fingerprint(study), fresh=fresh))
-            plan.finished = journal.finished(plan.keys)
+
+    def __init__(self, study: Study, keeping: Keeping, task: Task, workers: int = 1) -> None:
+        self.study, self.keeping, self.task, self.workers = study, keeping, task, workers
+        self.plan = Plan(study)
+        self.about = provenance.provenance(study, keeping.command, keeping.declared_in)
+        self._rehearse()
+
+    def _rehearse(self) -> None:
+        """Apply the reductions to the lattice as it is before anything is computed."""
+        pending = Columns.pending(self.study.size, Layout(self.study.measure).width)
+        lattice = assemble(self.study, pending, self.about)
+        for reduction in self.study.reductions:
+            try:
+                lattice = reduced(lattice, (reduction,))
+            except RsfStudyError:
+                raise
+            except Exception as error:
+                rule = f"does not fit this lattice: {type(error).__name__}: {error}"
+                raise InvalidValue("reduction", reduction.name, rule) from error
+
+    def path(self, ending: str) -> Path:
+        """A file of this run."""
+        assert self.keeping.output is not None
+        return self.keeping.output / f"{self.study.name}{ending}"
+
+    def __call__(self, mapper: Mapper, progress: Progress) -> xr.Dataset:
+        """Compute the cells that are not known yet, and assemble, reduce and write the dataset.
+
+        Parameters
+        ----------
+        mapper : callable
+            Where cells are computed: `cells.serial`, or what `workers.on_client` gives.
+        progress : callable
+            Told the number of finished cells and of all.
+
+        Raises
+        ------
+        DataError
+            If results cannot be kept, or the journal holds cells computed differently.
+        RunError
+            When interrupted; what is finished is kept in ``NAME.partial.nc`` and in the journal.
+        """
+        keeping = self.keeping
+        if keeping.format == "zarr":
+            pieces.check_free(self.path(".zarr"))
+        path = None if keeping.output is None else self.path(".cells.sqlite")
+        layout = Layout(self.study.measure)
+        with Journal(path, self.about["fingerprint"], layout, fresh=keeping.fresh) as journal:
+            try:
+                self._compute_missing(journal, mapper, progress)
+                return self._finished(journal)
+            except (KeyboardInterrupt, RunError) as error:
+                raise self._interrupted(journal, error) from error
+            except DataError as error:
+                raise DataError(f"{error} {self._resumable(journal)}") from error
+
+    def _compute_missing(self, journal: Journal, mapper: Mapper, progress: Progress) -> None:
+        cells = self.plan.different
+        answered = journal.answered(self.plan.keys[cells])
+        missing = scattered(cells[~answered])
+        done, failed, total = int(answered.sum()), 0, len(cells)
+        progress(done, total)
+        if not len(missing):
+            return
+        batches = self.plan.batches(missing, self._batch_size(len(missing)))
+        with contextlib.closing(mapper(self.task, batches)) as arriving:
+            for found in arriving:
+                journal.add(found)
+                lost = [outcome for _key, (outcome, _s) in found if not outcome.status.is_answer]
+                failed, done = failed + len(lost), done + len(found)
+                progress(done, total)
+                if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
+                    first = lost[0]
+                    raise RunError(
+                        f"the first {done} cells all failed, the last with {first.status.label}"
+                        f"{': ' * bool(first.message)}{first.message}. "
+                        "Mend that, or go on all the same with --keep-going (keep_going=True)"
+                    )
+
+    def _batch_size(self, cells: int) -> int:
+        """Cells per task: long enough to be worth sending, short enough to balance the workers."""
+        work = self.study.measure.expected_work(self.study.accuracy)
+        worthwhile = _SECONDS_PER_TASK / (_SECONDS_PER_RHS * work)
+        balanced = cells / (4 * self.workers)
+        return max(1, math.ceil(min(worthwhile, balanced, _LARGEST_BATCH)))
+
+    # ---- what is made of the cells --------------------------------------------------------------
+
+    def _finished(self, journal: Journal) -> xr.Dataset:
+        with self._reducing(journal):
+            if self.keeping.format == "zarr":
+                return self._in_pieces(journal)
+            dataset = self._reduced(self.lattice(journal))
+        if self.keeping.output is None:
+            return store.sealed(dataset)
+        written = store.write(dataset, self.path(".nc"))
+        self.path(".partial.nc").unlink(missing_ok=True)
+        return written
+
+    def lattice(self, journal: Journal) -> xr.Dataset:
+        """What is known, as a dataset without reductions."""
+        return assemble(self.study, journal.read(self.plan.keys), self.about)
+
+    def _reduced(self, lattice: xr.Dataset) -> xr.Dataset:
+        despite = self.keeping.despite_failures
+        return reduced(lattice, tuple(self.study.reductions), despite_failures=despite)
+
+    def _in_pieces(self, journal: Journal) -> xr.Dataset:
+        def read(start: int, stop: int) -> Columns:
+            return journal.read(self.plan.keys[start:stop])
+
+        return pieces.write(self.study, read, self.about, self._reduced, self.path(".zarr"))
+
+    @contextlib.contextmanager
+    def _reducing(self, journal: Journal) -> Iterator[None]:
+        """Keep the cells where they are all there but cannot be reduced."""
         try:
-            _compute_missing(plan, mapper, journal, workers, progress)
-        except (KeyboardInterrupt, RunError) as error:
-            raise _interrupted(plan, output, command, error) from error
-    try:
-        dataset = _dataset(plan, command)
-    except Exception as error:
-        raise _unreduced(plan, output, command, error) from error
-    if output is not None:
-        store.write(dataset, output / f"{study.name}.nc")
-        (output / f"{study.name}.partial.nc").unlink(missing_ok=True)
-    return dataset
-
-
-def _compute_missing(
-    plan: Plan, mapper: Mapper, journal: Journal | None, workers: int, progress: Progress
-) -> None:
-    missing = plan.missing()
-    keys, total = list(missing), len(set(plan.keys))
-    progress(total - len(keys), total)
-    if not keys:
-        return
-    size = _batch_size(len(keys), plan.study.measure.typical_work, workers)
-    batches = [keys[i : i + size] for i in range(0, len(keys), size)]
-    scenes = [[missing[key] for key in batch] for batch in batches]
-    for number, finished in mapper(plan.study.measure, plan.study.accuracy, scenes):
-        cells = list(zip(batches[number], finished, strict=True))
-        if journal is not None:
-            journal.add(cells)
-        plan.finished.update(cells)
-        progress(len(plan.finished), total)
-
-
-def _batch_size(cells: int, typical_work: int, workers: int) -> int:
-    """Cells per task: long enough to be worth sending, short enough to balance the workers."""
-    worthwhile = _SECONDS_PER_TASK / (_SECONDS_PER_RHS * typical_work)
-    balanced = cells / (4 * workers)
-    return max(1, math.ceil(min(worthwhile, balanced)))
-
-
-def _dataset(plan: Plan, command: str) -> xr.Dataset:
-    dataset = assemble(plan.study, plan.scenes, plan.outcomes(), provenance.provenance(command))
-    return reduced(dataset, tuple(plan.study.reductions))
-
-
-def _rehearse(plan: Plan) -> None:
-    """Apply the reductions to the lattice as it is before anything is computed."""
-    lattice = assemble(plan.study, plan.scenes, {}, provenance.provenance("rehearsal"))
-    for reduction in plan.study.reductions:
-        try:
-            lattice = reduced(lattice, (reduction,))
+            yield
         except RsfStudyError:
             raise
         except Exception as error:
-            rule = f"does not fit this lattice: {type(error).__name__}: {error}"
-            raise InvalidValue("reduction", reduction.name, rule) from error
+            text = f"{self.study.name}: cannot be reduced ({type(error).__name__}: {error})"
+            if self.keeping.output is None:
+                raise RunError(f"{text}.") from error
+            path = self.path(".unreduced.nc")
+            store.write(self.lattice(journal), path)
+            raise DataError(f"{text}; its cells are in {path}, without reductions.") from error
 
+    def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
+        """The error of a run that ended early, once what is finished has been kept."""
+        why = f"{self.study.name}: {str(error) or 'interrupted'}. "
+        if self.keeping.output is not None and self.keeping.format == "netcdf":
+            try:
+                store.write(self._reduced(self.lattice(journal)), self.path(".partial.nc"))
+            except DataError as unwritten:
+                why += f"{unwritten} "
+        return RunError(why + self._resumable(journal))
 
-def _unreduced(plan: Plan, output: Path | None, command: str, error: Exception) -> RunError:
-    """The error of a run whose cells are all there but cannot be reduced; the cells are kept."""
-    text = f"{plan.study.name}: cannot be reduced ({type(error).__name__}: {error})"
-    if output is None:
-        return RunError(f"{text}.")
-    path = output / f"{plan.study.name}.unreduced.nc"
-    lattice = assemble(plan.study, plan.scenes, plan.outcomes(), provenance.provenance(command))
-    store.write(lattice, path)
-    return RunError(f"{text}; its cells are in {path}, without reductions.")
-
-
-def _interrupted(plan: Plan, output: Path | None, command: str, error: BaseException) -> RunError:
-    """The error of a run that ended early, once what is finished has been kept."""
-    why = str(error) or "interrupted"
-    text = (
-        f"{plan.study.name}: {why}. {len(plan.outcomes())} of {plan.study.size} cells are finished"
-    )
-    if output is None:
-        return RunError(f"{text}; nothing was to be kept (no output directory).")
-    path = output / f"{plan.study.name}.partial.nc"
-    store.write(_dataset(plan, command), path)
-    return RunError(f"{text} and kept in {path}; the same command goes on from there.")
+    def _resumable(self, journal: Journal) -> str:
+        """How much is finished, where it is, and how to go on."""
+        known = int((journal.read(self.plan.keys).status != int(Status.PENDING)).sum())
+        text = f"{known} of {self.study.size} cells are finished"
+        if self.keeping.output is None:
+            return f"{text}; nothing was to be kept (no output directory)."
+        partial = self.path(".partial.nc")
+        where = partial if partial.exists() else self.path(".cells.sqlite")
+        return f"{text} and kept in {where}; the same command goes on from there."
 
 
 def estimated_cost(study: Study) -> tuple[int, float]:
     """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
     core.
     """
-    cells = len(set(study.scenes()))
-    work = cells * study.measure.typical_work * study.accuracy.relative_work
+    work = len(Plan(study).different) * study.measure.expected_work(study.accuracy)
     return round(work), work * _SECONDS_PER_RHS
-
-
-def command_line() -> str:
-    """What the user typed."""
-    return " ".join(["rsfstudy", *sys.argv[1:]])
 
 
 def counts(dataset: xr.Dataset) -> Mapping[str, int]:
     """How many cells ended with each status."""
-    status = dataset["status"].values
+    status = np.asarray(dataset["status"].values)
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import Any
 
@@ -81,6 +81,13 @@ class Scene:
     period: float = 5.0
     reference_rate: float = 1.17e-8
     instability_norm: float = 5e-4
+
+    def __new__(cls, **fields: Any) -> Scene:
+        """A scene to be filled in, unless a name is no field of one."""
+        for name in fields:
+            if name not in cls.__dataclass_fields__:
+                raise unknown_field(name)
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         _check_choice("law", self.law, laws.NAMES)
@@ -246,7 +253,7 @@ class Scene:
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in FIELDS}
 
 
 FIELDS: tuple[str, ...] = tuple(field.name for field in fields(Scene))
@@ -262,5 +269,5 @@ def _is_flag(value: object) -> bool:
 
 
 def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         raise InvalidValue(name, value, "is unknown", choices=choices)

@@ -36,7 +36,9 @@ class Status(IntEnum):
     INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
     UNVERIFIED = 22, "two formulations disagree: no bracket confirms the value"
     CELL_RAISED = 23, "the measure raised an exception"
-    WORKER_LOST = 24, "the worker process died while computing this cell"
+    WORKER_LOST = 24, "the worker process died each time it computed this cell alone"
+    NOT_FINITE = 26, "the measure answered ok without a finite number"
+    TIME_LIMIT_SPENT = 27, "no answer came within the time limit of a cell"
     PENDING = 25, "not computed yet"
 
     @property

@@ -1,10 +1,16 @@
-"""NetCDF files: written beside, read back, compared, and only then put in place."""
+"""NetCDF files: written beside, read back, compared, and only then put in place; what they hold is
+sealed with digests, so that damage is noticed and named.
+
+A digest of all bytes stands behind the end of the HDF5 file, where its readers do not look: on
+damaged bytes HDF5 may never return, so they are told before it sees them. A digest of each variable
+is an attribute, which stays with the dataset wherever a notebook saves it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,57 +20,166 @@ import xarray as xr
 
 from rsfstudy.errors import DataError
 
+#: Root attributes that a verdict or a rerun turns on.
+_SEALED = ("id", "completeness", "declaration", "provenance")
+_DIGESTS = "digests"
+_MARK = b"\nrsfstudy sha256 "
+_TRAILER = len(_MARK) + 64
 
-def write(dataset: xr.Dataset, path: Path) -> None:
+
+class Digests:
+    """Digests of the values of variables, each added whole or in consecutive pieces."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, Any] = {}
+
+    def add(self, name: str, values: np.ndarray) -> None:
+        """The next values of a variable, in row-major order."""
+        digest = self._of.setdefault(name, hashlib.sha256())
+        if values.dtype.kind in "OUST":
+            digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
+        else:
+            little = values.dtype.newbyteorder("<")
+            digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
+
+    def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
+        """The dataset with these digests, and those of its attributes."""
+        return dataset.assign_attrs({_DIGESTS: json.dumps(self._all(dataset.attrs))})
+
+    def _all(self, attrs: Mapping[Any, Any]) -> dict[str, str]:
+        texts = {f":{name}": str(attrs[name]).encode() for name in _SEALED if name in attrs}
+        found = {name: hashlib.sha256(text) for name, text in texts.items()} | self._of
+        return {name: digest.hexdigest()[:16] for name, digest in found.items()}
+
+    def check(self, dataset: xr.Dataset, where: str) -> None:
+        """Hold a dataset against the digests it carries.
+
+        Raises
+        ------
+        DataError
+            Where it carries none, or what they were made of is missing or changed.
+        """
+        try:
+            carried = dict(json.loads(dataset.attrs[_DIGESTS]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(
+                f"{where} carries no digests: it was not written by rsfstudy, or damaged."
+            ) from error
+        ours = _digests_of(dataset)._all(dataset.attrs)
+        for name, digest in carried.items():
+            if ours.get(name) != digest:
+                what = "missing" if name not in ours else "not what was written"
+                raise DataError(
+                    f"{where} is damaged, or was edited: {name!r} is {what}. "
+                    "Run the study again; its finished cells are kept beside it."
+                )
+
+
+def _digests_of(dataset: xr.Dataset) -> Digests:
+    digests = Digests()
+    for name in dataset.variables:
+        digests.add(str(name), dataset[name].values)
+    return digests
+
+
+def sealed(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset as a file holds it: with attributes NetCDF does not change, and digests."""
+    clean = clean_attributes(dataset)
+    return _digests_of(clean).sealing(clean)
+
+
+def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Write a dataset so that `path` holds the old file or the whole new one, whatever happens.
 
-    A reader that has the old file open keeps its data.
+    A reader that has the old file open keeps its data. What a write that was killed left beside is
+    written over by the next.
+
+    Returns
+    -------
+    xarray.Dataset
+        The dataset as the file holds it.
 
     Raises
     ------
     DataError
         If the directory cannot be written, or what is read back differs from what was written.
     """
-    clean = clean_attributes(dataset)
+    clean = sealed(dataset)
+    beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=".nc", dir=path.parent)
-    except OSError as error:
-        raise DataError(
-            f"cannot write {path}: {error.strerror}. Choose another --output."
-        ) from error
-    os.close(handle)
-    beside = Path(name)
-    try:
         clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
+        with open(beside, "ab") as file:
+            file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not clean.identical(back.load()):
                 raise DataError(f"{path} was not written: what was read back differs.")
         with open(beside, "rb") as file:
             os.fsync(file.fileno())
-        beside.chmod(0o666 & ~_umask())
         os.replace(beside, path)
-    except OSError as error:
-        raise DataError(f"cannot write {path}: {error}. Nothing was replaced.") from error
+    except (OSError, RuntimeError) as error:
+        # HDF5 reports a full disk as a RuntimeError
+        raise DataError(
+            f"cannot write {path}: {error}. Nothing was replaced; make room, or choose another "
+            "--output."
+        ) from error
     finally:
-        beside.unlink(missing_ok=True)
+        _remove(beside)
+    return clean
+
+
+def _digest_of_bytes(path: Path, size: int) -> bytes:
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while size > 0 and (part := file.read(min(size, 2**20))):
+            digest.update(part)
+            size -= len(part)
+    return digest.hexdigest().encode()
+
+
+def _check_bytes(path: Path) -> None:
+    """Hold a file against the digest of its bytes, if it has one behind its end."""
+    size = path.stat().st_size - _TRAILER
+    if size < 0:
+        return
+    with open(path, "rb") as file:
+        file.seek(size)
+        trailer = file.read()
+    if trailer.startswith(_MARK) and trailer != _MARK + _digest_of_bytes(path, size):
+        raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return  # the directory itself is no directory; the error on its way says so
 
 
 def read(path: Path) -> xr.Dataset:
-    """Load a results file into memory and close it.
+    """Load a results file into memory and close it; a Zarr store is opened, not loaded.
 
     Raises
     ------
     DataError
-        If it is missing, no NetCDF file, or not written by rsfstudy.
+        If it is missing, unreadable, not written by rsfstudy, or damaged.
     """
-    if not path.is_file():
+    if not path.exists():
         raise DataError(f"{path} does not exist. Run the study first, or name another file.")
     try:
-        dataset = xr.load_dataset(path, engine="netcdf4")
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path} cannot be read as NetCDF: {error}") from error
+        if path.is_dir():
+            dataset = xr.open_dataset(
+                path, engine="zarr", chunks=None, consolidated=False, cache=False
+            )
+        else:
+            _check_bytes(path)
+            dataset = xr.load_dataset(path, engine="netcdf4")
+    except DataError:
+        raise
+    except Exception as error:  # damage makes HDF5, netCDF4 and xarray raise almost anything
+        raise DataError(f"{path} cannot be read: {error}") from error
     declaration(dataset, str(path))
+    Digests().check(dataset, str(path))
     return dataset
 
 
@@ -120,9 +235,3 @@ def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
         if values.dtype.kind in "iu":
             plain[name] = {"_FillValue": None}
     return plain
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current

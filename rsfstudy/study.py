@@ -7,7 +7,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,19 +50,20 @@ class Axis:
     def __init__(
         self, dimension: str, values: Sequence[Any] | np.ndarray | Mapping[str, Row]
     ) -> None:
+        if not isinstance(dimension, str) or not dimension.isidentifier():
+            raise InvalidValue("axis", dimension, "must be named by a Python identifier")
+        labels: tuple[str, ...] | None = None
         if isinstance(values, Mapping):
-            labels: tuple[str, ...] | None = tuple(values)
-            rows = tuple(dict(row) for row in values.values())
-            if dimension in FIELDS:
-                raise InvalidValue(
-                    "axis", dimension, "is a field: a zipped axis needs a name of its own"
-                )
+            labels, rows = tuple(values), _rows(dimension, values)
         else:
             if dimension not in FIELDS:
                 raise unknown_field(dimension)
-            if isinstance(values, str):
-                values = [values]
-            labels, rows = None, tuple({dimension: _plain(value)} for value in values)
+            listed = [values] if isinstance(values, str) else values
+            if not _is_list(listed):
+                raise InvalidValue(dimension, values, "must be a list of values")
+            rows = tuple({dimension: _plain(value)} for value in listed)
+            if any(row[dimension] is None for row in rows):
+                raise InvalidValue(dimension, None, "must be a value on an axis")
         object.__setattr__(self, "dimension", dimension)
         object.__setattr__(self, "rows", rows)
         object.__setattr__(self, "labels", labels)
@@ -75,14 +76,17 @@ class Axis:
             for name, value in row.items():
                 if name not in FIELDS:
                     raise unknown_field(name)
+                if not isinstance(value, float | str | bool | None):
+                    raise InvalidValue(name, value, "must be a number, a flag or a text")
                 if isinstance(value, float) and not math.isfinite(value):
                     raise InvalidValue(self.dimension, value, "must be finite")
-        seen: list[Row] = []
+        seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
-            if row in seen:
+            point = frozenset(row.items())
+            if point in seen:
                 value = row.get(self.dimension, dict(row))
                 raise InvalidValue(self.dimension, value, "stands twice on its axis")
-            seen.append(row)
+            seen.add(point)
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -154,8 +158,16 @@ class Study:
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier():
+        if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+        for name in ("title", "summary", "plot"):
+            if not isinstance(getattr(self, name), str):
+                raise InvalidValue(name, getattr(self, name), "must be a text")
+        whole = isinstance(self.version, int) and not isinstance(self.version, bool)
+        if not whole or self.version < 1:
+            raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
+        if not isinstance(self.overrides, Mapping):
+            raise InvalidValue("overrides", self.overrides, "must be a mapping")
         self._check_parts()
         taken: dict[str, str] = {}
         for axis in self.axes:
@@ -173,8 +185,12 @@ class Study:
             ("axes", self.axes, Axis),
             ("reductions", self.reductions, Reduction),
             ("claims", self.claims, Claim),
+            ("references", self.references, str),
+            ("accuracy", [self.accuracy], Accuracy),
         ]
         for name, values, kind in parts:
+            if not isinstance(values, list | tuple):
+                raise InvalidValue(name, values, f"must be a list of {kind.__name__} objects")
             for value in values:
                 if not isinstance(value, kind):
                     raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
@@ -220,13 +236,7 @@ class Study:
         """
         used: set[str] = set()
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
-            try:
-                scene = self._scene(rows)
-            except InvalidValue as error:
-                place = ", ".join(
-                    f"{name}={value!r}" for row in rows for name, value in row.items()
-                )
-                raise error.at(f"cell {place}") from error
+            scene = self._scene(rows)
             used |= {name for name in FIELDS if getattr(scene, name) is not None}
             yield scene
         for axis in self.axes:
@@ -234,16 +244,26 @@ class Study:
                 if name not in used:
                     raise InvalidValue(axis.dimension, name, "has no effect in any cell")
 
+    def scene(self, cell: int) -> Scene:
+        """The scene of one cell, by its number in row-major order."""
+        places = np.unravel_index(cell, self.shape)
+        return self._scene([axis.rows[i] for axis, i in zip(self.axes, places, strict=True)])
+
     def _scene(self, rows: Sequence[Row]) -> Scene:
         fields = self.base.as_dict()
         for row in rows:
             fields.update(row)
-        stated = next((row for row in rows if "normal_stress" in row), {})
-        for name in _OF_VARIABLE_NORMAL_STRESS:
+        if fields["normal_stress"] == "constant":
             # one row that states both is contradictory, and Scene says so
-            if fields["normal_stress"] == "constant" and stated.get(name) is None:
-                fields[name] = None
-        return Scene(**fields)
+            stated = next((row for row in rows if "normal_stress" in row), {})
+            for name in _OF_VARIABLE_NORMAL_STRESS:
+                if stated.get(name) is None:
+                    fields[name] = None
+        try:
+            return Scene(**fields)
+        except InvalidValue as error:
+            place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
+            raise error.at(f"cell {place}") from error
 
     # ---- other axes ---------------------------------------------------------------------------
 
@@ -296,13 +316,25 @@ class Study:
             "base": self.base.as_dict(),
             "axes": [axis.describe() for axis in self.axes],
             "measure": self.measure.describe(),
-            "accuracy": {"rtol": self.accuracy.rtol, "budget": self.accuracy.budget},
+            "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
             "plot": self.plot,
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }
+
+
+def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
+    """The rows of a zipped axis: for each label the fields set there."""
+    if dimension in FIELDS:
+        raise InvalidValue("axis", dimension, "is a field: a zipped axis needs a name of its own")
+    for label, row in points.items():
+        if not isinstance(label, str) or not label:
+            raise InvalidValue(dimension, label, "must be a text that labels a point")
+        if not isinstance(row, Mapping) or not row:
+            raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
+    return tuple({n: _plain(v) for n, v in row.items()} for row in points.values())
 
 
 def _select(axis: Axis, labels: Sequence[str]) -> Axis:
@@ -337,7 +369,9 @@ def _spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
 
 
 def _is_list(value: Any) -> bool:
-    return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def _plain(value: Any) -> Any:

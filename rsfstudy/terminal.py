@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,24 +16,117 @@ from rich.table import Column, Table
 
 from rsfstudy import api, runner, store
 from rsfstudy.claims import NOT_APPLICABLE
+from rsfstudy.core.accuracy import DEFAULT_RTOL
+from rsfstudy.measures import Outcome
+from rsfstudy.plan import Plan
+from rsfstudy.scene import Scene
 from rsfstudy.status import Status
+from rsfstudy.study import Study
 
 OK, FAILED = 0, 1
+_MOST_SHOWN = 40
 
 console = Console()
 
 
-def report(dataset: xr.Dataset, name: str, output: Path) -> int:
+def declaration(study: Study) -> None:
+    """Print a study: its axes, what is fixed and measured, its cells and what they cost."""
+    console.print(f"[bold]{study.name}[/bold]: {study.title}\n")
+    if study.summary:
+        console.print(study.summary + "\n")
+    table = Table("", "", box=None, show_header=False)
+    for axis in study.axes:
+        points = list(axis.labels or [short(row[axis.dimension]) for row in axis.rows])
+        if len(points) > _MOST_SHOWN:
+            points = [*points[:10], "...", *points[-3:]]
+        table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
+    varied = {field for axis in study.axes for field in axis.fields}
+    fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
+    table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items()))
+    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in study.measure.describe().items()))
+    table.add_row("gives", ", ".join(study.measure.variables))
+    table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
+    table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
+    table.add_row("cells", f"{study.size}, of which {len(Plan(study).different)} differ")
+    work, seconds = runner.estimated_cost(study)
+    rtol = study.accuracy.rtol
+    cost = f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {rtol:g}"
+    table.add_row("cost", cost)
+    console.print(table)
+
+
+def announce(study: Study) -> None:
+    """Say what an accuracy will cost, before it does."""
+    work, seconds = runner.estimated_cost(study)
+    ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
+    console.print(
+        f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
+        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, {seconds:.0f} s on "
+        "one core",
+        highlight=False,
+    )
+
+
+def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> int:
     """What a run ends with: slopes, claims, failures and where the files are."""
     _reductions(dataset)
     _costs(dataset)
     moved = claims(dataset)
-    failed = failures(dataset)
-    work = int(dataset["rhs_evaluations"].sum())
-    tally = ", ".join(f"{count} {label}" for label, count in runner.counts(dataset).items())
-    console.print(f"{name}: {tally}; {work:,} right-hand sides", highlight=False)
-    console.print(f"wrote {output / name}.nc and {output / name}.png", highlight=False)
+    failed = failures(dataset, str(files[0]))
+    console.print(f"{name}: {_tally(dataset)}", highlight=False)
+    console.print(f"wrote {' and '.join(map(str, files))}", highlight=False)
     return max(moved, failed)
+
+
+def _tally(dataset: xr.Dataset) -> str:
+    work = int(dataset["rhs_evaluations"].sum())
+    counts = ", ".join(f"{count} {label}" for label, count in runner.counts(dataset).items())
+    return f"{counts}; {work:,} right-hand sides"
+
+
+def results(dataset: xr.Dataset, file: str) -> int:
+    """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
+    attrs, about = dataset.attrs, json.loads(dataset.attrs["provenance"])
+    console.print(f"[bold]{attrs['id']}[/bold]: {attrs['title']}\n")
+    table = Table("", "", box=None, show_header=False)
+    dims = dataset["status"].dims
+    table.add_row("lattice", " x ".join(f"{dataset.sizes[d]} {d}" for d in dims))
+    table.add_row("cells", f"{attrs['completeness']}; {_tally(dataset)}")
+    if "reduced_despite" in attrs:
+        table.add_row("reductions", attrs["reduced_despite"])
+    table.add_row("made by", f"{about['command']}, {about['time']}")
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
+    for name, values in dataset.data_vars.items():
+        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {values.long_name}")
+    console.print(table, highlight=False)
+    return failures(dataset, file)
+
+
+def outcome(scene: Scene, found: Outcome) -> int:
+    """One cell: its scene, its numbers and how it ended."""
+    fields = {name: value for name, value in scene.as_dict().items() if value is not None}
+    console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()), highlight=False)
+    for name, value in found.values.items():
+        console.print(f"{name} = {value!r}", highlight=False)
+    text = f"{found.status.label}{': ' * bool(found.message)}{found.message}"
+    console.print(f"{text} ({found.rhs_evaluations:,} right-hand sides)", highlight=False)
+    return OK if found.status.is_answer else FAILED
+
+
+def agreement(frame: pd.DataFrame) -> int:
+    """How a rerun agrees with its file; FAILED where a number is not the same."""
+    for name, (theirs, ours) in frame.attrs["differs"].items():
+        console.print(f"{name}: {theirs} then, {ours} now", style="yellow", highlight=False)
+    table = Table("variable", "values", "identical", "largest difference", box=None)
+    for row in frame.to_dict("records"):
+        gap = row["largest_difference"]
+        text = "-" if pd.isna(gap) else f"{gap:.3g}"
+        table.add_row(row["variable"], str(row["values"]), str(row["identical"]), text)
+    console.print(table)
+    same = bool((frame["values"] == frame["identical"]).all())
+    console.print("every number is the same" if same else "not every number is the same")
+    return OK if same else FAILED
 
 
 def _reductions(dataset: xr.Dataset) -> None:
@@ -147,8 +242,8 @@ def _claim_row(row: Any) -> tuple[str, ...]:
     )
 
 
-def failures(dataset: xr.Dataset) -> int:
-    """Print the cells that failed; FAILED if there are any."""
+def failures(dataset: xr.Dataset, file: str = "") -> int:
+    """Print the cells that failed, and how to reproduce one alone; FAILED if there are any."""
     if _undone(dataset):
         size = dataset["status"].size
         console.print(f"{_undone(dataset)} of {size} cells are not computed yet", style="red")
@@ -158,14 +253,35 @@ def failures(dataset: xr.Dataset) -> int:
     failed = failed & (dataset["status"] != int(Status.PENDING))
     if not bool(failed.any()):
         return FAILED
-    table = Table("cell", "status", "message", title=f"{int(failed.sum())} cells failed")
+    many, shown = int(failed.sum()), 20
+    table = Table("cell", "status", "message", title=f"{many} cells failed", title_justify="left")
     labels = {int(s): s.label for s in Status}
-    for index in np.argwhere(failed.values)[:20]:
+    commands = []
+    for index in np.argwhere(failed.values)[:shown]:
         cell = dataset[["status", "message"]].isel(dict(zip(failed.dims, index, strict=True)))
-        place = ", ".join(f"{d} = {short(cell[d].item())}" for d in map(str, failed.dims))
-        table.add_row(place, labels[int(cell["status"])], str(cell["message"].item()))
+        place = {str(d): cell[d].item() for d in failed.dims}
+        text = ", ".join(f"{name} = {short(value)}" for name, value in place.items())
+        table.add_row(text, labels[int(cell["status"])], str(cell["message"].item()))
+        commands.append(_reproducing(dataset, file, place))
     console.print(table)
+    if many > shown:
+        console.print(f"and {many - shown} more")
+    if file:
+        console.print("each alone, in one process:", highlight=False)
+        for command in commands:
+            console.print(f"  {command}", highlight=False, markup=False, soft_wrap=True)
     return FAILED
+
+
+def _reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
+    """The command that computes one cell alone."""
+    words = ["rsfstudy", "rerun", file]
+    declared_in = json.loads(dataset.attrs["provenance"]).get("declared_in")
+    if declared_in:
+        words += ["--study", declared_in]
+    for name, value in place.items():
+        words += ["--cell", f"{name}={value}"]
+    return shlex.join(words)
 
 
 def short(value: Any) -> str:

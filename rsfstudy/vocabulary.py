@@ -400,6 +400,14 @@ _SUFFIXES = {
 
 _COUNTS = ("points", "crossings")
 
+#: Times that were measured: no two runs share them.
+MEASURED_TIMES = (
+    "wall_time",
+    "run_time",
+    "time_per_evaluation",
+    "time_per_evaluation_in_rupture",
+)
+
 #: Coordinates that follow from an axis: name -> (axis, formula).
 DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
@@ -408,6 +416,15 @@ DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
     ),
     "a_over_b_minus_a": ("b_over_a", lambda b_over_a: 1.0 / (b_over_a - 1.0)),
 }
+
+
+def coverage(name: str) -> str:
+    """What kind of content a variable is, in the words of ISO 19115-1."""
+    if name in ("rhs_evaluations", *MEASURED_TIMES):
+        return "auxiliaryInformation"
+    if name in ("status", "message") or re.search("_(error|stderr|misfit|points)$", name):
+        return "qualityInformation"
+    return "modelResult"
 
 
 def quantity(name: str) -> Quantity:

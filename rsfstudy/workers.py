@@ -1,113 +1,162 @@
-"""Where cells are computed: in this process, or on the workers of a Dask cluster."""
+"""Dask workers: batches of cells are sent to them, and a cell that kills its worker is found.
+
+A worker that dies takes its whole batch with it, and may take others that waited there. The cells
+of all these are then sent one at a time while nothing else runs, so that only the cell that dies
+alone is blamed.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import itertools
 import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
 from typing import Any
 
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker
 from rsfstudy.errors import RunError
-from rsfstudy.journal import Finished
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
 _START_TIMEOUT = 60
+#: Time in s without any worker after which a run ends.
+PATIENCE = 60.0
+_LOOK = 2.0
+#: How often a cell may kill its worker before it is recorded as the culprit.
+_TRIES = 2
 #: Run by each worker process at its start: on Ctrl-C it is the driver that ends a run, and its
 #: workers.
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
-Batch = Sequence[Scene]
-#: Takes batches of scenes and yields, in any order, the number of a batch and its finished cells.
-Mapper = Callable[[Measure, Accuracy, Sequence[Batch]], Iterator[tuple[int, list[Finished]]]]
-
-
-def compute(measure: Measure, accuracy: Accuracy, scenes: Batch) -> list[Finished]:
-    """Measure scenes one after the other; an exception becomes the outcome of its cell."""
-    finished = []
-    for scene in scenes:
-        begin = time.perf_counter()
-        try:
-            outcome = measure(scene, accuracy)
-        except Exception as error:
-            outcome = Outcome(Status.CELL_RAISED, message=f"{type(error).__name__}: {error}")
-        finished.append((outcome, time.perf_counter() - begin))
-    return finished
-
-
-def serial(
-    measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
-) -> Iterator[tuple[int, list[Finished]]]:
-    """In this process, one cell after the other."""
-    for number, batch in enumerate(batches):
-        yield number, compute(measure, accuracy, batch)
-
 
 def on_client(client: Any) -> Mapper:
-    """On the workers of a Dask client.
+    """On the workers of a Dask client; they need no shared file system."""
 
-    A worker that dies takes its whole batch with it. The cells of such a batch are sent again one
-    by one, so that only the cell that kills its worker is blamed.
-    """
-    from distributed import as_completed
-
-    def mapper(
-        measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
-    ) -> Iterator[tuple[int, list[Finished]]]:
-        futures = {
-            client.submit(compute, measure, accuracy, batch, pure=False): number
-            for number, batch in enumerate(batches)
-        }
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+        if client.status != "running":
+            raise RunError(f"the Dask client is {client.status}: connect one to a cluster")
+        source = iter(batches)
+        running: dict[Any, Batch] = {}
+        suspects: list[Any] = []
         try:
-            for future in as_completed(list(futures)):
-                number = futures.pop(future)
-                if future.status == "finished":
-                    yield number, future.result()
+            while True:
+                if not suspects:
+                    _fill(client, task, source, running)
+                if running:
+                    for future in _finished(client, running):
+                        batch = running.pop(future)
+                        found = _result(future)
+                        if found is None:
+                            suspects += batch
+                        else:
+                            yield found
+                elif suspects:
+                    for cell in suspects:
+                        yield _alone(client, task, [cell])
+                    suspects = []
                 else:
-                    _raise_unless_lost(future)
-                    yield number, _one_by_one(client, measure, accuracy, batches[number])
+                    return
         finally:
-            client.cancel(list(futures))
+            client.cancel(list(running))
 
     return mapper
 
 
-def _one_by_one(client: Any, measure: Measure, accuracy: Accuracy, batch: Batch) -> list[Finished]:
-    finished = []
-    for scene in batch:
-        future = client.submit(compute, measure, accuracy, [scene], pure=False)
-        error = future.exception()
-        if error is None:
-            finished += future.result()
-        else:
-            _raise_unless_lost(future)
-            lost = Outcome(Status.WORKER_LOST, message=f"{type(error).__name__}: {error}")
-            finished.append((lost, math.nan))
-    return finished
+def _fill(client: Any, task: Task, source: Iterator[Batch], running: dict[Any, Batch]) -> None:
+    """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
+    enough = 4 + 2 * _threads(client)
+    for batch in itertools.islice(source, max(0, enough - len(running))):
+        running[client.submit(on_worker, task, batch, pure=False)] = batch
 
 
-def _raise_unless_lost(future: Any) -> None:
-    """A worker's death is a cell's failure; anything else is a failure of the cluster."""
-    from distributed.scheduler import KilledWorker
+def _threads(client: Any) -> int:
+    try:
+        return sum(client.nthreads().values())
+    except (OSError, TimeoutError) as error:
+        raise RunError("the Dask scheduler is lost") from error
 
-    error = future.exception() if future.status == "error" else None
-    if not isinstance(error, KilledWorker):
-        raise RunError(f"the Dask cluster gave up: {error or future.status}")
+
+def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
+    """Futures that are finished, once there are any.
+
+    Raises
+    ------
+    RunError
+        If the scheduler is lost, or there has been no worker for a while.
+    """
+    from distributed import wait
+
+    seen = time.monotonic()
+    while True:
+        try:
+            done: Iterable[Any] = wait(
+                list(running), timeout=_LOOK, return_when="FIRST_COMPLETED"
+            ).done
+            return done
+        except TimeoutError:
+            if _threads(client):
+                seen = time.monotonic()
+            elif time.monotonic() - seen > PATIENCE:
+                raise RunError(
+                    f"the Dask cluster has had no worker for {PATIENCE:g} s: start some"
+                ) from None
+        except CancelledError as error:
+            raise RunError("the Dask scheduler is lost") from error
+
+
+def _result(future: Any) -> Found | None:
+    """What a batch gave, or None where its worker died; anything else is a failure of the
+    cluster.
+    """
+    from distributed import KilledWorker
+
+    try:
+        found: Found = future.result()
+    except KilledWorker:
+        return None
+    except RunError:
+        raise
+    except CancelledError as error:
+        raise RunError("the Dask scheduler is lost") from error
+    except Exception as error:
+        raise RunError(
+            f"the Dask cluster gave up ({type(error).__name__}: {error}). "
+            "Its workers need the same rsfstudy"
+        ) from error
+    return found
+
+
+def _alone(client: Any, task: Task, batch: Batch) -> Found:
+    """A suspect by itself; the culprit where its worker dies again."""
+    for _ in range(_TRIES):
+        began = time.monotonic()
+        future = client.submit(on_worker, task, batch, pure=False)
+        _finished(client, [future])
+        found = _result(future)
+        if found is not None:
+            return found
+        seconds = time.monotonic() - began
+        if seconds > task.time_limit:
+            text = f"no answer within {task.time_limit:g} s; the worker's log shows where it was"
+            return [(batch[0][0], (Outcome(Status.TIME_LIMIT_SPENT, message=text), seconds))]
+    text = (
+        f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
+        "than a worker may use"
+    )
+    return [(batch[0][0], (Outcome(Status.WORKER_LOST, message=text), math.nan))]
 
 
 def on_local_cluster(processes: int) -> Mapper:
     """On worker processes of this machine, started when there is something to compute."""
 
-    def mapper(
-        measure: Measure, accuracy: Accuracy, batches: Sequence[Batch]
-    ) -> Iterator[tuple[int, list[Finished]]]:
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
         with local_cluster(processes) as client:
-            yield from on_client(client)(measure, accuracy, batches)
+            yield from on_client(client)(task, batches)
 
     return mapper
 
@@ -138,7 +187,9 @@ def local_cluster(workers: int) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     quiet = {
-        "distributed.scheduler.allowed-failures": 1,
+        "distributed.scheduler.allowed-failures": 0,
+        # Dask closes for good a worker that died and happens to be starting again this long after
+        "distributed.deploy.lost-worker-timeout": "1000 days",
         "distributed.comm.timeouts.connect": f"{_START_TIMEOUT}s",
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
@@ -159,6 +210,14 @@ def local_cluster(workers: int) -> Iterator[Any]:
         yield stack.enter_context(Client(cluster))
 
 
+async def _greeting(address: str) -> None:
+    """What Dask says first; its client would wait for ever where something else listens."""
+    from distributed.comm.core import connect
+
+    comm = await connect(address)
+    comm.abort()
+
+
 @contextlib.contextmanager
 def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
     """A client of a Dask scheduler that is already running.
@@ -171,11 +230,24 @@ def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
     from distributed import Client
 
     try:
+        asyncio.run(asyncio.wait_for(_greeting(address), timeout))
         client = Client(address, timeout=timeout)
-    except (OSError, ValueError) as error:
+    except Exception as error:  # what Dask makes of an address that is none has no end
         raise RunError(
-            f"no Dask scheduler answers at {address}: {error}. "
+            f"no Dask scheduler answers at {address!r}: {error}. "
             "Start one with `dask scheduler`, or leave --scheduler out."
         ) from error
-    with client:
+    with client, _quiet_loggers():
         yield client
+
+
+@contextlib.contextmanager
+def _quiet_loggers() -> Iterator[None]:
+    """What goes wrong with a cluster is told once, by the run."""
+    dask = logging.getLogger("distributed")
+    level = dask.level
+    dask.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        dask.setLevel(level)

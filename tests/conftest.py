@@ -41,3 +41,12 @@ def constant() -> Scene:
 def variable() -> Scene:
     """Slip law with all effects of variable normal stress."""
     return Scene(normal_stress="variable", alpha=0.56, phi=60.0)
+
+
+@pytest.fixture(scope="session")
+def cluster():
+    """A Dask client of two worker processes."""
+    from rsfstudy import workers
+
+    with workers.local_cluster(2) as client:
+        yield client

@@ -8,7 +8,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 import rsfstudy
-from rsfstudy import cli
+from rsfstudy import cli, store
 from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
@@ -66,7 +66,7 @@ def test_check_all_checks_what_is_there_and_names_what_is_not(results):
 def test_check_fails_when_a_verdict_moves(tmp_path):
     moved = rsfstudy.run(NAME, workers=0, output=None, progress=False)
     moved["zeta"] = moved["zeta"] + 0.5
-    moved.to_netcdf(tmp_path / "moved.nc")
+    store.write(moved, tmp_path / "moved.nc")
     checked = call("check", tmp_path / "moved.nc")
     assert checked.returncode == 1
     assert "differs, expected reproduced" in checked.stdout
@@ -77,7 +77,7 @@ def test_a_failed_cell_is_listed_and_fails(tmp_path, monkeypatch):
     dataset = rsfstudy.run(study, workers=0, output=None, progress=False, b_over_a=[2, 3])
     dataset.status[1, 0] = int(Status.INTEGRATION_FAILED)
     dataset.message[1, 0] = "step without length"
-    dataset.to_netcdf(tmp_path / "failed.nc")
+    store.write(dataset, tmp_path / "failed.nc")
     checked = call("check", tmp_path / "failed.nc")
     assert checked.returncode == 1
     assert "1 cells failed" in checked.stdout

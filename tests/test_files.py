@@ -2,18 +2,23 @@
 kept.
 """
 
+import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from running import FAULTY, command, ended, run
 
-from rsfstudy import Scene, store
-from rsfstudy.errors import DataError
-from rsfstudy.journal import Journal, cell_key
-from rsfstudy.measures import Outcome
+import rsfstudy
+from rsfstudy import Scene, catalogue, plots, restore, store
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.journal import Journal, Layout
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.plan import cell_key
 from rsfstudy.status import Status
 
 
@@ -91,7 +96,7 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     with pytest.raises(DataError, match="nothing.nc does not exist"):
         store.read(tmp_path / "nothing.nc")
     (tmp_path / "text.nc").write_text("not NetCDF")
-    with pytest.raises(DataError, match="text.nc cannot be read as NetCDF"):
+    with pytest.raises(DataError, match="text.nc cannot be read"):
         store.read(tmp_path / "text.nc")
     xr.Dataset({"v": 1.0}).to_netcdf(tmp_path / "foreign.nc")
     with pytest.raises(DataError, match="carries no study declaration"):
@@ -100,50 +105,223 @@ def test_missing_and_damaged_files_are_named(tmp_path):
 
 def test_an_output_that_is_a_file_is_named(tmp_path):
     (tmp_path / "taken").write_text("")
-    with pytest.raises(DataError, match="cannot write.*Choose another --output"):
+    with pytest.raises(DataError, match="cannot write.*choose another --output"):
         store.write(dataset(), tmp_path / "taken" / "trial.nc")
 
 
+class Pair(Measure):
+    """A number and a curve."""
+
+    name = "pair"
+    variables = {"v": (), "profile": ("phase",)}  # noqa: RUF012
+    inner_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
+
+
+LAYOUT = Layout(Pair())
 DONE = (Outcome(Status.OK, {"v": 1.5, "profile": np.array([1.0, np.nan])}, "", 42), 0.1)
+KEYS = np.array([cell_key(Scene()), cell_key(Scene(b_over_a=3.0))], dtype="V16")
+
+
+def journal(tmp_path, fingerprint=None, **options):
+    return Journal(
+        tmp_path / "trial.cells.sqlite", fingerprint or {"rtol": 1e-7}, LAYOUT, **options
+    )
 
 
 def test_the_journal_returns_what_it_was_given(tmp_path):
-    path, key = tmp_path / "trial.cells.sqlite", cell_key(Scene())
-    with Journal(path, {"rtol": 1e-7}) as journal:
-        journal.add([(key, DONE)])
-    with Journal(path, {"rtol": 1e-7}) as journal:
-        found = journal.finished([key, "unknown"])
-    assert list(found) == [key]
-    outcome, seconds = found[key]
-    assert (outcome.status, outcome.values["v"], outcome.rhs_evaluations) == (Status.OK, 1.5, 42)
-    np.testing.assert_array_equal(outcome.values["profile"], [1.0, np.nan])
-    assert seconds == 0.1
+    with journal(tmp_path) as kept:
+        kept.add([(KEYS[0].tobytes(), DONE)])
+    with journal(tmp_path) as kept:
+        assert kept.answered(KEYS).tolist() == [True, False]
+        found = kept.read(KEYS)
+    assert found.status.tolist() == [Status.OK, Status.PENDING]
+    assert (found.work[0], found.seconds[0]) == (42, 0.1)
+    np.testing.assert_array_equal(found.numbers[0], [1.5, 1.0, np.nan])
+    assert np.isnan(found.numbers[1]).all()
 
 
-def test_failed_cells_are_tried_again(tmp_path):
-    failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), 0.1)
-    with Journal(tmp_path / "trial.cells.sqlite", {}) as journal:
-        journal.add([("key", failed)])
-        assert journal.finished(["key"]) == {}
+def test_failed_cells_are_known_and_not_answered(tmp_path):
+    failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), float("nan"))
+    with journal(tmp_path) as kept:
+        kept.add([(KEYS[0].tobytes(), failed)])
+        assert not kept.answered(KEYS).any()
+        found = kept.read(KEYS)
+    assert (found.status[0], found.message[0]) == (Status.CELL_RAISED, "ValueError: x")
+    assert np.isnan(found.seconds[0])
 
 
 def test_a_journal_of_other_numbers_is_refused_with_the_difference(tmp_path):
-    path = tmp_path / "trial.cells.sqlite"
-    with Journal(path, {"rtol": 1e-7, "physics": "abc"}) as journal:
-        journal.add([("key", DONE)])
+    with journal(tmp_path, {"rtol": 1e-7, "physics": "abc"}) as kept:
+        kept.add([(KEYS[0].tobytes(), DONE)])
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-09 now.*--fresh"):
-        Journal(path, {"rtol": 1e-9, "physics": "abc"})
-    with Journal(path, {"rtol": 1e-9, "physics": "abc"}, fresh=True) as journal:
-        assert journal.finished(["key"]) == {}
+        journal(tmp_path, {"rtol": 1e-9, "physics": "abc"})
+    with journal(tmp_path, {"rtol": 1e-9, "physics": "abc"}, fresh=True) as kept:
+        assert not kept.answered(KEYS).any()
 
 
 def test_a_damaged_journal_is_named(tmp_path):
     path = tmp_path / "trial.cells.sqlite"
     path.write_text("not a database, however long this text may be")
     with pytest.raises(DataError, match="cannot use .*--fresh"):
-        Journal(path, {})
+        journal(tmp_path)
+
+
+def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
+    with journal(tmp_path) as kept:
+        kept.add([(KEYS[0].tobytes(), DONE)])
+    path = tmp_path / "trial.cells.sqlite"
+    right, wrong = np.array([1.5]).tobytes(), np.array([1.25]).tobytes()
+    content = path.read_bytes()
+    assert content.count(right) == 1
+    path.write_bytes(content.replace(right, wrong))
+    with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
+        kept.read(KEYS)
 
 
 def test_cells_differ_by_the_last_bit():
     assert cell_key(Scene(b_over_a=2.0)) != cell_key(Scene(b_over_a=np.nextafter(2.0, 3.0)))
     assert cell_key(Scene(b_over_a=2.0)) == cell_key(Scene(b_over_a=2))
+
+
+# ---- what a file says of itself -----------------------------------------------------------------
+
+
+@pytest.fixture
+def small(tmp_path):
+    run(output=tmp_path)
+    return tmp_path / "small.nc"
+
+
+def test_a_number_changed_in_a_file_is_named(small):
+    """By a hand with an editor for such files, or by a bad sector."""
+    import netCDF4
+
+    with netCDF4.Dataset(small, "r+") as file:
+        file["critical_velocity_ratio"][0, 0] += 1e-12
+    with pytest.raises(DataError, match=r"small.nc is damaged, .*'critical_velocity_ratio' is not"):
+        rsfstudy.open(small)
+
+
+@pytest.mark.parametrize("name", ["declaration", "completeness", "provenance", "id"])
+def test_an_attribute_changed_in_a_file_is_named(name, small):
+    import netCDF4
+
+    with netCDF4.Dataset(small, "r+") as file:
+        text = file.getncattr(name)
+        file.setncattr(name, text.replace(text[2], "x", 1))
+    with pytest.raises(DataError, match=f"{name}|carries a study declaration that is damaged"):
+        rsfstudy.open(small)
+
+
+def test_a_variable_that_was_removed_is_named(small, tmp_path):
+    xr.load_dataset(small).drop_vars("status").to_netcdf(tmp_path / "less.nc")
+    with pytest.raises(DataError, match="'status' is missing"):
+        rsfstudy.open(tmp_path / "less.nc")
+
+
+def test_what_a_notebook_adds_is_left_alone(small, tmp_path):
+    mine = xr.load_dataset(small)
+    mine["log"] = np.log(mine.critical_velocity_ratio)
+    mine.attrs["comment"] = "with logarithms"
+    mine.to_netcdf(tmp_path / "mine.nc")
+    assert "log" in rsfstudy.open(tmp_path / "mine.nc")
+
+
+def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
+    """Not even where its declaration names a measure or a plot that could be imported."""
+    (tmp_path / "evil.py").write_text("raise SystemExit('the code of a results file ran')")
+    monkeypatch.syspath_prepend(tmp_path)
+    dataset = xr.load_dataset(small)
+    declared = json.loads(dataset.attrs["declaration"])
+    declared["measure"]["name"] = declared["plot"] = "evil"
+    store.write(dataset.assign_attrs(declaration=json.dumps(declared)), tmp_path / "trap.nc")
+    rsfstudy.open(tmp_path / "trap.nc")
+    rsfstudy.check(tmp_path / "trap.nc")
+    with pytest.raises(InvalidValue, match="measure = 'evil': is not part of rsfstudy"):
+        rsfstudy.rerun(tmp_path / "trap.nc", workers=0, progress=False)
+    with pytest.raises(InvalidValue, match="plot = 'evil': is unknown"):
+        plots.figure(rsfstudy.open(tmp_path / "trap.nc"))
+    assert "evil" not in sys.modules
+
+
+def test_a_file_says_what_decided_its_numbers(small):
+    about = json.loads(rsfstudy.open(small).attrs["provenance"])
+    assert {"numpy", "scipy", "xarray", "dask", "python", "rsfstudy"} <= set(about["versions"])
+    assert {"physics", "rtol", "budget", "measure", "own_code"} <= set(about["fingerprint"])
+    for name in ("time", "command", "git", "machine", "mathematical_library"):
+        assert about[name]
+
+
+def test_git_tells_the_commit_and_whether_it_was_clean():
+    said = json.loads(run().attrs["provenance"])["git"]
+    root = Path(rsfstudy.__file__).parent.parent
+
+    def git(*words):
+        return subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True,
+                              check=True).stdout.strip()  # fmt: skip
+
+    state = "with uncommitted changes" if git("status", "--porcelain") else "clean"
+    assert said == f"{git('rev-parse', 'HEAD')} {state}"
+
+
+# ---- from the file alone ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", catalogue.names())
+def test_every_declaration_restores_its_study(name):
+    study = catalogue.load(name)
+    described = json.loads(json.dumps(study.describe()))
+    restored = restore.study(described)
+    assert json.loads(json.dumps(restored.describe())) == described
+    assert set(restored.scenes()) == set(study.scenes())
+
+
+def test_a_rerun_reproduces_every_number(small):
+    table = rsfstudy.rerun(small, workers=0, progress=False)
+    assert (table["values"] == table["identical"]).all()
+    assert set(table.variable) >= {"critical_velocity_ratio", "status", "rhs_evaluations"}
+    assert table.attrs["differs"] == {}
+
+
+def test_a_rerun_of_a_study_as_it_was_overridden(tmp_path):
+    options = {"b_over_a": [2.0, 2.5], "stiffness_ratio": 1.25, "workers": 0, "progress": False}
+    rsfstudy.run("rate_step_boundary", output=tmp_path, rtol=1e-6, **options)
+    table = rsfstudy.rerun(tmp_path / "rate_step_boundary.nc", workers=0, progress=False)
+    assert (table["values"] == table["identical"]).all()
+
+
+def test_a_rerun_shows_what_differs(small, tmp_path):
+    """Sealed anew, as by someone who meant it: the comparison finds the value."""
+    other = xr.load_dataset(small)
+    other["critical_velocity_ratio"][0, 0] += 1e-9
+    about = json.loads(other.attrs["provenance"])
+    about["fingerprint"]["scipy"] = "0.1"
+    store.write(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    table = rsfstudy.rerun(tmp_path / "other.nc", workers=0, progress=False).set_index("variable")
+    changed = table.loc["critical_velocity_ratio"]
+    assert changed["values"] - changed["identical"] == 1
+    assert changed["largest_difference"] == pytest.approx(1e-9, rel=1e-6)
+    assert table.attrs["differs"]["scipy"][0] == "0.1"
+
+
+def test_a_rerun_on_the_command_line(small):
+    code, out, _said = ended(command("rerun", small, "--serial", "--quiet"))
+    assert code == 0
+    assert "every number is the same" in out
+
+
+def test_a_rerun_of_a_study_of_ones_own(tmp_path):
+    """Its code is in its own file, which has to be named."""
+    run(FAULTY, output=tmp_path)
+    with pytest.raises(InvalidValue, match="'faulty': is not part of rsfstudy"):
+        rsfstudy.rerun(tmp_path / "faulty.nc", workers=0, progress=False)
+    table = rsfstudy.rerun(tmp_path / "faulty.nc", study=FAULTY, workers=0, progress=False)
+    assert (table["values"] == table["identical"]).all()
+    assert table.attrs["differs"] == {}
+
+
+def test_show_tells_what_is_in_a_file(small):
+    code, out, _said = ended(command("show", small))
+    assert code == 0
+    for text in ("2 case x 3 b_over_a", "complete", "6 ok", "scipy", "critical_velocity_ratio"):
+        assert text in out

@@ -27,7 +27,12 @@ FLOORS = {
     "lattice": 5,
     "store": 5,
     "journal": 5,
+    "plan": 5,
+    "pieces": 5,
+    "restore": 5,
+    "comparison": 5,
     "provenance": 5,
+    "cells": 6,
     "workers": 6,
     "runner": 6,
     "catalogue": 6,
@@ -46,6 +51,7 @@ HOMES = {
     "click": {"cli"},
     "rich": {"api", "cli", "terminal"},
     "sqlite3": {"journal"},
+    "zarr": {"pieces"},
 }
 
 

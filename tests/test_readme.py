@@ -51,8 +51,18 @@ def test_commands_and_options_exist():
     options = {
         option for command in cli.commands.values() for o in command.params for option in o.opts
     }
-    for option in re.findall(r"`(--[a-z]+)", README):
+    for option in re.findall(r"`(--[a-z-]+)", README):
         assert option in options
+
+
+def test_the_table_of_promises_names_tests_that_exist():
+    """And none of the tests of running, files and faults is left out."""
+    table = README[README.index("| promise | tests |") : README.index("### Scale")]
+    named = set(re.findall(r"`(test_\w+\.py)`", table))
+    here = Path(__file__).parent
+    assert all((here / name).is_file() for name in named)
+    about = ("runner", "resume", "faults", "clusters", "scale", "files", "bad_input", "study")
+    assert {f"test_{name}.py" for name in about} <= named
 
 
 def test_every_study_is_listed():

@@ -7,7 +7,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import catalogue
-from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.errors import DataError, InvalidValue
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -80,7 +80,7 @@ def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
         ("", "declares no study"),
         ("x = 1\nx +", "line 2: invalid syntax"),
         ("\n\n1 / 0", "raises ZeroDivisionError, line 3: division by zero"),
-        ("from rsfstudy import Scene\nScene(alfa=1)", "raises TypeError, line 2"),
+        ("from rsfstudy import Scene\nScene(alfa=1)", "line 2: field = 'alfa'"),
         ("from rsfstudy import Scene\nScene(a=-1)", "line 2: a = -1.0: must be greater than 0"),
         ("raise SystemExit('no')", "raises SystemExit, line 1: no"),
     ],
@@ -150,7 +150,7 @@ class Failing(Reduction):
     unfit = DECLARATION.replace(
         "measure=", 'reductions=[Failing(name="s", of="critical_displacement")], measure='
     )
-    with pytest.raises(RunError, match="ZeroDivisionError: on numbers.*without reductions"):
+    with pytest.raises(DataError, match="ZeroDivisionError: on numbers.*without reductions"):
         rsfstudy.run(written(tmp_path, failing + unfit), output=tmp_path, progress=False, workers=0)
     kept = rsfstudy.open(tmp_path / "mine.unreduced.nc")
     assert kept.critical_displacement.notnull().all()

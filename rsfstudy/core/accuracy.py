@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
@@ -10,10 +11,6 @@ from rsfstudy.errors import InvalidValue
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
-
-#: Right-hand sides by digits asked for, over those at the default rtol, as the study accuracy_cost
-#: measured them for a limit cycle.
-_WORK_BY_DIGITS = {2.0: 0.3, 3.0: 0.35, 5.0: 0.53, 7.0: 1.0, 8.0: 1.52, 9.0: 2.58, 10.0: 4.85}
 
 
 @dataclass(frozen=True)
@@ -59,17 +56,6 @@ class Accuracy:
         return 0.07 * self.rtol
 
     @property
-    def relative_work(self) -> float:
-        """What this accuracy costs, over what the default one does."""
-        known = sorted(_WORK_BY_DIGITS)
-        digits = min(-math.log10(self.rtol), known[-1] + 2.0)
-        above = next((d for d in known[1:] if d >= digits), known[-1])
-        below = known[known.index(above) - 1]
-        share = (digits - below) / (above - below)
-        low, high = _WORK_BY_DIGITS[below], _WORK_BY_DIGITS[above]
-        return float(low * (high / low) ** share)
-
-    @property
     def switch_norm(self) -> float:
         """Slip rate norm w up to which the slow manifold stands in for the full equations.
 
@@ -94,3 +80,14 @@ class Accuracy:
         manifold.
         """
         return 0.3 * self.rtol
+
+
+def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:
+    """What an accuracy costs over what the default one does, from measured costs by digits."""
+    known = sorted(by_digits)
+    digits = min(-math.log10(rtol), known[-1] + 2.0)
+    above = next((d for d in known[1:] if d >= digits), known[-1])
+    below = known[known.index(above) - 1]
+    share = (digits - below) / (above - below)
+    low, high = by_digits[below], by_digits[above]
+    return float(low * (high / low) ** share)

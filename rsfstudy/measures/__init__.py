@@ -13,8 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.accuracy import Accuracy, relative_work
 from rsfstudy.core.stepping import Halt, Meter
+from rsfstudy.errors import InvalidValue
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
@@ -78,6 +79,17 @@ class Measure:
         """Right-hand sides one cell usually takes at the default accuracy."""
         raise TypeError(f"{type(self).__name__} states no typical work")
 
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        """Right-hand sides by digits asked for, over those at the default accuracy, as the study
+        accuracy_cost measured them; here for a limit cycle, the most demanding.
+        """
+        return {2.0: 0.3, 3.0: 0.35, 5.0: 0.53, 7.0: 1.0, 8.0: 1.52, 9.0: 2.58, 10.0: 4.85}
+
+    def expected_work(self, accuracy: Accuracy) -> float:
+        """Right-hand sides one cell usually takes at an accuracy."""
+        return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The physics: measure one scene, charging `meter`."""
         raise TypeError(f"{type(self).__name__} measures nothing")
@@ -90,10 +102,34 @@ class Measure:
         """The same, with what it spent."""
         meter = Meter(accuracy.budget, dict(accuracy.methods))
         try:
-            found = self.find(scene, accuracy, meter)
+            found = self._checked(self.find(scene, accuracy, meter))
         except Halt as halt:
             found = Outcome(halt.status, message=str(halt))
         return Outcome(found.status, found.values, found.message, meter.spent), meter
+
+    def _checked(self, found: Outcome) -> Outcome:
+        """What was found, if it is what was declared; an answer without a finite number is none.
+
+        Raises
+        ------
+        InvalidValue
+            For a number that is not declared, or has another shape.
+        """
+        for name, value in found.values.items():
+            if name not in self.variables:
+                raise InvalidValue("measured", name, "is not declared", choices=self.variables)
+            shape = tuple(len(self.inner_coordinates[d]) for d in self.variables[name])
+            if np.shape(value) != shape:
+                rule = f"has the shape {np.shape(value)} and must have {shape}"
+                raise InvalidValue("measured", name, rule)
+        if found.status is not Status.OK:
+            return found
+        headline = np.asarray(found.values.get(self.headline, np.nan), dtype=float)
+        if np.isfinite(headline).any():
+            return found
+        return Outcome(
+            Status.NOT_FINITE, found.values, f"{self.headline} = {headline}", found.rhs_evaluations
+        )
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""

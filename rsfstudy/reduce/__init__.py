@@ -1,21 +1,22 @@
 """Reductions: from a lattice to boundaries and scaling slopes, kept in the same dataset.
 
 A reduction never draws on failed or missing cells: where there are any within its support, the
-result is NaN and says why. Cells that answered without a number (such as `stable_for_all_steps`)
-are left out, and counted.
+result is NaN and says why, unless it is told to leave the failed ones out. Cells that answered
+without a number (such as `stable_for_all_steps`) are left out, and counted.
 """
 
 from __future__ import annotations
 
 import xarray as xr
 
-from rsfstudy.reduce.base import Reduction
+from rsfstudy.reduce.base import Reduction, failed, without_failures
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.fits import LinearFit, ProportionalFit
 from rsfstudy.reduce.paths import Parting
 from rsfstudy.reduce.work import Cheapest
-from rsfstudy.vocabulary import quantity
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage, quantity
 
 __all__ = [
     "Boundary",
@@ -33,17 +34,32 @@ __all__ = [
 ]
 
 
-def reduced(dataset: xr.Dataset, reductions: tuple[Reduction, ...]) -> xr.Dataset:
-    """The dataset with the results of its reductions, each described by the vocabulary."""
+def reduced(
+    dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
+) -> xr.Dataset:
+    """The dataset with the results of its reductions, each described by the vocabulary.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    reductions : tuple of Reduction
+    despite_failures : bool
+        Leave failed cells out instead of refusing to draw on them; the results say so.
+    """
+    lost = int((failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum())
+    despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
     for reduction in reductions:
-        for name, values in reduction(dataset).data_vars.items():
+        support = without_failures(dataset) if despite else dataset
+        for name, values in reduction(support).data_vars.items():
             about = quantity(str(name))
             own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
             scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
-            values.attrs = {"long_name": about.long_name, "units": about.units, **scale, **own}
-            dataset = dataset.assign({name: values})
+            kind = {"coverage_content_type": coverage(str(name))}
+            named = {"long_name": about.long_name, "units": about.units}
+            values.attrs = {**named, **scale, **kind, **own}
+            dataset = dataset.assign({name: values.assign_attrs(despite)})
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:
                     about = quantity(str(coordinate))
                     dataset[coordinate].attrs = {"long_name": about.long_name, "units": about.units}
-    return dataset
+    return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})

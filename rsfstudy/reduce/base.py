@@ -45,6 +45,18 @@ def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
     return bad.any([d for d in bad.dims if d in along or d not in dataset[of].dims])
 
 
+def without_failures(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with its failed cells as cells that answered without a number."""
+    lost = failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
+    kept = {
+        name: values.where(~lost)
+        for name, values in dataset.data_vars.items()
+        if values.dtype.kind == "f" and set(lost.dims) <= set(values.dims)
+    }
+    status = dataset["status"].where(~lost, int(Status.NO_STEP))
+    return dataset.assign({**kept, "status": status})
+
+
 def dimension_of(dataset: xr.Dataset, on: str) -> str:
     """The one dimension a coordinate lies along.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 import xarray as xr
 
 from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
@@ -54,9 +55,12 @@ class _Fit(Reduction):
         support = within(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        used = support[self.of].notnull()
+        of = support[self.of]
+        # sums over arrays that lie otherwise in memory differ in the last bit
+        of = of.copy(data=np.ascontiguousarray(of.values))
+        used = of.notnull()
         x = self.centred(support[self.on].astype(float).where(used), dimension)
-        y = self.centred(self.offset(support[self.of]), dimension)
+        y = self.centred(self.offset(of), dimension)
         count = used.sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x

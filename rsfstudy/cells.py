@@ -1,0 +1,134 @@
+"""One cell after the other: what is computed in each, and what becomes of one that goes wrong."""
+
+from __future__ import annotations
+
+import faulthandler
+import itertools
+import os
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rsfstudy import provenance
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import RunError
+from rsfstudy.journal import Finished
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.scene import Scene
+from rsfstudy.status import Status
+
+#: Time in s a cell may take on a worker, far beyond what the usual work budget allows.
+DEFAULT_TIME_LIMIT = 600.0
+#: How often finished cells are handed over in one process, in s.
+_TELL = 0.2
+#: How often a worker looks for a cell that is over its limit, in s.
+_LOOK = 0.5
+
+#: Cells by their names.
+Batch = Sequence[tuple[bytes, Scene]]
+Found = list[tuple[bytes, Finished]]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is computed in every cell, and under which conditions.
+
+    Parameters
+    ----------
+    measure : Measure
+    accuracy : Accuracy
+    time_limit : float
+        Time in s a cell may take on a worker. Nothing bounds it in the user's own process.
+    code : mapping
+        Versions of all that decides a number, which every worker must have.
+    """
+
+    measure: Measure
+    accuracy: Accuracy
+    time_limit: float = DEFAULT_TIME_LIMIT
+    code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
+
+
+#: Takes a task and batches, and yields the finished cells, in any order.
+Mapper = Callable[[Task, Iterable[Batch]], Generator[Found]]
+
+
+def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+    """In this process, one cell after the other; they are handed over every now and then, because
+    keeping each for itself may cost more than computing it.
+    """
+    found: Found = []
+    began = told = time.monotonic()
+    for key, scene in itertools.chain.from_iterable(batches):
+        found.append((key, computed(task, scene)))
+        now = time.monotonic()
+        if now - told > min(_TELL, 0.5 * (told - began)):
+            yield found
+            found, told = [], time.monotonic()
+    yield found
+
+
+def on_worker(task: Task, batch: Batch) -> Found:
+    """In a worker process, which ends itself at a cell that is over its time limit.
+
+    Raises
+    ------
+    RunError
+        Where the worker runs other versions than the run was started with.
+    """
+    ours = provenance.code()
+    for name, wanted in task.code.items():
+        if ours.get(name) != wanted:
+            raise RunError(
+                f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
+                "mix. Give the workers the same versions"
+            )
+    found: Found = []
+    for key, scene in batch:
+        _deadlines.set(task.time_limit)
+        found.append((key, computed(task, scene)))
+    _deadlines.clear()
+    return found
+
+
+def computed(task: Task, scene: Scene) -> Finished:
+    """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
+    begin = time.perf_counter()
+    try:
+        outcome = task.measure(scene, task.accuracy)
+    except (Exception, SystemExit) as error:
+        # not str(error), which may raise as well
+        text = traceback.format_exception_only(error)[-1].strip()
+        outcome = Outcome(Status.CELL_RAISED, message=text)
+    return outcome, time.perf_counter() - begin
+
+
+class _Deadlines:
+    """Ends this process once a thread has not finished its cell in time."""
+
+    def __init__(self) -> None:
+        self._until: dict[int, float] = {}
+        self._watch: threading.Thread | None = None
+
+    def set(self, seconds: float) -> None:
+        """This thread starts a cell."""
+        self._until[threading.get_ident()] = time.monotonic() + seconds
+        if self._watch is None:
+            self._watch = threading.Thread(target=self._look, daemon=True)
+            self._watch.start()
+
+    def clear(self) -> None:
+        """This thread has no cell."""
+        self._until.pop(threading.get_ident(), None)
+
+    def _look(self) -> None:
+        while True:
+            time.sleep(_LOOK)
+            if any(time.monotonic() > end for end in list(self._until.values())):
+                faulthandler.dump_traceback()  # the worker's log says where it hangs
+                os._exit(1)
+
+
+_deadlines = _Deadlines()

@@ -1,0 +1,98 @@
+"""One results dataset held against another, and a cell found by its place."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import MEASURED_TIMES
+
+
+def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+    """How two datasets of one study agree, variable by variable, in the cells that both have.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``variable``, ``values``, ``identical`` and ``largest_difference``; in ``attrs["differs"]``
+        what decides a number and is not the same in both. Times, which no two runs share, are left
+        out.
+    """
+    pending = [d["status"] == int(Status.PENDING) for d in (theirs, ours)]
+    both = ~(pending[0] | pending[1])
+    rows = []
+    for name in theirs.data_vars:
+        if name in MEASURED_TIMES or name not in ours:
+            continue
+        a, b = theirs[name], ours[name]
+        known = np.broadcast_to(True, a.shape)
+        if set(both.dims) <= set(a.dims):
+            known = np.asarray(both.broadcast_like(a).transpose(*a.dims))
+        elif not bool(both.all()):
+            continue  # a reduction over cells that one of them has not
+        rows.append({"variable": name, **_agreement(a.values[known], b.values[known])})
+    frame = pd.DataFrame(rows)
+    frame.attrs["differs"] = _differences(*(_fingerprint(d) for d in (theirs, ours)))
+    return frame
+
+
+def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
+    if theirs.dtype.kind != "f":
+        same = np.asarray(theirs == ours)
+        return {"values": same.size, "identical": int(same.sum()), "largest_difference": np.nan}
+    same = (theirs == ours) | (np.isnan(theirs) & np.isnan(ours))
+    gap = np.abs(theirs - ours)[~same]
+    largest = float(np.max(gap)) if gap.size else 0.0
+    return {"values": same.size, "identical": int(same.sum()), "largest_difference": largest}
+
+
+def _fingerprint(dataset: xr.Dataset) -> dict[str, Any]:
+    return dict(json.loads(dataset.attrs["provenance"])["fingerprint"])
+
+
+def _differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    return {
+        name: (theirs.get(name), ours.get(name))
+        for name in sorted({*theirs, *ours})
+        if theirs.get(name) != ours.get(name)
+    }
+
+
+def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
+    """The number of the cell at a place, in row-major order.
+
+    Raises
+    ------
+    InvalidValue
+        Where the place names no dimension, leaves one out, or is not on its axis.
+    """
+    status = dataset["status"]
+    for name in place:
+        if name not in status.dims:
+            raise InvalidValue("cell", name, "is no axis", choices=[str(d) for d in status.dims])
+    index = []
+    for dimension in map(str, status.dims):
+        values = dataset[dimension].values
+        if dimension not in place:
+            if values.size > 1:
+                raise InvalidValue("cell", dict(place), f"leaves {dimension} open")
+            index.append(0)
+            continue
+        wanted = place[dimension]
+        if values.dtype.kind in "iuf" and isinstance(wanted, int | float):
+            found = np.flatnonzero(np.isclose(values, wanted, rtol=1e-5, atol=0.0))
+            nearest = np.argsort(np.abs(values[found] - wanted))[:1]
+            found = found[nearest]
+        else:
+            found = np.flatnonzero(values.astype(str) == str(wanted))
+        if not found.size:
+            raise InvalidValue(dimension, wanted, "is not on its axis", choices=map(str, values))
+        index.append(int(found[0]))
+    return int(np.ravel_multi_index(index, status.shape))

@@ -1,0 +1,70 @@
+"""The cells of a study before any is computed: how each is found again, and in which order they
+are computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from operator import attrgetter
+
+import numpy as np
+
+from rsfstudy.scene import FIELDS, Scene
+from rsfstudy.study import Study
+
+_values = attrgetter(*FIELDS)
+_KEY = np.dtype("V16")
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+
+
+def cell_key(scene: Scene) -> bytes:
+    """Name of a cell: a digest of the exact values of its scene."""
+    return hashlib.sha256(repr(_values(scene)).encode()).digest()[: _KEY.itemsize]
+
+
+class Plan:
+    """The cells of a study in row-major order; it holds no scenes, so that large lattices fit.
+
+    Parameters
+    ----------
+    study : Study
+
+    Attributes
+    ----------
+    keys : ndarray of bytes, shape (cells,)
+        Name of each cell; equal scenes share one.
+    different : ndarray of int
+        The first cell of each different scene.
+
+    Raises
+    ------
+    InvalidValue
+        For a cell that makes no meaningful scene, naming its place on the axes.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        names = bytearray()
+        for scene in study.scenes():
+            names += cell_key(scene)
+        self.keys = np.frombuffer(names, dtype=_KEY)
+        self.different = np.sort(np.unique(self.keys, return_index=True)[1])
+
+    def batches(self, cells: np.ndarray, size: int) -> Iterator[list[tuple[bytes, Scene]]]:
+        """Cells with their scenes, as many at a time; each batch is made when it is asked for."""
+        for start in range(0, len(cells), size):
+            batch = cells[start : start + size]
+            yield [(self.keys[cell].tobytes(), self.study.scene(int(cell))) for cell in batch]
+
+
+def scattered(cells: np.ndarray) -> np.ndarray:
+    """The same cells in strides of the golden section: the first few are a sample of all, so that
+    what they show (all fail, or how long they take) holds for the rest.
+    """
+    count = len(cells)
+    stride = max(1, round(_GOLDEN * count))
+    while math.gcd(stride, count) > 1:
+        stride += 1
+    return np.asarray(cells[np.arange(count) * stride % max(1, count)])

@@ -1,0 +1,36 @@
+"""Run a named study on a SLURM cluster: ``python slurm.py rate_step_boundary``.
+
+Run it on a login node, in the environment in which rsfstudy is installed (with dask-jobqueue); it
+submits jobs, waits for the first, and ends them when the study is done.
+"""
+
+import sys
+
+import distributed
+from dask_jobqueue.slurm import SLURMCluster
+
+import rsfstudy
+
+#: One job: 16 worker processes of one thread each, because a cell keeps its thread busy.
+JOB = {
+    "cores": 16,
+    "processes": 16,
+    "memory": "32GB",
+    "walltime": "02:00:00",
+    "queue": "normal",  # your partition
+    # "account": "...", "interface": "ib0", as your site asks for
+}
+JOBS = 4
+
+
+def main(study: str, cluster: type = SLURMCluster, jobs: int = JOBS, **job: object) -> None:
+    """Start a cluster, run a study on it, and say what came out."""
+    with cluster(**{**JOB, **job}) as found, distributed.Client(found) as client:
+        found.scale(jobs=jobs)
+        client.wait_for_workers(1)
+        dataset = rsfstudy.run(study, client=client)
+    print(rsfstudy.check(dataset)[["id", "claim", "published", "ours", "verdict"]].to_string())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,102 @@
+"""A study whose cells go wrong on demand, as a module of the tests and as a study file of its own.
+
+Its measure gives b/a. The environment says how long a cell takes, and what it does at which b/a.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+
+def _raise(error: BaseException):
+    raise error
+
+
+def _eat_memory():
+    eaten = []
+    while True:
+        eaten.append(np.ones(2_000_000))
+        time.sleep(0.01)
+
+
+def _hang():
+    while True:
+        time.sleep(0.01)
+
+
+FAULTS: dict[str, Callable] = {
+    "raises": lambda _meter: _raise(ZeroDivisionError("in the cell")),
+    "raises unprintable": lambda _meter: _raise(Unprintable()),
+    "runs out of memory": lambda _meter: np.ones(10**15),
+    "recurses": lambda meter: FAULTS["recurses"](meter),
+    "exits": lambda _meter: _raise(SystemExit("bye")),
+    "spends": lambda meter: meter.charge("any", 10**9),
+    "nan": lambda _meter: Outcome(Status.OK, {"total": np.nan}),
+    "nothing": lambda _meter: Outcome(Status.OK),
+    "no outcome": lambda _meter: 3.0,
+    "undeclared": lambda _meter: Outcome(Status.OK, {"totla": 1.0}),
+    "too many": lambda _meter: Outcome(Status.OK, {"total": np.ones(3)}),
+    "text": lambda _meter: Outcome(Status.OK, {"total": "one"}),
+    "dies": lambda _meter: os._exit(1),
+    "segfaults": lambda _meter: ctypes.string_at(0),
+    "eats memory": lambda _meter: _eat_memory(),
+    "hangs": lambda _meter: _hang(),
+}
+
+
+@dataclass(frozen=True)
+class Faulty(Measure):
+    """Gives b/a, except where it goes wrong."""
+
+    fault: str = ""
+    at: tuple[float, ...] = ()
+    name: ClassVar[str] = "faulty"
+    headline: ClassVar[str] = "total"
+    variables: ClassVar = {"total": ()}
+    typical_work: ClassVar[int] = 1
+
+    def find(self, scene, accuracy, meter):
+        time.sleep(float(os.environ.get("FAULT_TAKES", "0")))
+        if scene.b_over_a in self.at or (self.fault and not self.at):
+            return FAULTS[self.fault](meter)
+        meter.charge("any", 7)
+        return Outcome(Status.OK, {"total": scene.b_over_a})
+
+
+#: the same code, whether it is imported or run as a study file
+Faulty.source = Path(__file__).read_text()
+
+
+def declared(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Study:
+    """A lattice of b/a = 2, 2.5, 3 and so on."""
+    return Study(
+        name="faulty",
+        title="Cells that go wrong",
+        base=Scene(),
+        axes=[Axis("b_over_a", [2.0 + 0.5 * i for i in range(cells)])],
+        measure=Faulty(fault, at),
+    )
+
+
+study = declared(
+    os.environ.get("FAULT", ""),
+    tuple(float(at) for at in os.environ.get("FAULT_AT", "").split()),
+    int(os.environ.get("FAULT_CELLS", "4")),
+)

@@ -1,0 +1,79 @@
+"""Shared by the tests of running: a small lattice, and the command as a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures.critical_step import CriticalStep
+
+SMALL = Study(
+    name="small",
+    title="A small lattice",
+    base=Scene(),
+    axes=[
+        Axis("case", {"constant": {"normal_stress": "constant"}, "variable": {"alpha": 0.56}}),
+        Axis("b_over_a", [2.0, 2.5, 3.0]),
+    ],
+    measure=CriticalStep(),
+)
+FAULTY = Path(__file__).with_name("faulty.py")
+
+
+def run(study=SMALL, **options) -> xr.Dataset:
+    """In this process and in memory, unless told otherwise."""
+    return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
+    """The same bits, but for the time they took."""
+    xr.testing.assert_identical(
+        ours.drop_vars("wall_time").drop_attrs(), theirs.drop_vars("wall_time").drop_attrs()
+    )
+
+
+def command(*words, **environment) -> subprocess.Popen:
+    """The command in a process, and a session, of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "rsfstudy.cli", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "COLUMNS": "500", **environment},
+    )
+
+
+def ended(process: subprocess.Popen, seconds: float = 120) -> tuple[int, str, str]:
+    """Exit status, output and errors, once it has ended."""
+    out, said = process.communicate(timeout=seconds)
+    assert "Traceback" not in said, said
+    return process.returncode, out, said
+
+
+def cells_in(journal: Path) -> int:
+    """Number of cells another process has kept so far."""
+    try:
+        with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=ro", uri=True)) as db:
+            return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
+    except sqlite3.Error:
+        return 0
+
+
+def until(true: Callable[[], bool], process: subprocess.Popen | None = None) -> None:
+    """Wait until something is so, or a process has ended."""
+    for _ in range(1200):
+        if true() or (process is not None and process.poll() is not None):
+            return
+        time.sleep(0.05)
+    raise AssertionError("it never came to be")

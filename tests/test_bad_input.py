@@ -1,0 +1,390 @@
+"""Bad input fails before any work starts, with an error that names the place: never a traceback,
+never a half-written output.
+"""
+
+import json
+import os
+import string
+import sys
+import threading
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from running import FAULTY, SMALL, command, ended, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, catalogue, cli, plots, restore, store
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.scene import FIELDS
+
+#: Anything a user, a JSON file or a notebook may put where a value is asked for.
+ODD = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-5, 5),
+    st.floats(),
+    st.text(max_size=5),
+    st.just([]),
+    st.just({}),
+    st.just(np.nan),
+    st.just(np.array([1.0, 2.0])),
+    st.just(1j),
+    st.builds(object),
+)
+NUMBERS = st.floats(1.1, 4.0)
+
+
+def made(make, names):
+    """What is made, or None where it is refused with one of these names."""
+    try:
+        return make()
+    except InvalidValue as error:
+        said = str(error)
+    assert any(repr(name).strip("'\"") in said for name in names), said
+    return None
+
+
+# ---- declarations -------------------------------------------------------------------------------
+
+
+@given(st.dictionaries(st.sampled_from(FIELDS) | st.text(max_size=6), ODD, max_size=4))
+def test_a_scene_is_made_or_refused(fields):
+    scene = made(lambda: Scene(**fields), fields)
+    assert scene is None or np.isfinite(scene.stiffness)
+
+
+@given(
+    st.sampled_from(FIELDS) | st.text(max_size=6) | ODD,
+    st.lists(ODD, max_size=4) | st.dictionaries(st.text(max_size=3), ODD, max_size=2) | ODD,
+)
+@example("b_over_a", {"x": {"b_over_a": [1]}})
+def test_an_axis_is_made_or_refused(dimension, values):
+    try:
+        axis = Axis(dimension, values)
+    except InvalidValue:
+        return
+    assert len(axis) > 0
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(
+            ["name", "title", "summary", "base", "axes", "measure", "reductions", "claims",
+             "plot", "references", "accuracy", "version", "overrides"]
+        ),
+        ODD | st.just(SMALL.base) | st.just(SMALL.axes) | st.just(SMALL.measure) | st.just([3]),
+        max_size=3,
+    )
+)  # fmt: skip
+def test_a_study_is_made_or_refused(parts):
+    good = {"name": "n", "title": "t", "base": Scene(), "axes": SMALL.axes}
+    study = made(lambda: Study(**{**good, "measure": SMALL.measure, **parts}), parts)
+    assert study is None or json.dumps(study.describe())
+
+
+NAMES = st.sampled_from(FIELDS) | st.text(max_size=6)
+
+
+@given(st.dictionaries(NAMES, ODD | st.lists(ODD, max_size=3), max_size=3))
+def test_overrides_make_a_study_or_are_refused(overrides):
+    try:
+        study = SMALL.with_(**overrides)
+        scenes = list(study.scenes())
+    except InvalidValue:
+        return
+    assert len(scenes) == study.size
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ([], "has no values"),
+        ([2.0, 2.0], "stands twice"),
+        ([2.0, np.nan], "must be finite"),
+        ([np.inf], "must be finite"),
+        (3.0, "must be a list"),
+        ([[2.0]], "must be a number"),
+        (["two"], "must be a number"),
+        ([None], "must be"),
+    ],
+)
+def test_values_of_an_axis(values, complaint):
+    def scenes():
+        axes = [Axis("b_over_a", values)]
+        study = Study(name="n", title="t", base=Scene(), axes=axes, measure=CriticalStep())
+        return list(study.scenes())
+
+    with pytest.raises(InvalidValue, match=complaint):
+        scenes()
+
+
+def test_an_axis_may_be_unsorted():
+    """The values stay in the order they were given, and fits do not depend on it."""
+    down = run(SMALL.with_(b_over_a=[3.0, 2.0, 2.5]))
+    assert down.b_over_a.values.tolist() == [3.0, 2.0, 2.5]
+    up = run(SMALL)
+    xr.testing.assert_equal(
+        down.critical_velocity_ratio.sortby("b_over_a"), up.critical_velocity_ratio
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "suggestion"),
+    [
+        (["run", "rate_step_bondary"], "rate_step_boundary"),
+        (["show", "limit_cycle"], "limit_cycles"),
+        (["run", "rate_step_boundary", "--set", "b_over=2"], "b_over_a"),
+        (["run", "rate_step_boundary", "--set", "alhpa=0.3"], "alpha"),
+        (["run", "rate_step_boundary", "--set", "law=slipp"], "slip"),
+        (["run", "rate_step_boundary", "--set", "case=alpha = 0.2"], "alpha = 0.25"),
+    ],
+)
+def test_unknown_names_come_with_suggestions(words, suggestion):
+    code, said = called(words)
+    assert code == 2
+    assert f"Did you mean '{suggestion}'" in said or f"'{suggestion}'" in said
+
+
+# ---- the command line ---------------------------------------------------------------------------
+
+
+def called(words):
+    """Exit status and what is said, with the same handling of errors as the real entry point."""
+    runner = CliRunner()
+    with runner.isolation() as (out, err, _both):
+        try:
+            sys_argv, sys.argv = sys.argv, ["rsfstudy", *words]
+            try:
+                cli.main()
+                code = 0
+            except SystemExit as ended_with:
+                code = int(ended_with.code or 0)
+        finally:
+            sys.argv = sys_argv
+        said = out.getvalue().decode(errors="replace") + err.getvalue().decode(errors="replace")
+    return code, " ".join(said.split())
+
+
+#: Nearly right settings, and anything at all.
+SETTINGS = st.one_of(
+    st.text(max_size=12),
+    st.builds(
+        "{}={}".format,
+        st.sampled_from([*FIELDS, "case", "b_over"]),
+        st.text(alphabet=string.digits + ".,:-+eainf ", max_size=10),
+    ),
+    st.builds(
+        "{}={}:{}:{}".format, st.sampled_from(FIELDS), st.floats(), st.floats(),
+        st.integers(-2, 30) | st.floats(),
+    ),
+)  # fmt: skip
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(SETTINGS, min_size=1, max_size=2))
+@example(["b_over_a=2:3:100000000000"])
+@example(["b_over_a=2:3:1e400"])
+@example(["b_over_a=1"])
+@example(["=2"])
+@example(["b_over_a="])
+@example(["b_over_a=2,,3"])
+def test_any_setting_is_taken_or_refused(texts):
+    words = ["show", "rate_step_boundary"]
+    for text in texts:
+        words += ["--set", text]
+    code, said = called(words)
+    assert code in (0, 2), said
+    assert code == 0 or "rror" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run"],
+        ["run", "rate_step_boundary", "--all"],
+        ["run", "rate_step_boundary", "--rtol", "0"],
+        ["run", "rate_step_boundary", "--rtol", "nan"],
+        ["run", "rate_step_boundary", "--workers", "0"],
+        ["run", "rate_step_boundary", "--serial", "--scheduler", "tcp://127.0.0.1:1"],
+        ["run", "rate_step_boundary", "--format", "csv"],
+        ["run", "rate_step_boundary", "--time-limit", "0"],
+        ["run", "rate_step_boundary", "--set", "b_over_a=1"],
+        ["run", "rate_step_boundary", "--set", "phi=10"],
+        ["run", "nothing.py"],
+        ["rerun"],
+        ["nothing"],
+    ],
+)
+def test_wrong_usage(words, tmp_path, monkeypatch):
+    """Exit status 2, a message, and nothing written."""
+    monkeypatch.chdir(tmp_path)
+    code, said = called(words)
+    assert code == 2
+    assert "rror" in said
+    assert os.listdir(tmp_path) == []
+
+
+# ---- files --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    output = tmp_path_factory.mktemp("small")
+    run(output=output)
+    return output / "small.nc"
+
+
+@settings(max_examples=150)
+@given(data=st.data())
+def test_a_damaged_file_is_refused_or_unharmed(small, tmp_path_factory, data):
+    """Bytes changed, blanked or cut off, anywhere: an error that names the file, or, where they
+    were not in use, the same numbers.
+    """
+    content = bytearray(small.read_bytes())
+    at = data.draw(st.integers(0, len(content) - 1))
+    kind = data.draw(st.sampled_from(["flip", "blank", "cut"]))
+    if kind == "flip":
+        content[at] ^= 1 << data.draw(st.integers(0, 7))
+    elif kind == "blank":
+        content[at : at + 512] = bytes(len(content[at : at + 512]))
+    else:
+        del content[at:]
+    path = tmp_path_factory.mktemp("damaged") / "damaged.nc"
+    path.write_bytes(content)
+    try:
+        found = rsfstudy.open(path)
+    except DataError as error:
+        said = str(error)
+    else:
+        said = "damaged.nc unharmed"
+        xr.testing.assert_equal(found, xr.load_dataset(small))
+    assert "damaged.nc" in said
+
+
+@pytest.mark.parametrize("how", ["empty", "directory", "text", "foreign", "missing"])
+@pytest.mark.parametrize("command", ["check", "show", "plot", "rerun"])
+def test_what_is_no_results_file(command, how, tmp_path):
+    path = tmp_path / "what.nc"
+    if how == "empty":
+        path.touch()
+    elif how == "directory":
+        path.mkdir()
+    elif how == "text":
+        path.write_text("no NetCDF")
+    elif how == "foreign":
+        xr.Dataset({"v": 1.0}).to_netcdf(path)
+    code, said = called([command, str(path)])
+    assert code == 1
+    assert "what.nc" in said
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=150)
+@given(data=st.data())
+def test_a_declaration_that_was_meddled_with(small, data):
+    """Sealed anew, so that the digests are right: it is restored, or refused."""
+    dataset = store.read(small)
+    declared = json.loads(dataset.attrs["declaration"])
+    place, key = declared, data.draw(st.sampled_from(sorted(declared)))
+    while isinstance(place[key], dict | list) and place[key] and data.draw(st.booleans()):
+        place = place[key]
+        key = data.draw(
+            st.sampled_from(list(place) if isinstance(place, dict) else range(len(place)))
+        )
+    place[key] = data.draw(JSON)
+    meddled = dataset.assign_attrs(declaration=json.dumps(declared))
+    for use in (rsfstudy.check, plots.figure, lambda d: restore.study(store.declaration(d))):
+        try:
+            use(meddled)
+        except RsfStudyError:
+            continue
+
+
+@settings(max_examples=60)
+@given(st.text(max_size=40) | st.sampled_from([
+    "raise KeyError(3)", "import nothing_at_all", "study = None", "\0", "(" * 300, "def f(:",
+    "from rsfstudy import *\nstudy = Study()", "import sys; sys.exit(0)", "1/0",
+    "study = lambda: study", "class study: pass", "x" * 10**5, "while", "# -*- coding: nothing -*-",
+]))  # fmt: skip
+def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("file") / "mine.py"
+    path.write_text(text, errors="surrogatepass")
+    with pytest.raises(InvalidValue, match="mine"):
+        catalogue.load(str(path))
+
+
+def test_a_study_file_of_bytes(tmp_path):
+    (tmp_path / "mine.py").write_bytes(bytes(range(128, 255)))
+    with pytest.raises(InvalidValue, match="mine"):
+        catalogue.load(str(tmp_path / "mine.py"))
+
+
+# ---- where results go ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
+def test_an_output_that_cannot_be_written(output, monkeypatch):
+    """Told before any cell is computed."""
+    monkeypatch.setattr("rsfstudy.cells.computed", None)
+    with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
+        run(output=output)
+
+
+def test_a_journal_that_cannot_be_written(tmp_path, monkeypatch):
+    """An old journal on what is now read-only; root may write anything but a directory."""
+    (tmp_path / "small.cells.sqlite").mkdir()
+    with pytest.raises(DataError, match="cannot use .*--output"):
+        run(output=tmp_path)
+
+
+def test_an_error_on_the_command_line_is_one_message(tmp_path):
+    code, _out, said = ended(command("run", FAULTY, "--output", "/dev/null/results"))
+    assert code == 1
+    assert said.startswith("error: cannot use")
+
+
+def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
+    (tmp_path / "faulty.png").mkdir()
+    code, out, said = ended(command("run", FAULTY, "--serial", "--output", tmp_path))
+    assert code == 0
+    assert "no figure:" in said
+    assert "faulty.png" not in out
+    assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"
+
+
+@pytest.mark.parametrize("workers", [-1, 1.5, "two", None, True])
+def test_a_number_of_workers_that_is_none(workers):
+    with pytest.raises(InvalidValue, match="workers"):
+        run(workers=workers)
+
+
+def test_threads_that_run_studies_do_not_mix():
+    """Two studies at the same time in one process."""
+    found = {}
+
+    def computes(name, values):
+        found[name] = run(SMALL.with_(b_over_a=values))
+
+    threads = [
+        threading.Thread(target=computes, args=(n, v)) for n, v in (("a", [2.0]), ("b", [3.0]))
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    xr.testing.assert_equal(
+        found["a"].critical_velocity_ratio, run(SMALL.with_(b_over_a=[2.0])).critical_velocity_ratio
+    )

@@ -1,0 +1,231 @@
+"""On an existing Dask cluster: scheduler and workers as processes of their own, the same bits, and
+faults of the cluster told for what they are.
+"""
+
+import contextlib
+import json
+import os
+import re
+import runpy
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from faulty import declared
+from running import FAULTY, SMALL, cells_in, command, ended, run, same_numbers, until
+
+import rsfstudy
+from rsfstudy import cells, provenance, workers
+from rsfstudy.errors import RunError
+
+CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
+DASK = [sys.executable, "-m", "dask"]
+
+
+class Cluster:
+    """A scheduler and workers as processes, each worker in an empty directory of its own."""
+
+    def __init__(self, tmp_path, stack):
+        self.tmp_path, self.stack, self.workers = tmp_path, stack, []
+        file = tmp_path / "scheduler.json"
+        words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file"]
+        self.scheduler = self._start("scheduler", *words, str(file))
+        until(lambda: file.exists() and file.stat().st_size > 0, self.scheduler)
+        self.address = json.loads(file.read_text())["address"]
+
+    def _start(self, *words, cwd=None, **environment):
+        process = subprocess.Popen(
+            [*DASK, *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            cwd=cwd,
+            env={**os.environ, **environment},
+        )
+        self.stack.callback(self._end, process)
+        return process
+
+    @staticmethod
+    def _end(process):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait(30)
+
+    def worker(self, **environment):
+        place = self.tmp_path / f"worker{len(self.workers)}"
+        place.mkdir()
+        words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+        self.workers.append(self._start(*words, cwd=place, **environment))
+
+
+@pytest.fixture
+def separate(tmp_path):
+    with contextlib.ExitStack() as stack:
+        yield Cluster(tmp_path, stack)
+
+
+def test_the_same_bits_as_in_this_process(separate, tmp_path):
+    """The workers write nothing, neither where they are nor where the results go."""
+    separate.worker()
+    separate.worker()
+    with workers.existing_cluster(separate.address) as client:
+        same_numbers(run(SMALL, client=client, output=tmp_path / "results"), run())
+    assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
+    for place in ("worker0", "worker1"):
+        assert not list((tmp_path / place).rglob("*.nc"))
+        assert not list((tmp_path / place).rglob("*.sqlite"))
+
+
+def test_a_worker_lost_in_mid_run(separate, tmp_path):
+    """kill -9 of one of two, from the command line; no cell is blamed."""
+    slow = {"FAULT_TAKES": "0.05"}
+    separate.worker(**slow)
+    separate.worker(**slow)
+    words = ("run", FAULTY, "--scheduler", separate.address, "--output", tmp_path / "results")
+    process = command(*words, FAULT_CELLS="60")
+    until(lambda: cells_in(tmp_path / "results" / "faulty.cells.sqlite") > 0, process)
+    separate.workers[0].kill()
+    code, out, said = ended(process)
+    assert code == 0, out + said
+    same_numbers(rsfstudy.open("faulty", tmp_path / "results"), run(declared(cells=60)))
+
+
+def test_a_scheduler_lost_in_mid_run(separate, tmp_path):
+    """The run ends with what it has, and goes on without the cluster."""
+    separate.worker(FAULT_TAKES="0.05")
+    output = tmp_path / "results"
+    quick = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s", "FAULT_CELLS": "60"}
+    words = ("run", FAULTY, "--output", output)
+    process = command(*words, "--scheduler", separate.address, **quick)
+    until(lambda: cells_in(output / "faulty.cells.sqlite") > 0, process)
+    separate.scheduler.kill()
+    code, _out, said = ended(process)
+    assert code == 1
+    assert "the Dask scheduler is lost" in said
+    assert "of 60 cells are finished and kept" in said
+    resumed = run(declared(cells=60), output=output)
+    same_numbers(resumed, run(declared(cells=60)))
+
+
+def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
+    other = {**provenance.code(), "scipy": "0.1"}
+    monkeypatch.setattr(provenance, "code", lambda: other)
+    with pytest.raises(RunError, match=r"a worker has scipy .*, this run 0\.1"):
+        run(client=cluster)
+
+
+def test_a_task_carries_the_versions_it_needs():
+    assert cells.Task(SMALL.measure, SMALL.accuracy).code == provenance.code()
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp://127.0.0.1:1", "nonsense", "tcp://", "http://127.0.0.1:1", "tcp://[", "", " "]
+)
+def test_a_scheduler_that_does_not_answer_is_named(address):
+    with (
+        pytest.raises(RunError, match=re.escape(f"no Dask scheduler answers at {address!r}")),
+        workers.existing_cluster(address, timeout=1),
+    ):
+        pass
+
+
+def test_a_port_that_listens_and_says_nothing(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with (
+            pytest.raises(RunError, match="no Dask scheduler answers"),
+            workers.existing_cluster(address, timeout=1),
+        ):
+            pass
+
+
+def test_a_client_that_is_closed(tmp_path):
+    from distributed import Client
+
+    quiet = {"dashboard_address": ":0", "scheduler_kwargs": {"dashboard": False}}
+    with Client(n_workers=1, processes=False, **quiet) as client:
+        pass
+    with pytest.raises(RunError, match="client is closed"):
+        run(client=client)
+
+
+# ---- the files of the page ----------------------------------------------------------------------
+
+
+def test_the_slurm_job_is_what_it_says():
+    from dask_jobqueue import SLURMCluster
+
+    job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
+    with SLURMCluster(**job, scheduler_options={"dashboard": False}) as cluster:
+        script = cluster.job_script()
+    assert "#SBATCH -p normal" in script
+    assert "#SBATCH --cpus-per-task=16" in script
+    assert re.search("--nthreads 1 .*--nworkers 16 ", script)
+
+
+#: Jobs that are processes of this machine, in place of SLURM's.
+LOCAL_JOBS = """
+import runpy, sys
+from dask_jobqueue.local import LocalCluster
+
+def cluster(walltime, queue, **words):
+    return LocalCluster(**words)
+
+runpy.run_path(sys.argv[1])["main"](
+    "rate_step_boundary", cluster, jobs=1, cores=1, processes=1, memory="2GB",
+    python=sys.executable, scheduler_options={"dashboard": False},
+)
+"""
+
+
+def test_the_slurm_script_runs_a_study(tmp_path):
+    words = [sys.executable, "-c", LOCAL_JOBS, str(CLUSTERS / "slurm.py")]
+    ran = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert "reproduced" in ran.stdout
+    assert (tmp_path / "outputs" / "rate_step_boundary.nc").exists()
+
+
+def test_the_kubernetes_file_starts_a_cluster(tmp_path):
+    """Its own commands, as processes of this machine."""
+    parts = list(yaml.safe_load_all((CLUSTERS / "kubernetes.yaml").read_text()))
+    named = {(part["kind"], part["metadata"]["name"]): part for part in parts}
+    service = named["Service", "rsfstudy-scheduler"]
+
+    def container(name):
+        template = named["Deployment", name]["spec"]["template"]
+        return template["metadata"]["labels"], template["spec"]["containers"][0]
+
+    labels, scheduler = container("rsfstudy-scheduler")
+    _labels, worker = container("rsfstudy-workers")
+    assert service["spec"]["selector"] == labels
+    port = service["spec"]["ports"][0]["targetPort"]
+    assert {"containerPort": port} in scheduler["ports"]
+    assert f"tcp://rsfstudy-scheduler:{service['spec']['ports'][0]['port']}" in worker["args"]
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        free = str(server.getsockname()[1])
+    started = []
+    try:
+        for found in (scheduler, worker):
+            words = [word.replace("rsfstudy-scheduler", "127.0.0.1").replace(str(port), free)
+                     for word in found["args"]]  # fmt: skip
+            started.append(
+                subprocess.Popen(
+                    [sys.executable, "-m", *words],
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    cwd=tmp_path,
+                    start_new_session=True,
+                )
+            )
+        with workers.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=30) as client:
+            same_numbers(run(client=client), run())
+    finally:
+        for process in started:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait(30)

@@ -1,0 +1,231 @@
+"""A cell that goes wrong is found, isolated and recorded; its neighbours are not blamed; nothing
+is drawn from it unless one says so.
+"""
+
+import os
+import shlex
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from faulty import declared
+from running import FAULTY, command, ended, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, workers
+from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import LinearFit, reduced
+from rsfstudy.runner import Run
+from rsfstudy.status import Status
+
+LABELS = {s.label: s for s in Status}
+
+
+def only_one_failed(dataset, status):
+    """Of b/a = 2, 2.5, 3, 3.5 the second failed, and the others have their values."""
+    assert dataset.status.values.tolist() == [0, LABELS[status], 0, 0]
+    np.testing.assert_array_equal(dataset.total, [2.0, np.nan, 3.0, 3.5])
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "message"),
+    [
+        ("raises", "cell_raised", "ZeroDivisionError: in the cell"),
+        ("raises unprintable", "cell_raised", "Unprintable"),
+        ("runs out of memory", "cell_raised", "MemoryError"),
+        ("recurses", "cell_raised", "RecursionError"),
+        ("exits", "cell_raised", "SystemExit: bye"),
+        ("spends", "work_budget_spent", "500000"),
+        ("nan", "not_finite", "total = nan"),
+        ("nothing", "not_finite", "total = nan"),
+        ("no outcome", "cell_raised", "AttributeError"),
+        ("undeclared", "cell_raised", "'totla': is not declared. Did you mean 'total'?"),
+        ("too many", "cell_raised", "has the shape (3,) and must have ()"),
+        ("text", "cell_raised", "could not convert"),
+    ],
+)
+def test_a_cell_that_goes_wrong(fault, status, message, cluster):
+    """In this process and on a worker alike."""
+    for where in ({"workers": 0}, {"client": cluster}):
+        dataset = run(declared(fault, at=(2.5,)), **where)
+        only_one_failed(dataset, status)
+        assert message in dataset.message.values[1]
+
+
+@pytest.mark.parametrize("fault", ["dies", "segfaults"])
+def test_a_cell_that_kills_its_worker(fault, monkeypatch):
+    """One batch holds the killer and its neighbours: only the killer is recorded."""
+    monkeypatch.setattr(Run, "_batch_size", lambda *_args: 4)
+    dataset = run(declared(fault, at=(2.5,)), workers=2)
+    only_one_failed(dataset, "worker_lost")
+    assert "more memory than a worker may use" in dataset.message.values[1]
+
+
+def test_a_cell_that_hangs():
+    """Past the time limit its worker ends itself; the cell is tried alone before it is blamed."""
+    dataset = run(declared("hangs", at=(2.5,)), workers=2, time_limit=1.0)
+    only_one_failed(dataset, "time_limit_spent")
+    assert "no answer within 1 s" in dataset.message.values[1]
+
+
+def test_a_cell_that_exhausts_memory(tmp_path):
+    """Dask ends the worker before the machine does."""
+    from distributed import Client, LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=1,
+            threads_per_worker=1,
+            memory_limit="600MiB",
+            dashboard_address=":0",
+            scheduler_kwargs={"dashboard": False},
+            silence_logs=50,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        dataset = run(declared("eats memory", at=(2.5,)), client=client)
+    only_one_failed(dataset, "worker_lost")
+
+
+@pytest.mark.parametrize("fault", ["raises", "nan", "dies"])
+def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path):
+    where = {"workers": 2 if fault == "dies" else 0}
+    with pytest.raises(RunError, match=r"the first \d+ cells all failed, .*keep_going=True"):
+        run(declared(fault, cells=1000), output=tmp_path, **where)
+    partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
+    tried = partial.status != int(Status.PENDING)
+    assert 10 <= int(tried.sum()) < 1000
+    assert not (tmp_path / "faulty.nc").exists()
+
+
+def test_it_goes_on_when_told_to():
+    dataset = run(declared("raises", cells=100), keep_going=True)
+    assert (dataset.status == int(Status.CELL_RAISED)).all()
+
+
+def test_a_few_failures_or_a_small_lattice_do_not_stop_it(tmp_path):
+    """Nor does trying the failures of an earlier run again."""
+    failing = tuple(2.0 + 0.5 * i for i in range(40))
+    half = declared("raises", at=failing, cells=80)
+    for _ in range(2):
+        dataset = run(half, output=tmp_path)
+        assert int((dataset.status == int(Status.CELL_RAISED)).sum()) == 40
+    assert (run(declared("raises", cells=9)).status == int(Status.CELL_RAISED)).all()
+
+
+def show(*words):
+    return ended(command("show", *words))
+
+
+def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path):
+    environment = {"FAULT": "raises", "FAULT_AT": "2.5 3.5"}
+    code, _out, _said = ended(command("run", FAULTY, "--output", tmp_path, **environment))
+    assert code == 1
+    code, out, _said = show(tmp_path / "faulty.nc")
+    assert code == 1
+    assert "2 cells failed" in out
+    assert out.count("ZeroDivisionError: in the cell") == 2
+    commands = [line.strip() for line in out.splitlines() if "rsfstudy rerun" in line]
+    assert len(commands) == 2
+    words = shlex.split(commands[0])
+    assert words[-2:] == ["--cell", "b_over_a=2.5"]
+    alone = subprocess.run(
+        [sys.executable, "-m", "rsfstudy.cli", *words[1:]],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
+    # it fails as it failed, with the traceback that says where
+    assert alone.returncode == 1
+    assert "in find" in alone.stderr
+    assert "ZeroDivisionError: in the cell" in alone.stderr
+
+
+def test_a_cell_of_a_named_study_alone(tmp_path):
+    whole = rsfstudy.run("displacement_boundary", workers=0, output=tmp_path, progress=False,
+                         b_over_a=[2.0, 3.0])  # fmt: skip
+    last = whole.isel(dict.fromkeys(whole.critical_displacement.dims, -1))
+    place = {str(d): last[d].item() for d in whole.critical_displacement.dims}
+    scene, outcome = rsfstudy.cell(tmp_path / "displacement_boundary.nc", **place)
+    assert scene.b_over_a == 3.0
+    assert outcome.values["critical_displacement"] == whole.critical_displacement.sel(place).item()
+    with pytest.raises(InvalidValue, match="leaves .* open"):
+        rsfstudy.cell(tmp_path / "displacement_boundary.nc", law="slip")
+    with pytest.raises(InvalidValue, match="is not on its axis"):
+        rsfstudy.cell(tmp_path / "displacement_boundary.nc", **{**place, "b_over_a": 9.0})
+
+
+def lattice(failing=(3.0,)) -> xr.Dataset:
+    return run(declared("raises", at=failing, cells=6))
+
+
+FIT = (LinearFit(name="slope", of="total", on="b_over_a"),)
+
+
+def test_reductions_refuse_failed_cells():
+    found = reduced(lattice(), FIT)
+    assert np.isnan(found.slope)
+    assert "failed or are missing" in found.slope.refused
+    assert "reduced_despite" not in found.attrs
+
+
+def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
+    found = reduced(lattice(), FIT, despite_failures=True)
+    assert float(found.slope) == pytest.approx(1.0, rel=1e-14)
+    assert int(found.slope_points) == 5
+    assert found.slope.despite == "1 failed cells are left out"
+    assert found.attrs["reduced_despite"] == "1 failed cells are left out"
+    # the lattice itself is as it was
+    assert found.status.values[2] == Status.CELL_RAISED
+    whole = reduced(lattice(failing=(99.0,)), FIT, despite_failures=True)
+    assert "reduced_despite" not in whole.attrs
+
+
+def test_a_missing_cell_is_refused_all_the_same():
+    partial = lattice(failing=(99.0,))
+    partial["status"][1] = int(Status.PENDING)
+    assert np.isnan(reduced(partial, FIT, despite_failures=True).slope)
+
+
+def test_the_run_passes_it_on(tmp_path):
+    """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
+    study = Study(
+        name="budgeted",
+        title="One cell fails",
+        base=Scene(normal_stress="constant"),
+        axes=[Axis("b_over_a", [2.0, 2.5, 3.0, 3.5, 4.0])],
+        measure=CriticalStep(of="displacement_step"),
+        reductions=[LinearFit(name="slope", of="critical_displacement", on="a_over_b_minus_a")],
+    )
+    failing = CriticalStep.find
+
+    def find(self, scene, accuracy, meter):
+        if scene.b_over_a == 3.0:
+            raise ZeroDivisionError
+        return failing(self, scene, accuracy, meter)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CriticalStep, "find", find)
+        assert np.isnan(run(study, output=tmp_path).slope)
+        told = run(study, output=tmp_path, despite_failures=True)
+    assert np.isfinite(told.slope)
+    assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
+
+
+def test_workers_that_never_come(monkeypatch):
+    """A scheduler without workers: the run ends with the reason."""
+    from distributed import Client, LocalCluster
+
+    monkeypatch.setattr(workers, "PATIENCE", 1.0)
+    with (
+        LocalCluster(
+            n_workers=0, dashboard_address=":0", scheduler_kwargs={"dashboard": False}
+        ) as cluster,
+        Client(cluster) as client,
+        pytest.raises(RunError, match="no worker for 1 s: start some"),
+    ):
+        run(declared(), client=client)

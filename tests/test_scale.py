@@ -1,0 +1,165 @@
+"""Large lattices: little memory and few messages a cell, and stores that are written in pieces."""
+
+import os
+
+import numpy as np
+import pytest
+import xarray as xr
+from faulty import declared
+from running import SMALL, run, same_numbers
+from scale import apart
+
+import rsfstudy
+from rsfstudy import Axis, Study, pieces, plan, plots, runner
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.scene import Scene
+
+
+@pytest.mark.parametrize("format", ["netcdf", "zarr"])
+def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
+    """Peak memory of a process that runs 60,000 cells, beyond that of one that has run 100."""
+    assert apart(60_000, 0, format)["bytes"] < 1000
+
+
+def test_a_plan_holds_no_scenes(monkeypatch):
+    """Each scene is made once for its name and once to be sent."""
+    made = []
+    check = Scene.__post_init__
+
+    def counted(self):
+        made.append(1)
+        check(self)
+
+    study = declared(cells=1000)
+    monkeypatch.setattr(Scene, "__post_init__", counted)
+    run(study)
+    # and along each axis: for coordinates, in the rehearsal and at the end
+    assert len(made) <= 2 * study.size + 2 * sum(study.shape) + 10
+
+
+def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
+    """However many cells: what waits there fills its memory."""
+    monkeypatch.setattr(runner.Run, "_batch_size", lambda *_args: 1)
+    waiting, most = set(), []
+    submit = cluster.submit
+
+    def counted(*words, **options):
+        future = submit(*words, **options)
+        waiting.add(future)
+        most.append(sum(f.status == "pending" for f in waiting))
+        return future
+
+    monkeypatch.setattr(cluster, "submit", counted)
+    run(declared(cells=60), client=cluster)
+    assert len(most) == 60
+    assert max(most) <= 4 + 2 * 2
+
+
+def test_batches_are_small_enough_to_lose():
+    study = declared(cells=100_000)
+    assert study.size > runner._LARGEST_BATCH * 3
+    ready = runner.Run.__new__(runner.Run)
+    ready.study, ready.workers = study, 2
+    assert ready._batch_size(study.size) == runner._LARGEST_BATCH
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
+def test_the_first_cells_are_a_sample_of_all(count):
+    """Every cell once, and no two neighbours one after the other in a long list."""
+    order = plan.scattered(np.arange(count))
+    assert sorted(order) == list(range(count))
+    if count >= 10:
+        assert (np.abs(np.diff(order)) > 1).all()
+
+
+# ---- Zarr ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("numbers", [3, 8, 10**6])
+def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch):
+    """In pieces of one cell, of part of a row, and in one; nothing but the store is left."""
+    monkeypatch.setattr(pieces, "_NUMBERS", numbers)
+    in_pieces = run(SMALL, output=tmp_path, format="zarr")
+    same_numbers(in_pieces.load().map(plain), run(SMALL))
+    assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.zarr"]
+    alone = xr.open_dataset(tmp_path / "small.zarr", engine="zarr", consolidated=False)
+    assert alone.attrs["completeness"] == "complete"
+    assert alone.critical_velocity_ratio.attrs == run().critical_velocity_ratio.attrs
+    assert rsfstudy.check(tmp_path / "small.zarr").empty
+    plots.save(rsfstudy.open(tmp_path / "small.zarr"), tmp_path / "small.png")
+
+
+def plain(values: xr.DataArray) -> xr.DataArray:
+    """Text as NetCDF reads it."""
+    return values.astype(object) if values.dtype.kind == "T" else values
+
+
+def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
+    monkeypatch.setattr(pieces, "_NUMBERS", 100)
+    options = {"workers": 0, "progress": False, "output": tmp_path}
+    store = rsfstudy.run("rate_step_boundary", format="zarr", **options)
+    file = rsfstudy.run("rate_step_boundary", **options)
+    xr.testing.assert_equal(store.zeta.load().drop_vars("case"), file.zeta.drop_vars("case"))
+    verdicts = [rsfstudy.check(found).verdict.tolist() for found in (store, file)]
+    assert verdicts[0] == verdicts[1]
+
+
+def test_a_store_that_is_there_is_not_replaced(tmp_path):
+    run(SMALL, output=tmp_path, format="zarr")
+    with pytest.raises(DataError, match=r"small\.zarr is there already"):
+        run(SMALL, output=tmp_path, format="zarr")
+
+
+def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
+    """Interrupted between two pieces: nothing stays but the journal, and the command goes on."""
+    monkeypatch.setattr(pieces, "_NUMBERS", 3)
+    original, written = pieces.variables, []
+
+    def interrupted(*words):
+        written.append(1)
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        return original(*words)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pieces, "variables", interrupted)
+        with pytest.raises(rsfstudy.errors.RunError, match="6 of 6 cells are finished"):
+            run(SMALL, output=tmp_path, format="zarr")
+    assert os.listdir(tmp_path) == ["small.cells.sqlite"]
+    same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), run(SMALL))
+
+
+def test_a_chunk_that_is_lost_is_noticed(tmp_path):
+    run(SMALL, output=tmp_path, format="zarr")
+    (tmp_path / "small.zarr" / "status" / "c" / "0" / "0").unlink(missing_ok=True)
+    (tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0").unlink()
+    with pytest.raises(DataError, match=r"small\.zarr is damaged"):
+        rsfstudy.open(tmp_path / "small.zarr")
+    # and whoever opens it without rsfstudy reads "pending", not "ok"
+    bare = xr.open_dataset(tmp_path / "small.zarr", engine="zarr", consolidated=False)
+    assert int(bare.status[0, 0]) == rsfstudy.status.Status.PENDING
+    assert np.isnan(bare.critical_velocity_ratio[0, 0])
+
+
+def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setattr(pieces.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(InvalidValue, match=r"pip install 'rsfstudy\[zarr\]'"):
+        run(SMALL, output=tmp_path, format="zarr")
+
+
+@pytest.mark.parametrize("shape", [(1,), (7,), (3, 5), (2, 3, 4), (5, 1, 6)])
+@pytest.mark.parametrize("most", [1, 2, 4, 7, 100])
+def test_slabs_fill_a_lattice_in_row_major_order(shape, most):
+    chunk = pieces._chunk(shape, most)
+    assert np.prod(chunk) <= max(most, 1)
+    cells = np.arange(np.prod(shape)).reshape(shape)
+    visited = np.concatenate([cells[region].ravel() for region in pieces._regions(shape, chunk)])
+    np.testing.assert_array_equal(visited, cells.ravel())
+
+
+def test_large_axes_are_checked_in_no_time():
+    """A hundred thousand values: by their hashes, not each against each."""
+    axis = Axis("b_over_a", np.linspace(1.5, 3.0, 100_000))
+    assert len(axis) == 100_000
+    study = Study(name="n", title="t", base=Scene(), axes=[axis], measure=SMALL.measure)
+    assert study.scene(99_999).b_over_a == 3.0
