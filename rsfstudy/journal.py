@@ -166,13 +166,15 @@ class Journal:
         except sqlite3.Error as error:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
-    def answered(self, keys: np.ndarray) -> np.ndarray:
-        """Whether each cell has an answer; failures have none, so that they are tried again."""
-        answers = {s.name for s in Status if s.is_answer}
+    def known(self, keys: np.ndarray, *, answered: bool = False) -> np.ndarray:
+        """Whether each cell is finished, or even answered; failures are not, so that they are tried
+        again.
+        """
+        wanted = {s.name for s in Status if s.is_answer or not answered}
         found = np.zeros(len(keys), dtype=bool)
         for start, rows in self._rows(keys, "status"):
             for place, key in enumerate(keys[start : start + _AT_A_TIME]):
-                found[start + place] = rows.get(key.tobytes(), ("",))[0] in answers
+                found[start + place] = rows.get(key.tobytes(), ("",))[0] in wanted
         return found
 
     def read(self, keys: np.ndarray) -> Columns:

@@ -148,7 +148,7 @@ class Run:
 
     def _compute_missing(self, journal: Journal, mapper: Mapper, progress: Progress) -> None:
         cells = self.plan.different
-        answered = journal.answered(self.plan.keys[cells])
+        answered = journal.known(self.plan.keys[cells], answered=True)
         missing = scattered(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress(done, total)
@@ -186,7 +186,8 @@ class Run:
         if self.keeping.output is None:
             return store.sealed(dataset)
         written = store.write(dataset, self.path(".nc"))
-        self.path(".partial.nc").unlink(missing_ok=True)
+        for stale in (".partial.nc", ".unreduced.nc"):
+            self.path(stale).unlink(missing_ok=True)
         return written
 
     def lattice(self, journal: Journal) -> xr.Dataset:
@@ -222,15 +223,18 @@ class Run:
         """The error of a run that ended early, once what is finished has been kept."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.keeping.output is not None and self.keeping.format == "netcdf":
+            lattice = self.lattice(journal)
+            with contextlib.suppress(Exception):  # a reduction may not bear missing cells
+                lattice = self._reduced(lattice)
             try:
-                store.write(self._reduced(self.lattice(journal)), self.path(".partial.nc"))
+                store.write(lattice, self.path(".partial.nc"))
             except DataError as unwritten:
                 why += f"{unwritten} "
         return RunError(why + self._resumable(journal))
 
     def _resumable(self, journal: Journal) -> str:
         """How much is finished, where it is, and how to go on."""
-        known = int((journal.read(self.plan.keys).status != int(Status.PENDING)).sum())
+        known = int(journal.known(self.plan.keys).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.keeping.output is None:
             return f"{text}; nothing was to be kept (no output directory)."

@@ -97,7 +97,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        The dataset as the file holds it.
+        The dataset as the file holds it; ``encoding["source"]`` says where.
 
     Raises
     ------
@@ -125,6 +125,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         ) from error
     finally:
         _remove(beside)
+    clean.encoding["source"] = str(path)
     return clean
 
 

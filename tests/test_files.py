@@ -132,7 +132,7 @@ def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
         kept.add([(KEYS[0].tobytes(), DONE)])
     with journal(tmp_path) as kept:
-        assert kept.answered(KEYS).tolist() == [True, False]
+        assert kept.known(KEYS, answered=True).tolist() == [True, False]
         found = kept.read(KEYS)
     assert found.status.tolist() == [Status.OK, Status.PENDING]
     assert (found.work[0], found.seconds[0]) == (42, 0.1)
@@ -144,7 +144,8 @@ def test_failed_cells_are_known_and_not_answered(tmp_path):
     failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), float("nan"))
     with journal(tmp_path) as kept:
         kept.add([(KEYS[0].tobytes(), failed)])
-        assert not kept.answered(KEYS).any()
+        assert not kept.known(KEYS, answered=True).any()
+        assert kept.known(KEYS).tolist() == [True, False]
         found = kept.read(KEYS)
     assert (found.status[0], found.message[0]) == (Status.CELL_RAISED, "ValueError: x")
     assert np.isnan(found.seconds[0])
@@ -156,7 +157,7 @@ def test_a_journal_of_other_numbers_is_refused_with_the_difference(tmp_path):
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-09 now.*--fresh"):
         journal(tmp_path, {"rtol": 1e-9, "physics": "abc"})
     with journal(tmp_path, {"rtol": 1e-9, "physics": "abc"}, fresh=True) as kept:
-        assert not kept.answered(KEYS).any()
+        assert not kept.known(KEYS).any()
 
 
 def test_a_damaged_journal_is_named(tmp_path):

@@ -45,6 +45,7 @@ def _phase_plane(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
     reach, height = np.array(axes.get_xlim(), dtype=float), axes.get_ylim()
     rates = np.linspace(reach[0], reach[1], 200)
     drawn: set[float] = set()
+    top = height[0] + 0.96 * (height[1] - height[0])
     for number, (cell, _label) in enumerate(cells):
         if cot_phi(cell) in drawn:
             continue
@@ -54,13 +55,13 @@ def _phase_plane(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
             theta = -state * LN10 * float(cell["a"]) * float(cell["b_over_a"])
             line = constant_state_line(cell, theta, rates)
             axes.plot(rates, line, ":", color=f"C{number}", linewidth=0.6)
-            inside = np.flatnonzero((line > height[0]) & (line < height[1]))
-            if inside.size:
+            inside = np.flatnonzero((line > height[0]) & (line < top))
+            if inside.size and number == 0:  # the lines of the others meet these at the edges
                 at = inside[-1]
                 axes.text(
                     rates[at],
                     line[at],
-                    f"{theta:.2g}",
+                    f"{theta + 0.0:.2g}",
                     fontsize="xx-small",
                     color=f"C{number}",
                     ha="right",

@@ -16,7 +16,7 @@ DIMENSIONS = ("mass", "phi", "load_velocity_ratio")
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     """One curve an angle without mass; dots mark thresholds found from growth of the assembled
-    equations, crosses where the next slower cell has no steady state.
+    equations, dotted lines where slower sliding has no steady state.
     """
     massless = dataset.isel(mass=0)
     rate = np.log10(dataset["load_velocity_ratio"])
