@@ -11,17 +11,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import (
-        cell,
-        check,
-        critical_step,
-        limit_cycle,
-        open,
-        rerun,
-        run,
-        studies,
-        to_si,
-    )
+    from rsfstudy.api import cell, check, open, rerun, run, studies
+    from rsfstudy.one_scene import critical_step, limit_cycle, to_si
     from rsfstudy.scene import Scene
     from rsfstudy.study import Axis, Study
     from rsfstudy.trajectory import simulate
@@ -38,9 +29,9 @@ _HOMES = {
     "check": "api",
     "studies": "api",
     "simulate": "trajectory",
-    "critical_step": "api",
-    "limit_cycle": "api",
-    "to_si": "api",
+    "critical_step": "one_scene",
+    "limit_cycle": "one_scene",
+    "to_si": "one_scene",
 }
 
 __all__ = [

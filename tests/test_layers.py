@@ -21,6 +21,7 @@ FLOORS = {
     "core": 3,
     "measures": 4,
     "trajectory": 5,
+    "one_scene": 5,
     "claims": 5,
     "reduce": 5,
     "study": 5,
