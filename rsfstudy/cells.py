@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import itertools
+import math
 import os
 import threading
 import time
@@ -25,6 +26,8 @@ DEFAULT_TIME_LIMIT = 600.0
 _TELL = 0.2
 #: How often a worker looks for a cell that is over its limit, in s.
 _LOOK = 0.5
+#: How often Python's own watchdog is set anew, and how much later it acts, in s.
+_ARM, _GRACE = 1.0, 3.0
 
 #: Cells by their names.
 Batch = Sequence[tuple[bytes, Scene]]
@@ -106,22 +109,35 @@ def computed(task: Task, scene: Scene) -> Finished:
 
 
 class _Deadlines:
-    """Ends this process once a thread has not finished its cell in time."""
+    """Ends this process once a thread has not finished its cell in time.
+
+    A thread of its own looks after all others. Where a cell holds the interpreter's lock it cannot:
+    then Python's own watchdog, which is not precise about which thread is late, ends the process a
+    little later.
+    """
 
     def __init__(self) -> None:
         self._until: dict[int, float] = {}
         self._watch: threading.Thread | None = None
+        self._armed = -math.inf
 
     def set(self, seconds: float) -> None:
         """This thread starts a cell."""
-        self._until[threading.get_ident()] = time.monotonic() + seconds
+        now = time.monotonic()
+        self._until[threading.get_ident()] = now + seconds
         if self._watch is None:
             self._watch = threading.Thread(target=self._look, daemon=True)
             self._watch.start()
+        if now - self._armed > _ARM:
+            faulthandler.dump_traceback_later(seconds + _GRACE, exit=True)
+            self._armed = now
 
     def clear(self) -> None:
         """This thread has no cell."""
         self._until.pop(threading.get_ident(), None)
+        if not self._until:
+            faulthandler.cancel_dump_traceback_later()
+            self._armed = -math.inf
 
     def _look(self) -> None:
         while True:

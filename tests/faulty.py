@@ -58,6 +58,7 @@ FAULTS: dict[str, Callable] = {
     "segfaults": lambda _meter: ctypes.string_at(0),
     "eats memory": lambda _meter: _eat_memory(),
     "hangs": lambda _meter: _hang(),
+    "hangs in C": lambda _meter: ctypes.PyDLL(None).sleep(10**6),
 }
 
 

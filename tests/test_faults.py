@@ -64,9 +64,12 @@ def test_a_cell_that_kills_its_worker(fault, monkeypatch):
     assert "more memory than a worker may use" in dataset.message.values[1]
 
 
-def test_a_cell_that_hangs():
-    """Past the time limit its worker ends itself; the cell is tried alone before it is blamed."""
-    dataset = run(declared("hangs", at=(2.5,)), workers=2, time_limit=1.0)
+@pytest.mark.parametrize("fault", ["hangs", "hangs in C"])
+def test_a_cell_that_hangs(fault):
+    """Past the time limit its worker ends itself, even where it cannot run any Python; the cell is
+    tried alone before it is blamed.
+    """
+    dataset = run(declared(fault, at=(2.5,)), workers=2, time_limit=1.0)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 1 s" in dataset.message.values[1]
 
