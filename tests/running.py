@@ -42,10 +42,19 @@ def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
     )
 
 
+#: Ctrl-C ends it even where the tests run in the background, where shells have it ignored.
+_COMMAND = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from rsfstudy.cli import main
+main()
+"""
+
+
 def command(*words, **environment) -> subprocess.Popen:
     """The command in a process, and a session, of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "rsfstudy.cli", *map(str, words)],
+        [sys.executable, "-c", _COMMAND, *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

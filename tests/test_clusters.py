@@ -160,7 +160,7 @@ def test_the_slurm_job_is_what_it_says():
     from dask_jobqueue import SLURMCluster
 
     job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
-    with SLURMCluster(**job, scheduler_options={"dashboard": False}) as cluster:
+    with SLURMCluster(**job, scheduler_options={"dashboard_address": ":0"}) as cluster:
         script = cluster.job_script()
     assert "#SBATCH -p normal" in script
     assert "#SBATCH --cpus-per-task=16" in script
@@ -177,7 +177,7 @@ def cluster(walltime, queue, **words):
 
 runpy.run_path(sys.argv[1])["main"](
     "rate_step_boundary", cluster, jobs=1, cores=1, processes=1, memory="2GB",
-    python=sys.executable, scheduler_options={"dashboard": False},
+    python=sys.executable, scheduler_options={"dashboard_address": ":0"},
 )
 """
 
