@@ -21,7 +21,7 @@ from rsfstudy.measures import Outcome
 from rsfstudy.runner import Keeping, Progress
 from rsfstudy.scene import Scene
 from rsfstudy.study import Study
-from rsfstudy.workers import on_client, on_local_cluster
+from rsfstudy.workers import on_client, on_local_cluster, threads
 
 OUTPUT = Path("outputs")
 
@@ -93,13 +93,12 @@ def run(
     """
     declared = declaration(study, rtol, overrides)
     keeping = Keeping(
-        output=None if output is None else Path(output),
+        output=_directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
         despite_failures=despite_failures,
         command=command,
-        declared_in="" if isinstance(study, Study) or Path(study).suffix != ".py" else str(study),
     )
     return _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
 
@@ -127,8 +126,16 @@ class _Workers:
         whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
         if not whole or self.processes < 0:
             raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
-        if not self.time_limit > 0.0:
-            raise InvalidValue("time_limit", self.time_limit, "must be greater than 0")
+        if self.client is not None and not hasattr(self.client, "submit"):
+            raise InvalidValue("client", self.client, "must be a distributed.Client")
+        limit: object = self.time_limit
+        if not isinstance(limit, int | float) or not limit > 0.0:
+            raise InvalidValue("time_limit", limit, "must be a number greater than 0")
+
+    def threads(self) -> int:
+        """How many cells are computed at a time."""
+        at_a_time = self.processes if self.client is None else threads(self.client)
+        return max(1, at_a_time)
 
     def mapper(self) -> Mapper:
         """What computes batches of cells there."""
@@ -137,9 +144,17 @@ class _Workers:
         return on_local_cluster(self.processes) if self.processes > 0 else serial
 
 
+def _directory(output: str | Path | None) -> Path | None:
+    if output is None:
+        return None
+    if not isinstance(output, str | Path):
+        raise InvalidValue("output", output, "must be a path, or None")
+    return Path(output)
+
+
 def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
     task = Task(study.measure, study.accuracy, workers.time_limit)
-    ready = runner.Run(study, keeping, task, max(1, workers.processes))
+    ready = runner.Run(study, keeping, task, workers.threads())
     with _bar(study.name, workers.progress) as told:
         return ready(workers.mapper(), told)
 
@@ -178,6 +193,8 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     DataError
         If there is no such file, or it was not written by rsfstudy.
     """
+    if not isinstance(name, str | Path):
+        raise InvalidValue("name", name, "must be the name of a study, or a path")
     path = Path(name)
     if path.suffix == ".py":
         name = catalogue.load(str(path)).name
@@ -239,13 +256,16 @@ def rerun(
     """
     theirs = open(file)
     declared = study_of(theirs, study)
+    directory = _directory(output)
+    if directory is not None and directory.resolve() == Path(file).resolve().parent:
+        rule = "would take the place of what it is held against"
+        raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
     keeping = Keeping(
-        output=None if output is None else Path(output),
+        output=directory,
         fresh=True,
         keep_going=True,
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
-        declared_in="" if study is None else str(study),
     )
     ours = _computed(declared, keeping, _Workers(workers, client, progress=progress))
     return compared(theirs, ours)
@@ -259,14 +279,14 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     if file is None:
         return restore.study(declared)
     named = catalogue.load(str(file))
-    return replace(
-        named.with_(**declared["overrides"]) if declared["overrides"] else named,
-        accuracy=restore.accuracy(declared["accuracy"]),
-    )
+    if named.name != declared["name"]:
+        rule = f"declares the study {named.name!r}, and the results are of {declared['name']!r}"
+        raise InvalidValue("study", str(file), rule)
+    return restore.study(declared, of_its_own=named)
 
 
 def cell(
-    file: str | Path, *, study: str | Path | None = None, **place: Any
+    file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
     """Compute one cell of a results file alone, in this process, letting it raise what it raises.
 
@@ -274,10 +294,10 @@ def cell(
     ----------
     file : path
         A results file.
+    place : mapping of str to value
+        Where the cell is: the value, or label, on each axis; numbers may be text too.
     study : path, optional
         The file that declares the study, where its measure is not part of rsfstudy.
-    **place
-        Where the cell is: the value of each dimension of the lattice, or its label.
 
     Returns
     -------

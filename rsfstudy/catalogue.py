@@ -7,6 +7,7 @@ import importlib.util
 import pkgutil
 import sys
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -35,7 +36,7 @@ def load(name: str) -> Study:
         raises, or declares no study.
     """
     if name.endswith(".py"):
-        return _declared_in(_run(Path(name)), name)
+        return replace(_declared_in(_run(Path(name)), name), declared_in=name)
     if name not in names():
         raise InvalidValue(
             "study", name, "is unknown", choices=names(), remedy="Or name a file: path/to/study.py."
@@ -50,9 +51,11 @@ def _run(path: Path) -> ModuleType:
     It is taken out of the list of modules again: worker processes, which cannot import it, then get
     what it defines by value.
     """
-    if not path.is_file():
-        raise InvalidValue("study", str(path), "is no file")
-    path = path.resolve()
+    try:
+        path = path.resolve(strict=True)
+        path.read_bytes()
+    except OSError as error:
+        raise InvalidValue("study", str(path), f"is no file ({error.strerror})") from error
     spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
     assert spec is not None
     assert spec.loader is not None

@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rsfstudy import provenance
 from rsfstudy.core.accuracy import Accuracy
@@ -89,10 +89,12 @@ def on_worker(task: Task, batch: Batch) -> Found:
                 "mix. Give the workers the same versions"
             )
     found: Found = []
-    for key, scene in batch:
-        _deadlines.set(task.time_limit)
-        found.append((key, computed(task, scene)))
-    _deadlines.clear()
+    try:
+        for key, scene in batch:
+            _deadlines.set(task.time_limit)
+            found.append((key, computed(task, scene)))
+    finally:
+        _deadlines.clear()
     return found
 
 
@@ -100,12 +102,15 @@ def computed(task: Task, scene: Scene) -> Finished:
     """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
     begin = time.perf_counter()
     try:
-        outcome = task.measure(scene, task.accuracy)
-    except (Exception, SystemExit) as error:
+        found = task.measure(scene, task.accuracy)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a cell may raise SystemExit or CancelledError too
         # not str(error), which may raise as well
         text = traceback.format_exception_only(error)[-1].strip()
-        outcome = Outcome(Status.CELL_RAISED, message=text)
-    return outcome, time.perf_counter() - begin
+        found = Outcome(Status.CELL_RAISED, message=text)
+    message = str(found.message or "").encode(errors="backslashreplace").decode()
+    return replace(found, message=message.replace("\0", "\\0")), time.perf_counter() - begin
 
 
 class _Deadlines:

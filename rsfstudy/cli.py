@@ -30,7 +30,7 @@ _MOST_POINTS = 1_000_000
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 RESULTS = (".nc", ".zarr")
 
-_stderr = Console(stderr=True)
+_stderr = Console(stderr=True, markup=False, emoji=False, highlight=False)
 
 _all = click.option("--all", "every", is_flag=True, help="Every named study.")
 _output = click.option(
@@ -79,10 +79,10 @@ def main() -> None:
         _stderr.print("interrupted")
         sys.exit(FAILED)
     except InvalidValue as error:
-        _stderr.print(f"error: {error}", markup=False, highlight=False)
+        _stderr.print(f"error: {error}")
         sys.exit(WRONG_USAGE)
     except RsfStudyError as error:
-        _stderr.print(f"error: {error}", markup=False, highlight=False)
+        _stderr.print(f"error: {error}")
         sys.exit(FAILED)
 
 
@@ -104,6 +104,8 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
     to reproduce each cell that failed.
     """
     if Path(name).suffix in RESULTS:
+        if settings or rtol is not None:
+            raise click.UsageError("a results file is shown as it is, without --set or --rtol")
         return terminal.results(api.open(name), name)
     terminal.declaration(_declared(catalogue.load(name), settings, rtol))
     return OK
@@ -156,15 +158,13 @@ def run(
             if rtol is not None:
                 terminal.announce(study)
             dataset = api.run(
-                named,
+                study,
                 workers=0 if serial else workers,
                 client=client,
                 output=output,
                 progress=not quiet,
                 command=shlex.join(["rsfstudy", *sys.argv[1:]]),
-                rtol=rtol,
                 **choices,
-                **_overrides(catalogue.load(named), settings),
             )
             files = [output / f"{study.name}.{_ENDINGS[choices['format']]}"]
             files += _drawn(dataset, output / f"{study.name}.png")
@@ -207,8 +207,7 @@ def rerun(
 ) -> int:
     """Compute a results file anew from what it says of itself, and compare every number."""
     if place:
-        where = dict(_setting(text, ()) for text in place)
-        return terminal.outcome(*api.cell(file, study=study, **where))
+        return terminal.outcome(*api.cell(file, dict(map(_place, place)), study=study))
     with _client(scheduler, serial) as client:
         table = api.rerun(
             file,
@@ -270,7 +269,21 @@ def _declared(study: Study, settings: tuple[str, ...], rtol: float | None) -> St
 
 def _overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     labels = {label for axis in study.axes for label in axis.labels or ()}
-    return dict(_setting(text, labels) for text in settings)
+    found: dict[str, Any] = {}
+    for text in settings:
+        name, values = _setting(text, labels)
+        if name in found:
+            raise InvalidValue("--set", text, f"sets {name} twice")
+        found[name] = values
+    return found
+
+
+def _place(text: str) -> tuple[str, str]:
+    """One ``AXIS=VALUE``, the value as it is."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise InvalidValue("--cell", text, "must read AXIS=VALUE, as in b_over_a=2")
+    return name, value
 
 
 def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
@@ -282,7 +295,9 @@ def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
         return name.strip(), [values.strip()]
     parts = [part.strip() for part in values.split(",")]
     if len(parts) > 1:
-        return name.strip(), [_value(part) for part in parts if part]
+        if not all(parts):
+            raise InvalidValue("--set", text, "leaves a value out")
+        return name.strip(), [_value(part) for part in parts]
     if values.count(":") == 2:
         return name.strip(), _spaced(text, *values.split(":"))
     if ":" in values:
@@ -329,7 +344,7 @@ def _drawn(dataset: xr.Dataset, path: Path) -> list[Path]:
     try:
         plots.save(dataset, path)
     except (OSError, RsfStudyError) as error:
-        _stderr.print(f"no figure: {error}", markup=False, highlight=False)
+        _stderr.print(f"no figure: {error}")
         return []
     return [path]
 

@@ -29,7 +29,11 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     both = ~(pending[0] | pending[1])
     rows = []
     for name in theirs.data_vars:
-        if name in MEASURED_TIMES or name not in ours:
+        if name in MEASURED_TIMES:
+            continue
+        if name not in ours or ours[name].shape != theirs[name].shape:
+            gone = {"values": theirs[name].size, "identical": 0, "largest_difference": np.nan}
+            rows.append({"variable": name, **gone})
             continue
         a, b = theirs[name], ours[name]
         known = np.broadcast_to(True, a.shape)
@@ -85,14 +89,23 @@ def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
                 raise InvalidValue("cell", dict(place), f"leaves {dimension} open")
             index.append(0)
             continue
-        wanted = place[dimension]
-        if values.dtype.kind in "iuf" and isinstance(wanted, int | float):
-            found = np.flatnonzero(np.isclose(values, wanted, rtol=1e-5, atol=0.0))
-            nearest = np.argsort(np.abs(values[found] - wanted))[:1]
-            found = found[nearest]
-        else:
-            found = np.flatnonzero(values.astype(str) == str(wanted))
-        if not found.size:
-            raise InvalidValue(dimension, wanted, "is not on its axis", choices=map(str, values))
-        index.append(int(found[0]))
+        found = _on_axis(values, place[dimension])
+        if found is None:
+            rule = "is not on its axis"
+            raise InvalidValue(dimension, place[dimension], rule, choices=map(str, values))
+        index.append(found)
     return int(np.ravel_multi_index(index, status.shape))
+
+
+def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
+    """Where a value stands on an axis: the label itself, or the nearest number that is close."""
+    if values.dtype.kind in "iuf":
+        try:
+            number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
+        except (TypeError, ValueError):
+            return None
+        gaps = np.abs(values - number)
+        nearest = int(np.argmin(gaps))
+        return nearest if gaps[nearest] <= 1e-5 * abs(number) else None
+    found = np.flatnonzero(values.astype(str) == str(wanted))
+    return int(found[0]) if found.size else None

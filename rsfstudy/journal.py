@@ -75,7 +75,7 @@ class Columns:
         return cls(
             np.full(cells, int(Status.PENDING), dtype=np.int8),
             np.full(cells, "", dtype=object),
-            np.zeros(cells, dtype=np.int32),
+            np.zeros(cells, dtype=np.int64),
             np.full(cells, np.nan),
             np.full((cells, width), np.nan),
         )
@@ -238,7 +238,7 @@ def _brief(value: object) -> str:
 def _differences(theirs: str, ours: Mapping[str, Any]) -> str:
     try:
         before = dict(json.loads(theirs))
-    except ValueError:
+    except (TypeError, ValueError):
         return "its fingerprint is damaged"
     return "; ".join(
         f"{name}: {_brief(before.get(name))} there, {_brief(ours.get(name))} now"

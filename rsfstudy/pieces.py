@@ -68,12 +68,14 @@ def write(
         digests = Digests()
         for name in coords.variables:
             digests.add(str(name), coords[name].values)
+            digests.describe(str(name), coords[name].attrs)
         known = _lattice(study, read, beside, digests)
         lattice = xr.open_dataset(beside, **_OPEN)
         made = reduce(lattice)
         new = made.drop_vars([name for name in made.variables if name in lattice.variables])
         for name in new.variables:
             digests.add(str(name), new[name].values)
+            digests.describe(str(name), new[name].attrs)
         about = {**attributes(study, known, provenance), **made.attrs, **_named(lattice)}
         sealed = digests.sealing(_as_objects(new).assign_attrs(about))
         sealed.to_zarr(beside, mode="a", consolidated=False)
@@ -125,6 +127,7 @@ def _lattice(study: Study, read: Read, path: Path, digests: Digests) -> int:
                 )
             arrays[name][region] = values
             digests.add(name, values)
+            digests.describe(name, about)
     return known
 
 

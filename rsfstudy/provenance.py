@@ -74,7 +74,7 @@ def _own_code(measure: type[Measure]) -> str:
     return hashlib.sha256(source.encode()).hexdigest()[:16]
 
 
-def provenance(study: Study, command: str, declared_in: str = "") -> dict[str, Any]:
+def provenance(study: Study, command: str) -> dict[str, Any]:
     """Where, when and from what a run was made, and by which versions.
 
     Parameters
@@ -82,13 +82,11 @@ def provenance(study: Study, command: str, declared_in: str = "") -> dict[str, A
     study : Study
     command : str
         What the user typed.
-    declared_in : str
-        The file that declares the study, if it is no named one.
     """
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
-        "declared_in": declared_in,
+        "declared_in": study.declared_in,
         "versions": {
             "python": platform.python_version(),
             **{name: _version(name) for name in _DEPENDENCIES},

@@ -21,8 +21,14 @@ from rsfstudy.status import Status
 from rsfstudy.study import Axis, Study
 
 
-def study(declaration: Mapping[str, Any]) -> Study:
+def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> Study:
     """The study that describes itself by this declaration.
+
+    Parameters
+    ----------
+    declaration : mapping
+    of_its_own : Study, optional
+        Where to take the measure and the reductions from, if they are not part of rsfstudy.
 
     Raises
     ------
@@ -33,14 +39,20 @@ def study(declaration: Mapping[str, Any]) -> Study:
     """
     parts = dict(declaration)
     try:
+        described = parts.pop("measure"), parts.pop("reductions")
+        if of_its_own is None:
+            found, reductions = measure(described[0]), [_reduction(kind) for kind in described[1]]
+        else:
+            found, reductions = of_its_own.measure, list(of_its_own.reductions)
         return Study(
             base=Scene(**parts.pop("base")),
             axes=[Axis(axis["dimension"], axis["values"]) for axis in parts.pop("axes")],
-            measure=measure(parts.pop("measure")),
+            measure=found,
             accuracy=accuracy(parts.pop("accuracy")),
-            reductions=[_reduction(kind) for kind in parts.pop("reductions")],
+            reductions=reductions,
             claims=[Claim(**claim) for claim in parts.pop("claims")],
             **parts,
+            declared_in="" if of_its_own is None else of_its_own.declared_in,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, InvalidValue) and error.name in ("measure", "reduction"):

@@ -50,9 +50,8 @@ class Keeping:
         Go on where the first cells all fail.
     despite_failures : bool
         Reduce what there is where cells failed.
-    command, declared_in : str
-        What the user typed, for the history, and the file that declares the study, if it is no
-        named one.
+    command : str
+        What the user typed, for the history.
     """
 
     output: Path | None = None
@@ -61,7 +60,6 @@ class Keeping:
     keep_going: bool = False
     despite_failures: bool = False
     command: str = "rsfstudy.run"
-    declared_in: str = ""
 
     def __post_init__(self) -> None:
         if self.format not in FORMATS:
@@ -94,7 +92,7 @@ class Run:
     def __init__(self, study: Study, keeping: Keeping, task: Task, workers: int = 1) -> None:
         self.study, self.keeping, self.task, self.workers = study, keeping, task, workers
         self.plan = Plan(study)
-        self.about = provenance.provenance(study, keeping.command, keeping.declared_in)
+        self.about = provenance.provenance(study, keeping.command)
         self._rehearse()
 
     def _rehearse(self) -> None:
@@ -179,13 +177,12 @@ class Run:
     # ---- what is made of the cells --------------------------------------------------------------
 
     def _finished(self, journal: Journal) -> xr.Dataset:
+        zarr = self.keeping.format == "zarr"
         with self._reducing(journal):
-            if self.keeping.format == "zarr":
-                return self._in_pieces(journal)
-            dataset = self._reduced(self.lattice(journal))
+            found = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
         if self.keeping.output is None:
-            return store.sealed(dataset)
-        written = store.write(dataset, self.path(".nc"))
+            return store.sealed(found)
+        written = found if zarr else store.write(found, self.path(".nc"))
         for stale in (".partial.nc", ".unreduced.nc"):
             self.path(stale).unlink(missing_ok=True)
         return written
@@ -238,8 +235,7 @@ class Run:
         text = f"{known} of {self.study.size} cells are finished"
         if self.keeping.output is None:
             return f"{text}; nothing was to be kept (no output directory)."
-        partial = self.path(".partial.nc")
-        where = partial if partial.exists() else self.path(".cells.sqlite")
+        where = self.path(".cells.sqlite")
         return f"{text} and kept in {where}; the same command goes on from there."
 
 

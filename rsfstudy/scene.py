@@ -109,7 +109,10 @@ class Scene:
         value = getattr(self, name)
         if isinstance(value, bool) or not isinstance(value, Real):
             raise InvalidValue(name, value, "must be a number")
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
         if not math.isfinite(number):
             raise InvalidValue(name, number, "must be finite")
         if positive and number <= 0.0:

@@ -15,13 +15,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import dask
 import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError
 
 #: Root attributes that a verdict or a rerun turns on.
-_SEALED = ("id", "completeness", "declaration", "provenance")
+_SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
 _DIGESTS = "digests"
 _MARK = b"\nrsfstudy sha256 "
 _TRAILER = len(_MARK) + 64
@@ -32,6 +33,7 @@ class Digests:
 
     def __init__(self) -> None:
         self._of: dict[str, Any] = {}
+        self._about: dict[str, str] = {}
 
     def add(self, name: str, values: np.ndarray) -> None:
         """The next values of a variable, in row-major order."""
@@ -42,13 +44,18 @@ class Digests:
             little = values.dtype.newbyteorder("<")
             digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
 
+    def describe(self, name: str, attrs: Mapping[Any, Any]) -> None:
+        """The attributes of a variable, as they are written."""
+        plain = {str(key): np.asarray(value).tolist() for key, value in attrs.items()}
+        self._about[f"{name}:"] = json.dumps(plain, sort_keys=True)
+
     def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
         """The dataset with these digests, and those of its attributes."""
         return dataset.assign_attrs({_DIGESTS: json.dumps(self._all(dataset.attrs))})
 
     def _all(self, attrs: Mapping[Any, Any]) -> dict[str, str]:
-        texts = {f":{name}": str(attrs[name]).encode() for name in _SEALED if name in attrs}
-        found = {name: hashlib.sha256(text) for name, text in texts.items()} | self._of
+        texts = {f":{name}": str(attrs[name]) for name in _SEALED if name in attrs} | self._about
+        found = self._of | {name: hashlib.sha256(t.encode()) for name, t in texts.items()}
         return {name: digest.hexdigest()[:16] for name, digest in found.items()}
 
     def check(self, dataset: xr.Dataset, where: str) -> None:
@@ -70,15 +77,23 @@ class Digests:
             if ours.get(name) != digest:
                 what = "missing" if name not in ours else "not what was written"
                 raise DataError(
-                    f"{where} is damaged, or was edited: {name!r} is {what}. "
+                    f"{where} is damaged, or was edited: {_named(name)} is {what}. "
                     "Run the study again; its finished cells are kept beside it."
                 )
+
+
+def _named(name: str) -> str:
+    """A variable, an attribute of one, or a root attribute, as their digests are named."""
+    if name.endswith(":"):
+        return f"an attribute of {name[:-1]!r}"
+    return f"the attribute {name[1:]!r}" if name.startswith(":") else repr(name)
 
 
 def _digests_of(dataset: xr.Dataset) -> Digests:
     digests = Digests()
     for name in dataset.variables:
         digests.add(str(name), dataset[name].values)
+        digests.describe(str(name), dataset[name].attrs)
     return digests
 
 
@@ -108,7 +123,9 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
+        # a lock that xarray would ask the Dask cluster for is of no use, and may never come
+        with dask.config.set(scheduler="synchronous"):
+            clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
         with open(beside, "ab") as file:
             file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
@@ -165,9 +182,9 @@ def read(path: Path) -> xr.Dataset:
     DataError
         If it is missing, unreadable, not written by rsfstudy, or damaged.
     """
-    if not path.exists():
-        raise DataError(f"{path} does not exist. Run the study first, or name another file.")
     try:
+        if not path.exists():
+            raise DataError(f"{path} does not exist. Run the study first, or name another file.")
         if path.is_dir():
             dataset = xr.open_dataset(
                 path, engine="zarr", chunks=None, consolidated=False, cache=False

@@ -5,6 +5,7 @@ it.
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -18,6 +19,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.reduce import Reduction
 from rsfstudy.scene import FIELDS, Scene, unknown_field
+from rsfstudy.vocabulary import DERIVED
 
 #: Fields that only scenes with variable normal stress have.
 _OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
@@ -156,18 +158,21 @@ class Study:
     accuracy: Accuracy = field(default_factory=Accuracy)
     version: int = 1
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    #: The file of a study that is no named one.
+    declared_in: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
-        for name in ("title", "summary", "plot"):
-            if not isinstance(getattr(self, name), str):
-                raise InvalidValue(name, getattr(self, name), "must be a text")
+        for name in ("title", "summary", "plot", "declared_in"):
+            _check_text(name, getattr(self, name))
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
-        if not isinstance(self.overrides, Mapping):
-            raise InvalidValue("overrides", self.overrides, "must be a mapping")
+        try:
+            json.dumps(dict(self.overrides))
+        except (TypeError, ValueError) as error:
+            raise InvalidValue("overrides", self.overrides, "must be plain data") from error
         self._check_parts()
         taken: dict[str, str] = {}
         for axis in self.axes:
@@ -201,8 +206,12 @@ class Study:
             if reduction.of not in known:
                 raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
             known.append(reduction.name)
+        kept = ("status", "message", "rhs_evaluations", "wall_time")
+        taken = {*known, *kept, *self.measure.inner_coordinates, *DERIVED}
         for axis in self.axes:
             self._check_sought(axis.fields)
+            if axis.dimension in taken:
+                raise InvalidValue("axis", axis.dimension, "is the name of something measured")
 
     def _check_sought(self, fields: Sequence[str]) -> None:
         for name in fields:
@@ -267,7 +276,7 @@ class Study:
 
     # ---- other axes ---------------------------------------------------------------------------
 
-    def with_(self, **overrides: Any) -> Study:
+    def with_(self, /, **overrides: Any) -> Study:
         """The study with other axis values or other fixed values.
 
         A list for a field that is fixed makes it an axis; a field along a zipped axis changes only
@@ -325,12 +334,23 @@ class Study:
         }
 
 
+def _check_text(name: str, text: object) -> None:
+    """A text that a file can hold."""
+    if not isinstance(text, str) or "\0" in text:
+        raise InvalidValue(name, text, "must be a text")
+    try:
+        text.encode()
+    except UnicodeError as error:
+        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
+
+
 def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
     if dimension in FIELDS:
         raise InvalidValue("axis", dimension, "is a field: a zipped axis needs a name of its own")
     for label, row in points.items():
-        if not isinstance(label, str) or not label:
+        _check_text(dimension, label)
+        if not label:
             raise InvalidValue(dimension, label, "must be a text that labels a point")
         if not isinstance(row, Mapping) or not row:
             raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
@@ -377,7 +397,9 @@ def _is_list(value: Any) -> bool:
 def _plain(value: Any) -> Any:
     """A value as Python's own number, flag or text; whole numbers as float."""
     value = value.item() if isinstance(value, np.generic) else value
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    return float(value) if abs(value) < 2**1023 else math.inf
 
 
 def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:

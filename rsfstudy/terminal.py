@@ -13,6 +13,7 @@ import pandas as pd
 import xarray as xr
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 
 from rsfstudy import api, runner, store
 from rsfstudy.claims import NOT_APPLICABLE
@@ -26,12 +27,13 @@ from rsfstudy.study import Study
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
 
-console = Console()
+#: What a user or a cell wrote is printed as it is, brackets and all.
+console = Console(markup=False, emoji=False)
 
 
 def declaration(study: Study) -> None:
     """Print a study: its axes, what is fixed and measured, its cells and what they cost."""
-    console.print(f"[bold]{study.name}[/bold]: {study.title}\n")
+    console.print(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
         console.print(study.summary + "\n")
     table = Table("", "", box=None, show_header=False)
@@ -73,8 +75,8 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> int:
     _costs(dataset)
     moved = claims(dataset)
     failed = failures(dataset, str(files[0]))
-    console.print(f"{name}: {_tally(dataset)}", highlight=False)
-    console.print(f"wrote {' and '.join(map(str, files))}", highlight=False)
+    console.print(f"{name}: {_tally(dataset)}")
+    console.print(f"wrote {' and '.join(map(str, files))}")
     return max(moved, failed)
 
 
@@ -87,7 +89,7 @@ def _tally(dataset: xr.Dataset) -> str:
 def results(dataset: xr.Dataset, file: str) -> int:
     """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
     attrs, about = dataset.attrs, json.loads(dataset.attrs["provenance"])
-    console.print(f"[bold]{attrs['id']}[/bold]: {attrs['title']}\n")
+    console.print(f"{attrs['id']}: {attrs['title']}\n", style="bold")
     table = Table("", "", box=None, show_header=False)
     dims = dataset["status"].dims
     table.add_row("lattice", " x ".join(f"{dataset.sizes[d]} {d}" for d in dims))
@@ -99,31 +101,34 @@ def results(dataset: xr.Dataset, file: str) -> int:
     table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
     for name, values in dataset.data_vars.items():
         table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {values.long_name}")
-    console.print(table, highlight=False)
+    console.print(table)
     return failures(dataset, file)
 
 
 def outcome(scene: Scene, found: Outcome) -> int:
     """One cell: its scene, its numbers and how it ended."""
     fields = {name: value for name, value in scene.as_dict().items() if value is not None}
-    console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()), highlight=False)
+    console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()))
     for name, value in found.values.items():
-        console.print(f"{name} = {value!r}", highlight=False)
+        console.print(f"{name} = {value!r}")
     text = f"{found.status.label}{': ' * bool(found.message)}{found.message}"
-    console.print(f"{text} ({found.rhs_evaluations:,} right-hand sides)", highlight=False)
+    console.print(f"{text} ({found.rhs_evaluations:,} right-hand sides)")
     return OK if found.status.is_answer else FAILED
 
 
 def agreement(frame: pd.DataFrame) -> int:
     """How a rerun agrees with its file; FAILED where a number is not the same."""
     for name, (theirs, ours) in frame.attrs["differs"].items():
-        console.print(f"{name}: {theirs} then, {ours} now", style="yellow", highlight=False)
+        console.print(f"{name}: {theirs} then, {ours} now", style="yellow")
     table = Table("variable", "values", "identical", "largest difference", box=None)
     for row in frame.to_dict("records"):
         gap = row["largest_difference"]
         text = "-" if pd.isna(gap) else f"{gap:.3g}"
         table.add_row(row["variable"], str(row["values"]), str(row["identical"]), text)
     console.print(table)
+    if not frame["values"].sum():
+        console.print("nothing to compare: no cell of the file is finished")
+        return FAILED
     same = bool((frame["values"] == frame["identical"]).all())
     console.print("every number is the same" if same else "not every number is the same")
     return OK if same else FAILED
@@ -169,9 +174,9 @@ def claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
     table_of = api.check(dataset)
     overrides = store.declaration(dataset)["overrides"]
-    console.print(f"[bold]{dataset.attrs['id']}[/bold] ({dataset.attrs['completeness']})")
+    console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
     if overrides:
-        console.print(f"not as declared: {_settings(overrides)}", highlight=False, markup=False)
+        console.print(f"not as declared: {_settings(overrides)}")
     if (table_of.empty or table_of["verdict"].eq(NOT_APPLICABLE).all()) and not _undone(dataset):
         console.print("no claim applies")
         return OK
@@ -226,7 +231,7 @@ def _undone(dataset: xr.Dataset) -> int:
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
-def _claim_row(row: Any) -> tuple[str, ...]:
+def _claim_row(row: Any) -> tuple[str | Text, ...]:
     sign = {"equals": "", "below": "< ", "above": "> "}[row.relation]
     reason = f"{row.tolerance:g}: {row.reason}"
     if row.because:
@@ -238,7 +243,7 @@ def _claim_row(row: Any) -> tuple[str, ...]:
         f"{sign}{row.published:g}",
         "-" if pd.isna(row.ours) else f"{row.ours:.6g}",
         reason,
-        f"[{colour}]{row.verdict}[/{colour}]",
+        Text(row.verdict, style=colour),
     )
 
 
@@ -267,9 +272,9 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
     if many > shown:
         console.print(f"and {many - shown} more")
     if file:
-        console.print("each alone, in one process:", highlight=False)
+        console.print("each alone, in one process:")
         for command in commands:
-            console.print(f"  {command}", highlight=False, markup=False, soft_wrap=True)
+            console.print(f"  {command}", soft_wrap=True)
     return FAILED
 
 

@@ -38,8 +38,6 @@ def on_client(client: Any) -> Mapper:
     """On the workers of a Dask client; they need no shared file system."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-        if client.status != "running":
-            raise RunError(f"the Dask client is {client.status}: connect one to a cluster")
         source = iter(batches)
         running: dict[Any, Batch] = {}
         suspects: list[Any] = []
@@ -69,12 +67,15 @@ def on_client(client: Any) -> Mapper:
 
 def _fill(client: Any, task: Task, source: Iterator[Batch], running: dict[Any, Batch]) -> None:
     """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
-    enough = 4 + 2 * _threads(client)
+    enough = 4 + 2 * threads(client)
     for batch in itertools.islice(source, max(0, enough - len(running))):
         running[client.submit(on_worker, task, batch, pure=False)] = batch
 
 
-def _threads(client: Any) -> int:
+def threads(client: Any) -> int:
+    """How many cells the workers of a client compute at a time."""
+    if client.status != "running":
+        raise RunError(f"the Dask client is {client.status}: connect one to a cluster")
     try:
         return sum(client.nthreads().values())
     except (OSError, TimeoutError) as error:
@@ -99,7 +100,7 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
             ).done
             return done
         except TimeoutError:
-            if _threads(client):
+            if threads(client):
                 seen = time.monotonic()
             elif time.monotonic() - seen > PATIENCE:
                 raise RunError(
@@ -136,8 +137,11 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
     for _ in range(_TRIES):
         began = time.monotonic()
         future = client.submit(on_worker, task, batch, pure=False)
-        _finished(client, [future])
-        found = _result(future)
+        try:
+            _finished(client, [future])
+            found = _result(future)
+        finally:
+            client.cancel([future])
         if found is not None:
             return found
         seconds = time.monotonic() - began

@@ -5,6 +5,7 @@ Its measure gives b/a. The environment says how long a cell takes, and what it d
 
 from __future__ import annotations
 
+import asyncio
 import ctypes
 import os
 import time
@@ -54,6 +55,14 @@ FAULTS: dict[str, Callable] = {
     "undeclared": lambda _meter: Outcome(Status.OK, {"totla": 1.0}),
     "too many": lambda _meter: Outcome(Status.OK, {"total": np.ones(3)}),
     "text": lambda _meter: Outcome(Status.OK, {"total": "one"}),
+    "text anywhere": lambda _meter: Outcome(Status.UNVERIFIED, {"total": "one"}),
+    "complex": lambda _meter: Outcome(Status.OK, {"total": 1j}),
+    "no status": lambda _meter: Outcome("ok", {"total": 1.0}),
+    "pending": lambda _meter: Outcome(Status.PENDING, {"total": 1.0}),
+    "surrogate": lambda _meter: _raise(OSError("no \udc80 file")),
+    "nul": lambda _meter: _raise(ValueError("bad\0byte [/red]")),
+    "cancelled": lambda _meter: _raise(asyncio.CancelledError()),
+    "generator": lambda _meter: _raise(GeneratorExit()),
     "dies": lambda _meter: os._exit(1),
     "segfaults": lambda _meter: ctypes.string_at(0),
     "eats memory": lambda _meter: _eat_memory(),

@@ -216,6 +216,10 @@ def test_any_setting_is_taken_or_refused(texts):
         ["run", "rate_step_boundary", "--set", "b_over_a=1"],
         ["run", "rate_step_boundary", "--set", "phi=10"],
         ["run", "nothing.py"],
+        ["run", "rate_step_boundary", "--set", "self=3"],
+        ["run", "rate_step_boundary", "--set", "b_over_a=2", "--set", "b_over_a=3"],
+        ["run", "rate_step_boundary", "--set", "b_over_a=2,,3"],
+        ["show", "what.nc", "--set", "b_over_a=2"],
         ["rerun"],
         ["nothing"],
     ],
@@ -369,6 +373,47 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
 def test_a_number_of_workers_that_is_none(workers):
     with pytest.raises(InvalidValue, match="workers"):
         run(workers=workers)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rtol": "a"},
+        {"rtol": True},
+        {"time_limit": "a"},
+        {"output": 3},
+        {"client": "tcp://x"},
+        {"format": 3},
+        {"b_over_a": [10**400]},
+        {"b_over_a": 10**400},
+        {"self": 3},
+    ],
+)
+def test_options_that_are_none(options):
+    with pytest.raises(InvalidValue, match=next(iter(options))):
+        run(**options)
+
+
+@pytest.mark.parametrize("name", [3, None, "a" * 5000 + ".nc", "a" * 5000])
+def test_names_that_are_none(name):
+    with pytest.raises(RsfStudyError):
+        rsfstudy.open(name)
+    with pytest.raises(RsfStudyError):
+        rsfstudy.check(name)
+
+
+def test_a_study_file_with_an_endless_name():
+    with pytest.raises(InvalidValue, match="is no file"):
+        catalogue.load("a" * 5000 + ".py")
+
+
+@pytest.mark.parametrize(
+    "dimension", ["status", "wall_time", "critical_velocity_ratio", "a_over_b_minus_a"]
+)
+def test_an_axis_named_as_something_measured(dimension):
+    axis = Axis(dimension, {"one": {"phi": 55.0}, "two": {"phi": 65.0}})
+    with pytest.raises(InvalidValue, match="is the name of something measured"):
+        Study(name="n", title="t", base=Scene(), axes=[axis], measure=CriticalStep())
 
 
 def test_threads_that_run_studies_do_not_mix():

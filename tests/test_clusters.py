@@ -107,6 +107,7 @@ def test_a_scheduler_lost_in_mid_run(separate, tmp_path):
     assert code == 1
     assert "the Dask scheduler is lost" in said
     assert "of 60 cells are finished and kept" in said
+    assert (output / "faulty.partial.nc").exists()
     resumed = run(declared(cells=60), output=output)
     same_numbers(resumed, run(declared(cells=60)))
 

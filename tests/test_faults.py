@@ -14,7 +14,7 @@ from faulty import declared
 from running import FAULTY, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, workers
+from rsfstudy import Axis, Scene, Study, cli, terminal, workers
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
@@ -41,18 +41,29 @@ def only_one_failed(dataset, status):
         ("spends", "work_budget_spent", "500000"),
         ("nan", "not_finite", "total = nan"),
         ("nothing", "not_finite", "total = nan"),
-        ("no outcome", "cell_raised", "AttributeError"),
+        ("no outcome", "cell_raised", "must be an Outcome with a Status"),
         ("undeclared", "cell_raised", "'totla': is not declared. Did you mean 'total'?"),
         ("too many", "cell_raised", "has the shape (3,) and must have ()"),
-        ("text", "cell_raised", "could not convert"),
+        ("text", "cell_raised", "must be a real number"),
+        ("text anywhere", "cell_raised", "must be a real number"),
+        ("complex", "cell_raised", "must be a real number"),
+        ("no status", "cell_raised", "must be an Outcome with a Status"),
+        ("pending", "cell_raised", "must say what became of the cell"),
+        ("surrogate", "cell_raised", r"OSError: no \udc80 file"),
+        ("nul", "cell_raised", r"ValueError: bad\0byte [/red]"),
+        ("cancelled", "cell_raised", "CancelledError"),
+        ("generator", "cell_raised", "GeneratorExit"),
     ],
 )
-def test_a_cell_that_goes_wrong(fault, status, message, cluster):
-    """In this process and on a worker alike."""
+def test_a_cell_that_goes_wrong(fault, status, message, cluster, tmp_path, capsys):
+    """In this process and on a worker alike; the file and the terminal hold the message."""
     for where in ({"workers": 0}, {"client": cluster}):
-        dataset = run(declared(fault, at=(2.5,)), **where)
+        dataset = run(declared(fault, at=(2.5,)), **where, output=tmp_path, fresh=True)
         only_one_failed(dataset, status)
         assert message in dataset.message.values[1]
+        only_one_failed(rsfstudy.open("faulty", tmp_path), status)
+        assert terminal.failures(dataset) == 1
+        assert status in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("fault", ["dies", "segfaults"])
@@ -153,13 +164,47 @@ def test_a_cell_of_a_named_study_alone(tmp_path):
                          b_over_a=[2.0, 3.0])  # fmt: skip
     last = whole.isel(dict.fromkeys(whole.critical_displacement.dims, -1))
     place = {str(d): last[d].item() for d in whole.critical_displacement.dims}
-    scene, outcome = rsfstudy.cell(tmp_path / "displacement_boundary.nc", **place)
+    scene, outcome = rsfstudy.cell(tmp_path / "displacement_boundary.nc", place)
     assert scene.b_over_a == 3.0
     assert outcome.values["critical_displacement"] == whole.critical_displacement.sel(place).item()
     with pytest.raises(InvalidValue, match="leaves .* open"):
-        rsfstudy.cell(tmp_path / "displacement_boundary.nc", law="slip")
+        rsfstudy.cell(tmp_path / "displacement_boundary.nc", {"law": "slip"})
     with pytest.raises(InvalidValue, match="is not on its axis"):
-        rsfstudy.cell(tmp_path / "displacement_boundary.nc", **{**place, "b_over_a": 9.0})
+        rsfstudy.cell(tmp_path / "displacement_boundary.nc", {**place, "b_over_a": 9.0})
+
+
+AWKWARD = ["1:2:3", "p,q", "true", "3", "1e3", " lead", "a='b\"", "[red]", "Größe", "x = 1, y = 2"]
+
+
+@pytest.mark.parametrize("number", range(len(AWKWARD)))
+def test_cells_with_awkward_labels_alone(number, tmp_path):
+    """The command that is printed finds the cell, whatever its label."""
+    rows = {label: {"b_over_a": 2.0 + i} for i, label in enumerate(AWKWARD)}
+    study = Study(
+        name="awkward",
+        title="Awkward [labels]",
+        base=Scene(normal_stress="constant"),
+        axes=[Axis("study", rows), Axis("inertia", [False, True])],
+        measure=CriticalStep(of="displacement_step"),
+    )
+    dataset = run(study, output=tmp_path)
+    index = (number, 1)
+    dataset["status"][index] = int(Status.UNVERIFIED)
+    place = {"study": AWKWARD[number], "inertia": dataset.inertia.values[1]}
+    words = shlex.split(terminal._reproducing(dataset, str(tmp_path / "awkward.nc"), place))
+    cells = dict(cli._place(text) for text in words if "=" in text)
+    scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
+    assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
+
+
+def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
+    """The study file has other values meanwhile; its measure is what is taken from it."""
+    run(FAULTY, output=tmp_path, b_over_a=[7.0, 8.0])
+    scene, outcome = rsfstudy.cell(tmp_path / "faulty.nc", {"b_over_a": "8"}, study=FAULTY)
+    assert scene.b_over_a == outcome.values["total"] == 8.0
+    (tmp_path / "other.py").write_text(FAULTY.read_text().replace('name="faulty"', 'name="other"'))
+    with pytest.raises(InvalidValue, match="'other', and the results are of 'faulty'"):
+        rsfstudy.cell(tmp_path / "faulty.nc", {"b_over_a": 8}, study=tmp_path / "other.py")
 
 
 def lattice(failing=(3.0,)) -> xr.Dataset:

@@ -214,6 +214,16 @@ def test_an_attribute_changed_in_a_file_is_named(name, small):
         rsfstudy.open(small)
 
 
+def test_an_attribute_of_a_variable_changed_in_a_file_is_named(small, tmp_path):
+    other = xr.load_dataset(small)
+    other.critical_velocity_ratio.attrs["units"] = "furlong"
+    other.to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(
+        DataError, match="an attribute of 'critical_velocity_ratio' is not what was written"
+    ):
+        rsfstudy.open(tmp_path / "other.nc")
+
+
 def test_a_variable_that_was_removed_is_named(small, tmp_path):
     xr.load_dataset(small).drop_vars("status").to_netcdf(tmp_path / "less.nc")
     with pytest.raises(DataError, match="'status' is missing"):
@@ -303,6 +313,20 @@ def test_a_rerun_shows_what_differs(small, tmp_path):
     assert changed["values"] - changed["identical"] == 1
     assert changed["largest_difference"] == pytest.approx(1e-9, rel=1e-6)
     assert table.attrs["differs"]["scipy"][0] == "0.1"
+
+
+def test_a_rerun_does_not_take_the_place_of_what_it_is_held_against(small):
+    with pytest.raises(InvalidValue, match="would take the place"):
+        rsfstudy.rerun(small, workers=0, output=small.parent, progress=False)
+
+
+def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
+    empty = xr.load_dataset(small)
+    empty["status"][:] = 25
+    store.write(empty, tmp_path / "empty.nc")
+    code, out, _said = ended(command("rerun", tmp_path / "empty.nc", "--serial", "--quiet"))
+    assert code == 1
+    assert "nothing to compare" in out
 
 
 def test_a_rerun_on_the_command_line(small):

@@ -46,7 +46,7 @@ FLOORS = {
 }
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"workers"},
+    "dask": {"workers", "store"},
     "distributed": {"workers"},
     "matplotlib": {"plots"},
     "click": {"cli"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 from rsfstudy.errors import InvalidValue
 
@@ -38,6 +39,9 @@ class Accuracy:
     methods: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
+        for name in ("rtol", "budget"):
+            if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), Real):
+                raise InvalidValue(name, getattr(self, name), "must be a number")
         if not TIGHTEST_RTOL <= self.rtol <= LOOSEST_RTOL:
             raise InvalidValue(
                 "rtol",

@@ -113,8 +113,12 @@ class Measure:
         Raises
         ------
         InvalidValue
-            For a number that is not declared, or has another shape.
+            For what is no outcome, and a number that is not declared or real, or has another shape.
         """
+        if not isinstance(found, Outcome) or not isinstance(found.status, Status):
+            raise InvalidValue("measured", found, "must be an Outcome with a Status")
+        if found.status is Status.PENDING:
+            raise InvalidValue("measured", found, "must say what became of the cell")
         for name, value in found.values.items():
             if name not in self.variables:
                 raise InvalidValue("measured", name, "is not declared", choices=self.variables)
@@ -122,6 +126,8 @@ class Measure:
             if np.shape(value) != shape:
                 rule = f"has the shape {np.shape(value)} and must have {shape}"
                 raise InvalidValue("measured", name, rule)
+            if np.asarray(value).dtype.kind not in "iufb":
+                raise InvalidValue("measured", name, f"is {value!r} and must be a real number")
         if found.status is not Status.OK:
             return found
         headline = np.asarray(found.values.get(self.headline, np.nan), dtype=float)
