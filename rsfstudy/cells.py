@@ -6,9 +6,11 @@ import faulthandler
 import itertools
 import math
 import os
+import pickle
 import threading
 import time
 import traceback
+import zlib
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -73,8 +75,13 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
     yield found
 
 
-def on_worker(task: Task, batch: Batch) -> Found:
-    """In a worker process, which ends itself at a cell that is over its time limit.
+def packed(batch: Batch) -> bytes:
+    """A batch as little as can be: Dask's scheduler holds on to what it has passed on."""
+    return zlib.compress(pickle.dumps(batch), level=1)
+
+
+def on_worker(task: Task, batch: bytes) -> Found:
+    """A packed batch in a worker process, which ends itself at a cell that is over its time limit.
 
     Raises
     ------
@@ -90,7 +97,7 @@ def on_worker(task: Task, batch: Batch) -> Found:
             )
     found: Found = []
     try:
-        for key, scene in batch:
+        for key, scene in pickle.loads(zlib.decompress(batch)):
             _deadlines.set(task.time_limit)
             found.append((key, computed(task, scene)))
     finally:

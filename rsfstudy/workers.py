@@ -18,7 +18,7 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import Any
 
-from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker
+from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed
 from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -69,7 +69,7 @@ def _fill(client: Any, task: Task, source: Iterator[Batch], running: dict[Any, B
     """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
     enough = 4 + 2 * threads(client)
     for batch in itertools.islice(source, max(0, enough - len(running))):
-        running[client.submit(on_worker, task, batch, pure=False)] = batch
+        running[client.submit(on_worker, task, packed(batch), pure=False)] = batch
 
 
 def threads(client: Any) -> int:
@@ -136,7 +136,7 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
     """A suspect by itself; the culprit where its worker dies again."""
     for _ in range(_TRIES):
         began = time.monotonic()
-        future = client.submit(on_worker, task, batch, pure=False)
+        future = client.submit(on_worker, task, packed(batch), pure=False)
         try:
             _finished(client, [future])
             found = _result(future)
