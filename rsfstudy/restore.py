@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rsfstudy import measures, reduce
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import DataError, InvalidValue
@@ -18,7 +19,7 @@ from rsfstudy.measures.problem import Problem
 from rsfstudy.reduce import Reduction
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 
 def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> Study:

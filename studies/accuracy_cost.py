@@ -1,5 +1,6 @@
 """What accuracy costs: every integrator on problems whose answer is known to more digits."""
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -9,7 +10,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import WorkPrecision
 from rsfstudy.reduce import Cheapest, LinearFit
 from rsfstudy.scene import Scene
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 from . import _references as known
 

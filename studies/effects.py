@@ -2,11 +2,12 @@
 
 import math
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.reduce import RelativeDifference
 from rsfstudy.scene import Scene
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 #: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
 #: stress.

@@ -2,6 +2,7 @@
 
 import math
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
@@ -14,7 +15,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 from . import _references as known
 

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import Inverse
 from rsfstudy.scene import Scene
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 from ._paper import PAPER, REFERENCE
 

@@ -4,11 +4,12 @@
 
 import numpy as np
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import Inverse, LinearFit
 from rsfstudy.scene import Scene
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 from ._paper import PAPER, REFERENCE
 

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from rsfstudy.axis import Axis
 from rsfstudy.claims import Claim
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Axis, Study
+from rsfstudy.study import Study
 
 from ._paper import PAPER, REFERENCE
 

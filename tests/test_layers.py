@@ -24,6 +24,7 @@ FLOORS = {
     "one_scene": 5,
     "claims": 5,
     "reduce": 5,
+    "axis": 5,
     "study": 5,
     "lattice": 5,
     "store": 5,

@@ -1,0 +1,167 @@
+"""One labelled dimension of a lattice: a plain list of values, or labelled points of several
+fields.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.scene import FIELDS, unknown_field
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, init=False)
+class Axis:
+    """One labelled dimension of a lattice.
+
+    Parameters
+    ----------
+    dimension : str
+        Name of the dimension; for a plain axis the field of the scene it varies.
+    values : sequence, or mapping of str to mapping
+        The values of that field; or, for a zipped axis, a label for each point and the fields set
+        there, as in ``{"constant": {"normal_stress": "constant"}, ...}``.
+
+    Raises
+    ------
+    InvalidValue
+        For an axis that is empty, repeats a value, holds a non-finite one or names no field.
+    """
+
+    dimension: str
+    rows: tuple[Row, ...]
+    labels: tuple[str, ...] | None
+
+    def __init__(
+        self, dimension: str, values: Sequence[Any] | np.ndarray | Mapping[str, Row]
+    ) -> None:
+        if not isinstance(dimension, str) or not dimension.isidentifier():
+            raise InvalidValue("axis", dimension, "must be named by a Python identifier")
+        labels: tuple[str, ...] | None = None
+        if isinstance(values, Mapping):
+            labels, rows = tuple(values), _rows(dimension, values)
+        else:
+            if dimension not in FIELDS:
+                raise unknown_field(dimension)
+            listed = [values] if isinstance(values, str) else values
+            if not is_list(listed):
+                raise InvalidValue(dimension, values, "must be a list of values")
+            rows = tuple({dimension: plain(value)} for value in listed)
+            if any(row[dimension] is None for row in rows):
+                raise InvalidValue(dimension, None, "must be a value on an axis")
+        object.__setattr__(self, "dimension", dimension)
+        object.__setattr__(self, "rows", rows)
+        object.__setattr__(self, "labels", labels)
+        self._check()
+
+    def _check(self) -> None:
+        if not self.rows:
+            raise InvalidValue("axis", self.dimension, "has no values")
+        for row in self.rows:
+            for name, value in row.items():
+                if name not in FIELDS:
+                    raise unknown_field(name)
+                if not isinstance(value, float | str | bool | None):
+                    raise InvalidValue(name, value, "must be a number, a flag or a text")
+                if isinstance(value, float) and not math.isfinite(value):
+                    raise InvalidValue(self.dimension, value, "must be finite")
+        seen: set[frozenset[tuple[str, Any]]] = set()
+        for row in self.rows:
+            point = frozenset(row.items())
+            if point in seen:
+                value = row.get(self.dimension, dict(row))
+                raise InvalidValue(self.dimension, value, "stands twice on its axis")
+            seen.add(point)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Fields of the scene that vary along the axis."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row))
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def describe(self) -> dict[str, Any]:
+        """The axis as plain data."""
+        if self.labels is None:
+            return {
+                "dimension": self.dimension,
+                "values": [row[self.dimension] for row in self.rows],
+            }
+        rows = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
+        return {"dimension": self.dimension, "values": rows}
+
+
+def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
+    """The rows of a zipped axis: for each label the fields set there."""
+    if dimension in FIELDS:
+        raise InvalidValue("axis", dimension, "is a field: a zipped axis needs a name of its own")
+    for label, row in points.items():
+        check_text(dimension, label)
+        if not label:
+            raise InvalidValue(dimension, label, "must be a text that labels a point")
+        if not isinstance(row, Mapping) or not row:
+            raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
+    return tuple({n: plain(v) for n, v in row.items()} for row in points.values())
+
+
+def select(axis: Axis, labels: Sequence[str]) -> Axis:
+    """The points of a zipped axis that bear these labels."""
+    assert axis.labels is not None
+    rows = dict(zip(axis.labels, axis.rows, strict=True))
+    for label in labels:
+        if label not in rows:
+            raise InvalidValue(axis.dimension, label, "is no point of the axis", choices=rows)
+    return Axis(axis.dimension, {label: rows[label] for label in labels})
+
+
+def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+    """A zipped axis whose points that use a field take new values of it; the others stay."""
+    assert axis.labels is not None
+    spread: dict[str, Row] = {}
+    for label, row in zip(axis.labels, axis.rows, strict=True):
+        if name not in row:
+            spread[label] = row
+            continue
+        for value in values:
+            changed = {**row, name: plain(value)}
+            if changed in spread.values():
+                continue
+            new = f"{name} = {value}"
+            if changed == row:
+                new = label
+            elif new in spread:
+                new = f"{label}, {new}"
+            spread[new] = changed
+    return Axis(axis.dimension, spread)
+
+
+def check_text(name: str, text: object) -> None:
+    """A text that a file can hold."""
+    if not isinstance(text, str) or "\0" in text:
+        raise InvalidValue(name, text, "must be a text")
+    try:
+        text.encode()
+    except UnicodeError as error:
+        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
+
+
+def is_list(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
+def plain(value: Any) -> Any:
+    """A value as Python's own number, flag or text; whole numbers as float."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    return float(value) if abs(value) < 2**1023 else math.inf
