@@ -166,15 +166,14 @@ class Journal:
         except sqlite3.Error as error:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
-    def known(self, keys: np.ndarray, *, answered: bool = False) -> np.ndarray:
-        """Whether each cell is finished, or even answered; failures are not, so that they are tried
-        again.
-        """
-        wanted = {s.name for s in Status if s.is_answer or not answered}
-        found = np.zeros(len(keys), dtype=bool)
+    def ended(self, keys: np.ndarray) -> np.ndarray:
+        """The status of each cell, `pending` where none is kept."""
+        codes = {status.name: int(status) for status in Status}
+        found = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
         for start, rows in self._rows(keys, "status"):
-            for place, key in enumerate(keys[start : start + _AT_A_TIME]):
-                found[start + place] = rows.get(key.tobytes(), ("",))[0] in wanted
+            for cell, key in enumerate(keys[start : start + _AT_A_TIME], start):
+                (name,) = rows.get(key.tobytes(), (Status.PENDING.name,))
+                found[cell] = codes.get(name, int(Status.PENDING))
         return found
 
     def read(self, keys: np.ndarray) -> Columns:

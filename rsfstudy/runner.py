@@ -146,7 +146,8 @@ class Run:
 
     def _compute_missing(self, journal: Journal, mapper: Mapper, progress: Progress) -> None:
         cells = self.plan.different
-        answered = journal.known(self.plan.keys[cells], answered=True)
+        # failures are tried again
+        answered = journal.ended(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
         missing = scattered(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress(done, total)
@@ -231,7 +232,7 @@ class Run:
 
     def _resumable(self, journal: Journal) -> str:
         """How much is finished, where it is, and how to go on."""
-        known = int(journal.known(self.plan.keys).sum())
+        known = int((journal.ended(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.keeping.output is None:
             return f"{text}; nothing was to be kept (no output directory)."

@@ -19,7 +19,7 @@ from faulty import declared
 from running import FAULTY, SMALL, cells_in, command, ended, run, same_numbers, until
 
 import rsfstudy
-from rsfstudy import cells, provenance, workers
+from rsfstudy import provenance, workers
 from rsfstudy.errors import RunError
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
@@ -117,10 +117,6 @@ def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
     monkeypatch.setattr(provenance, "code", lambda: other)
     with pytest.raises(RunError, match=r"a worker has scipy .*, this run 0\.1"):
         run(client=cluster)
-
-
-def test_a_task_carries_the_versions_it_needs():
-    assert cells.Task(SMALL.measure, SMALL.accuracy).code == provenance.code()
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
         kept.add([(KEYS[0].tobytes(), DONE)])
     with journal(tmp_path) as kept:
-        assert kept.known(KEYS, answered=True).tolist() == [True, False]
+        assert kept.ended(KEYS).tolist() == [Status.OK, Status.PENDING]
         found = kept.read(KEYS)
     assert found.status.tolist() == [Status.OK, Status.PENDING]
     assert (found.work[0], found.seconds[0]) == (42, 0.1)
@@ -140,12 +140,11 @@ def test_the_journal_returns_what_it_was_given(tmp_path):
     assert np.isnan(found.numbers[1]).all()
 
 
-def test_failed_cells_are_known_and_not_answered(tmp_path):
+def test_failed_cells_are_kept_as_such(tmp_path):
     failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), float("nan"))
     with journal(tmp_path) as kept:
         kept.add([(KEYS[0].tobytes(), failed)])
-        assert not kept.known(KEYS, answered=True).any()
-        assert kept.known(KEYS).tolist() == [True, False]
+        assert kept.ended(KEYS).tolist() == [Status.CELL_RAISED, Status.PENDING]
         found = kept.read(KEYS)
     assert (found.status[0], found.message[0]) == (Status.CELL_RAISED, "ValueError: x")
     assert np.isnan(found.seconds[0])
@@ -157,7 +156,7 @@ def test_a_journal_of_other_numbers_is_refused_with_the_difference(tmp_path):
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-09 now.*--fresh"):
         journal(tmp_path, {"rtol": 1e-9, "physics": "abc"})
     with journal(tmp_path, {"rtol": 1e-9, "physics": "abc"}, fresh=True) as kept:
-        assert not kept.known(KEYS).any()
+        assert (kept.ended(KEYS) == Status.PENDING).all()
 
 
 def test_a_damaged_journal_is_named(tmp_path):
