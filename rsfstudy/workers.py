@@ -232,26 +232,18 @@ def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
         If none answers at the address.
     """
     from distributed import Client
+    from distributed.utils import silence_logging_cmgr
 
-    try:
-        asyncio.run(asyncio.wait_for(_greeting(address), timeout))
-        client = Client(address, timeout=timeout)
-    except Exception as error:  # what Dask makes of an address that is none has no end
-        raise RunError(
-            f"no Dask scheduler answers at {address!r}: {error}. "
-            "Start one with `dask scheduler`, or leave --scheduler out."
-        ) from error
-    with client, _quiet_loggers():
-        yield client
-
-
-@contextlib.contextmanager
-def _quiet_loggers() -> Iterator[None]:
-    """What goes wrong with a cluster is told once, by the run."""
-    dask = logging.getLogger("distributed")
-    level = dask.level
-    dask.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        dask.setLevel(level)
+    # what goes wrong with a cluster is told once, by the run; Dask's client has more to say until
+    # it is closed
+    with silence_logging_cmgr(logging.CRITICAL + 1):
+        try:
+            asyncio.run(asyncio.wait_for(_greeting(address), timeout))
+            client = Client(address, timeout=timeout)
+        except Exception as error:  # what Dask makes of an address that is none has no end
+            raise RunError(
+                f"no Dask scheduler answers at {address!r}: {error}. "
+                "Start one with `dask scheduler`, or leave --scheduler out."
+            ) from error
+        with client:
+            yield client

@@ -106,6 +106,7 @@ def test_a_scheduler_lost_in_mid_run(separate, tmp_path):
     code, _out, said = ended(process)
     assert code == 1
     assert "the Dask scheduler is lost" in said
+    assert "distributed." not in said  # told once, not by Dask too
     assert "of 60 cells are finished and kept" in said
     assert (output / "faulty.partial.nc").exists()
     resumed = run(declared(cells=60), output=output)
