@@ -194,6 +194,9 @@ def local_cluster(workers: int) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": 0,
         # Dask closes for good a worker that died and happens to be starting again this long after
         "distributed.deploy.lost-worker-timeout": "1000 days",
+        # what each process does beside its cells: 50 ticks and 100 looks at the stack a second
+        "distributed.admin.tick.interval": "1s",
+        "distributed.worker.profile.enabled": False,
         "distributed.comm.timeouts.connect": f"{_START_TIMEOUT}s",
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
