@@ -1,8 +1,8 @@
 """The journal of a study: every finished cell, on disk as soon as it is finished.
 
-An SQLite file beside the results. A cell is found again by the exact values of its scene;
-everything else that decides its numbers is the journal's fingerprint, and a journal with another
-fingerprint is refused.
+An SQLite file beside the results, for one run at a time. A cell is found again by the exact values
+of its scene; everything else that decides its numbers is the journal's fingerprint, and a journal
+with another fingerprint is refused.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ CREATE TABLE IF NOT EXISTS cells (
     checksum INTEGER);
 """
 _AT_A_TIME = 500
+#: How long to wait for another run to end, in s.
+_WAIT = 0.5
 _REMEDY = "Choose another --output, or start over with --fresh."
 
 
@@ -98,7 +100,8 @@ class Journal:
     Raises
     ------
     DataError
-        If the file cannot be opened, or its fingerprint differs; the text says where.
+        If the file cannot be opened, another run uses it, or its fingerprint differs; the text says
+        where.
     """
 
     def __init__(
@@ -117,14 +120,19 @@ class Journal:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 if fresh:
-                    forget(path)
-            self._db = sqlite3.connect(":memory:" if path is None else path)
+                    _forget(path)
+            self._db = _alone(path or ":memory:")
             with self._db:
                 self._db.executescript(_TABLES)
                 row = self._db.execute("SELECT json FROM fingerprint").fetchone()
                 if row is None:
                     self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
         except (OSError, sqlite3.Error) as error:
+            if _is_taken(error):
+                raise DataError(
+                    f"another run uses {self._path}: let it end, or choose another --output "
+                    "(output=)."
+                ) from error
             raise DataError(f"cannot use {self._path}: {error}. {_REMEDY}") from error
         if row is not None and row[0] != wanted:
             self._db.close()
@@ -217,8 +225,33 @@ class Journal:
             yield start, {key: row for key, *row in rows}
 
 
-def forget(path: Path) -> None:
-    """Remove a journal, and what SQLite left beside it of a write that was cut short."""
+def _alone(path: Path | str) -> sqlite3.Connection:
+    """A database that nobody else may use until it is closed, or this process ends."""
+    db = sqlite3.connect(path, timeout=_WAIT)
+    try:
+        db.execute("PRAGMA locking_mode = EXCLUSIVE")
+        db.execute("BEGIN EXCLUSIVE")
+        db.commit()
+    except sqlite3.Error:
+        db.close()
+        raise
+    return db
+
+
+def _is_taken(error: Exception) -> bool:
+    return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
+
+
+def _forget(path: Path) -> None:
+    """Remove a journal that no other run uses, and what SQLite left beside it of a write that was
+    cut short.
+    """
+    if path.exists():
+        try:
+            _alone(path).close()
+        except sqlite3.Error as error:
+            if _is_taken(error):
+                raise
     for file in (path, path.with_name(f"{path.name}-journal")):
         file.unlink(missing_ok=True)
 

@@ -228,6 +228,18 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch)
     same_numbers(extended, run(longer))
 
 
+@pytest.mark.parametrize("fresh", [False, True])
+def test_two_runs_at_a_time_are_refused(tmp_path, fresh):
+    """The second is told, and the first is not disturbed."""
+    process = command("run", FAULTY, "--output", tmp_path, **{**SLOW, "FAULT_TAKES": "0.2"})
+    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
+    with pytest.raises(DataError, match=r"another run uses .*faulty\.cells\.sqlite"):
+        run(declared(cells=CELLS), output=tmp_path, fresh=fresh)
+    code, out, _said = ended(process)
+    assert code == 0, out
+    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
+
+
 def test_other_tolerances_are_not_mixed(tmp_path):
     run(output=tmp_path)
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now.*--fresh"):
