@@ -228,6 +228,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
+    time_limit: float = DEFAULT_TIME_LIMIT,
 ) -> pd.DataFrame:
     """Compute a results file anew from what it says of itself, and hold the numbers against it.
 
@@ -238,7 +239,7 @@ def rerun(
     study : path, optional
         The file that declares the study, where its measure is not part of rsfstudy; code is never
         taken from a results file.
-    workers, client, output, progress
+    workers, client, output, progress, time_limit
         As in `run`; by default nothing is written.
 
     Returns
@@ -267,7 +268,7 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    ours = _computed(declared, keeping, _Workers(workers, client, progress=progress))
+    ours = _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
     return compared(theirs, ours)
 
 

@@ -85,6 +85,20 @@ class Claim:
         """The claim as plain data."""
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
 
+    def check_names(self, dataset: xr.Dataset) -> None:
+        """Raise InvalidValue where the claim speaks of what a dataset does not have: its verdict
+        would always be that it is not applicable.
+        """
+        variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
+        for variable in filter(None, (self.variable, self.minus_variable)):
+            if variable not in dataset:
+                rule = f"is no variable of the results, in claim {self.id}"
+                raise InvalidValue("variable", variable, rule, choices=sorted(variables))
+        for name in [*self.where, *self.minus]:
+            if name not in coordinates:
+                rule = f"is no coordinate of the results, in claim {self.id}"
+                raise InvalidValue("where", name, rule, choices=sorted(coordinates))
+
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
         """Our value, and whether it reproduces the published one.
 

@@ -59,6 +59,13 @@ _workers = click.option(
 )
 _serial = click.option("--serial", is_flag=True, help="Compute in this process.")
 _scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
+_time_limit = click.option(
+    "--time-limit",
+    type=float,
+    default=DEFAULT_TIME_LIMIT,
+    show_default=True,
+    help="Seconds after which a worker gives a cell up.",
+)
 _quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 
 
@@ -120,13 +127,7 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
 @_serial
 @_scheduler
 @_rtol
-@click.option(
-    "--time-limit",
-    type=float,
-    default=DEFAULT_TIME_LIMIT,
-    show_default=True,
-    help="Seconds after which a worker gives a cell up.",
-)
+@_time_limit
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
 @click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")
 @click.option("--despite-failures", is_flag=True, help="Reduce what there is where cells failed.")
@@ -194,6 +195,7 @@ def run(
 @_workers
 @_serial
 @_scheduler
+@_time_limit
 @_quiet
 def rerun(
     file: Path,
@@ -203,6 +205,7 @@ def rerun(
     workers: int,
     serial: bool,
     scheduler: str | None,
+    time_limit: float,
     quiet: bool,
 ) -> int:
     """Compute a results file anew from what it says of itself, and compare every number."""
@@ -216,6 +219,7 @@ def rerun(
             client=client,
             output=output,
             progress=not quiet,
+            time_limit=time_limit,
         )
     return terminal.agreement(table)
 
@@ -227,8 +231,7 @@ def rerun(
 def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
     if not every:
-        dataset = api.open(_results(name, every)[0], output)
-        return max(terminal.claims(dataset), terminal.failures(dataset))
+        return terminal.checked(api.open(_results(name, every)[0], output))
     status, found = OK, []
     for what in catalogue.names():
         if (output / f"{what}.nc").exists():

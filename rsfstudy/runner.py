@@ -85,8 +85,8 @@ class Run:
     Raises
     ------
     InvalidValue
-        For a declaration with a cell that makes no scene, or reductions that do not fit its
-        lattice, before anything is computed.
+        For a declaration with a cell that makes no scene, or reductions or claims that do not fit
+        its lattice, before anything is computed.
     """
 
     def __init__(self, study: Study, keeping: Keeping, task: Task, workers: int = 1) -> None:
@@ -96,7 +96,9 @@ class Run:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Apply the reductions to the lattice as it is before anything is computed."""
+        """Apply the reductions to the lattice as it is before anything is computed; where it is as
+        declared, the claims must speak of what comes out.
+        """
         pending = Columns.pending(self.study.size, Layout(self.study.measure).width)
         lattice = assemble(self.study, pending, self.about)
         for reduction in self.study.reductions:
@@ -107,6 +109,8 @@ class Run:
             except Exception as error:
                 rule = f"does not fit this lattice: {type(error).__name__}: {error}"
                 raise InvalidValue("reduction", reduction.name, rule) from error
+        for claim in () if self.study.overrides else self.study.claims:
+            claim.check_names(lattice)
 
     def path(self, ending: str) -> Path:
         """A file of this run."""

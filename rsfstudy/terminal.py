@@ -170,6 +170,18 @@ def _costs(dataset: xr.Dataset) -> None:
     console.print(table)
 
 
+def checked(dataset: xr.Dataset) -> int:
+    """Print the claims and the failed cells; FAILED where a verdict is not the expected one, a cell
+    failed, or none of the study's claims could be held against anything.
+    """
+    verdicts = api.check(dataset)
+    vacuous = len(verdicts) > 0 and bool(verdicts["verdict"].eq(NOT_APPLICABLE).all())
+    status = max(claims(dataset), failures(dataset))
+    if vacuous:
+        console.print(f"nothing was checked: of {len(verdicts)} claims none applies", style="red")
+    return FAILED if vacuous else status
+
+
 def claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
     table_of = api.check(dataset)

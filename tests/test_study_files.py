@@ -73,6 +73,42 @@ def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
     assert "study_file_mine" not in sys.modules
 
 
+CLAIM = """
+from rsfstudy.claims import Claim
+
+study = dataclasses.replace(study, claims=[Claim(
+    id="M1", statement="", source="", published=1.0, tolerance=0.1, reason="", {}
+)])
+"""
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"),
+    [
+        (
+            'variable="critcal_displacement", where={"phi": 55.0}',
+            "'critcal_displacement': is no variable.*M1",
+        ),
+        (
+            'variable="critical_displacement", where={"ph": 55.0}',
+            "'ph': is no coordinate.*M1.*'phi'",
+        ),
+        (
+            'variable="critical_displacement", where={"phi": 55.0}, minus={"b": 1.0}',
+            "'b': is no coordinate.*M1",
+        ),
+    ],
+)
+def test_a_claim_on_what_is_not_there_is_told_before_anything_is_computed(
+    names, complaint, tmp_path
+):
+    """It would never apply, and so never be checked."""
+    file = written(tmp_path, "import dataclasses" + DECLARATION + CLAIM.replace("{}", names))
+    with pytest.raises(InvalidValue, match=complaint):
+        rsfstudy.run(file, output=tmp_path / "results")
+    assert not (tmp_path / "results").exists()
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
