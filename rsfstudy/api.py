@@ -24,6 +24,8 @@ from rsfstudy.study import Study
 from rsfstudy.workers import on_client, on_local_cluster, threads
 
 OUTPUT = Path("outputs")
+#: No cell takes thirty years, and no clock of ours goes much further.
+_LONGEST = 1e9
 
 
 def studies() -> dict[str, Study]:
@@ -129,8 +131,9 @@ class _Workers:
         if self.client is not None and not hasattr(self.client, "submit"):
             raise InvalidValue("client", self.client, "must be a distributed.Client")
         limit: object = self.time_limit
-        if not isinstance(limit, int | float) or not limit > 0.0:
-            raise InvalidValue("time_limit", limit, "must be a number greater than 0")
+        if not isinstance(limit, int | float) or not 0.0 < limit <= _LONGEST:
+            rule = f"must be a number greater than 0, up to {_LONGEST:g} s"
+            raise InvalidValue("time_limit", limit, rule)
 
     def threads(self) -> int:
         """How many cells are computed at a time."""

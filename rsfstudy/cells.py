@@ -10,6 +10,7 @@ import pickle
 import threading
 import time
 import traceback
+import uuid
 import zlib
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,8 +25,10 @@ from rsfstudy.status import Status
 
 #: Time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0
-#: How often finished cells are handed over in one process, in s.
-_TELL = 0.2
+#: How often finished cells are handed over, in s: in one process, and by a worker.
+_TELL, _TELL_DRIVER = 0.2, 0.5
+#: Tells this process from others.
+_HERE = uuid.uuid4().hex
 #: How often a worker looks for a cell that is over its limit, in s.
 _LOOK = 0.5
 #: How often Python's own watchdog is set anew, and how much later it acts, in s.
@@ -48,12 +51,15 @@ class Task:
         Time in s a cell may take on a worker. Nothing bounds it in the user's own process.
     code : mapping
         Versions of all that decides a number, which every worker must have.
+    home : str
+        The process that made the task.
     """
 
     measure: Measure
     accuracy: Accuracy
     time_limit: float = DEFAULT_TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
+    home: str = _HERE
 
 
 #: Takes a task and batches, and yields the finished cells, in any order.
@@ -67,7 +73,7 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
     found: Found = []
     began = told = time.monotonic()
     for key, scene in itertools.chain.from_iterable(batches):
-        found.append((key, computed(task, scene)))
+        found.append((key, computed(task, scene, let_through=(KeyboardInterrupt,))))
         now = time.monotonic()
         if now - told > min(_TELL, 0.5 * (told - began)):
             yield found
@@ -83,6 +89,11 @@ def packed(batch: Batch) -> bytes:
 def on_worker(task: Task, batch: bytes) -> Found:
     """A packed batch in a worker process, which ends itself at a cell that is over its time limit.
 
+    Returns
+    -------
+    list
+        Its first cells: as many as were finished when it was time to hand them over.
+
     Raises
     ------
     RunError
@@ -96,27 +107,33 @@ def on_worker(task: Task, batch: bytes) -> Found:
                 "mix. Give the workers the same versions"
             )
     found: Found = []
+    began = time.monotonic()
     try:
         for key, scene in pickle.loads(zlib.decompress(batch)):
-            _deadlines.set(task.time_limit)
+            if task.home != _HERE:  # a worker may be a thread of the user's own process
+                _deadlines.set(task.time_limit)
             found.append((key, computed(task, scene)))
+            if time.monotonic() - began > _TELL_DRIVER:
+                break
     finally:
         _deadlines.clear()
     return found
 
 
-def computed(task: Task, scene: Scene) -> Finished:
+def computed(
+    task: Task, scene: Scene, let_through: tuple[type[BaseException], ...] = ()
+) -> Finished:
     """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
     begin = time.perf_counter()
     try:
         found = task.measure(scene, task.accuracy)
-    except KeyboardInterrupt:
+    except let_through:
         raise
     except BaseException as error:  # a cell may raise SystemExit or CancelledError too
         # not str(error), which may raise as well
         text = traceback.format_exception_only(error)[-1].strip()
         found = Outcome(Status.CELL_RAISED, message=text)
-    message = str(found.message or "").encode(errors="backslashreplace").decode()
+    message = found.message.encode(errors="backslashreplace").decode()
     return replace(found, message=message.replace("\0", "\\0")), time.perf_counter() - begin
 
 

@@ -38,13 +38,13 @@ def on_client(client: Any) -> Mapper:
     """On the workers of a Dask client; they need no shared file system."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-        source = iter(batches)
+        waiting = _Waiting(batches)
         running: dict[Any, Batch] = {}
         suspects: list[Any] = []
         try:
             while True:
                 if not suspects:
-                    _fill(client, task, source, running)
+                    _fill(client, task, waiting, running)
                 if running:
                     for future in _finished(client, running):
                         batch = running.pop(future)
@@ -52,6 +52,7 @@ def on_client(client: Any) -> Mapper:
                         if found is None:
                             suspects += batch
                         else:
+                            waiting.back(batch[len(found) :])
                             yield found
                 elif suspects:
                     for cell in suspects:
@@ -65,10 +66,25 @@ def on_client(client: Any) -> Mapper:
     return mapper
 
 
-def _fill(client: Any, task: Task, source: Iterator[Batch], running: dict[Any, Batch]) -> None:
+class _Waiting(Iterator[Batch]):
+    """Batches that are not sent yet; what a worker left of one is the next."""
+
+    def __init__(self, batches: Iterable[Batch]) -> None:
+        self._new = iter(batches)
+        self._left: list[Batch] = []
+
+    def __next__(self) -> Batch:
+        return self._left.pop() if self._left else next(self._new)
+
+    def back(self, rest: Batch) -> None:
+        """Take what is left of a batch."""
+        self._left += [rest] if rest else []
+
+
+def _fill(client: Any, task: Task, waiting: _Waiting, running: dict[Any, Batch]) -> None:
     """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
     enough = 4 + 2 * threads(client)
-    for batch in itertools.islice(source, max(0, enough - len(running))):
+    for batch in itertools.islice(waiting, max(0, enough - len(running))):
         running[client.submit(on_worker, task, packed(batch), pure=False)] = batch
 
 

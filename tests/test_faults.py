@@ -47,6 +47,9 @@ def only_one_failed(dataset, status):
         ("text", "cell_raised", "must be a real number"),
         ("text anywhere", "cell_raised", "must be a real number"),
         ("complex", "cell_raised", "must be a real number"),
+        ("masked", "cell_raised", "must be a real number"),
+        ("number for message", "cell_raised", "must be a text"),
+        ("unprintable message", "cell_raised", "must be a text"),
         ("no status", "cell_raised", "must be an Outcome with a Status"),
         ("pending", "cell_raised", "must say what became of the cell"),
         ("surrogate", "cell_raised", r"OSError: no \udc80 file"),
@@ -73,6 +76,23 @@ def test_a_cell_that_kills_its_worker(fault, monkeypatch):
     dataset = run(declared(fault, at=(2.5,)), workers=2)
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]
+
+
+def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):
+    """Nobody pressed Ctrl-C there."""
+    dataset = run(declared("interrupts", at=(2.5,)), client=cluster)
+    only_one_failed(dataset, "cell_raised")
+    assert "KeyboardInterrupt" in dataset.message.values[1]
+
+
+def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
+    """A worker may be a thread of it."""
+    from distributed import Client
+
+    monkeypatch.setenv("FAULT_TAKES", "1.2")
+    with Client(processes=False, n_workers=1, dashboard_address=None) as client:
+        dataset = run(declared(cells=2), client=client, time_limit=0.1)
+    assert dataset.status.values.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("fault", ["hangs", "hangs in C"])

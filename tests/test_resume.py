@@ -45,9 +45,9 @@ def goes_on(output, already):
     asked = []
     original = cells.computed
 
-    def counted(task, scene):
+    def counted(task, scene, **options):
         asked.append(scene)
-        return original(task, scene)
+        return original(task, scene, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cells, "computed", counted)
@@ -216,9 +216,9 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch)
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.nc"]
     asked, original = [], cells.computed
 
-    def counted(task, scene):
+    def counted(task, scene, **options):
         asked.append(scene.b_over_a)
-        return original(task, scene)
+        return original(task, scene, **options)
 
     monkeypatch.setattr(cells, "computed", counted)
     longer = SMALL.with_(b_over_a=[2.0, 2.25, 2.5, 3.0, 3.5])
@@ -226,6 +226,18 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch)
     assert sorted(asked) == [2.25, 2.25, 3.5, 3.5]
     same_numbers(extended.sel(b_over_a=[2.0, 2.5, 3.0]), first)
     same_numbers(extended, run(longer))
+
+
+def test_what_a_worker_has_finished_is_kept_before_its_batch_is_done(tmp_path):
+    """However little its cells were expected to cost: here a batch would last 15 s."""
+    process = command("run", FAULTY, "--output", tmp_path, FAULT_TAKES="0.25", FAULT_CELLS="480")
+    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
+    began = time.monotonic()
+    until(lambda: time.monotonic() - began > 3.0, process)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    kept = cells_in(tmp_path / "faulty.cells.sqlite")
+    assert 8 <= kept < 60
 
 
 @pytest.mark.parametrize("fresh", [False, True])

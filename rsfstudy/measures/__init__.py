@@ -117,6 +117,8 @@ class Measure:
         """
         if not isinstance(found, Outcome) or not isinstance(found.status, Status):
             raise InvalidValue("measured", found, "must be an Outcome with a Status")
+        if not isinstance(found.message, str):
+            raise InvalidValue("message", type(found.message).__name__, "must be a text")
         if found.status is Status.PENDING:
             raise InvalidValue("measured", found, "must say what became of the cell")
         for name, value in found.values.items():
@@ -126,7 +128,8 @@ class Measure:
             if np.shape(value) != shape:
                 rule = f"has the shape {np.shape(value)} and must have {shape}"
                 raise InvalidValue("measured", name, rule)
-            if np.asarray(value).dtype.kind not in "iufb":
+            masked = isinstance(value, np.ma.MaskedArray)
+            if masked or np.asarray(value).dtype.kind not in "iufb":
                 raise InvalidValue("measured", name, f"is {value!r} and must be a real number")
         if found.status is not Status.OK:
             return found
