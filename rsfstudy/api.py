@@ -12,8 +12,8 @@ import pandas as pd
 import xarray as xr
 from rich import progress as bars
 
-from rsfstudy import catalogue, restore, runner, store
-from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, serial
+from rsfstudy import catalogue, own_code, restore, runner, store
+from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
 from rsfstudy.claims import Claim, verdicts
 from rsfstudy.comparison import cell_number, compared
 from rsfstudy.errors import DataError, InvalidValue
@@ -156,7 +156,10 @@ def _directory(output: str | Path | None) -> Path | None:
 
 
 def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
-    task = Task(study.measure, study.accuracy, workers.time_limit)
+    digest = own_code.digest(type(study.measure))
+    task = Task(study.measure, study.accuracy, workers.time_limit, own_code=digest)
+    if workers.mapper() is not serial:
+        sendable(task)  # told before any work, if it is not
     ready = runner.Run(study, keeping, task, workers.threads())
     with _bar(study.name, workers.progress) as told:
         return ready(workers.mapper(), told)

@@ -12,7 +12,6 @@ from pathlib import Path
 from types import ModuleType
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure
 from rsfstudy.study import Study
 
 #: Where the files of `studies/` are installed.
@@ -48,8 +47,9 @@ def load(name: str) -> Study:
 def _run(path: Path) -> ModuleType:
     """The module a file makes.
 
-    It is taken out of the list of modules again: worker processes, which cannot import it, then get
-    what it defines by value.
+    It is taken out of the list of modules again, and so are those beside it that it imports: worker
+    processes, which cannot import them, then get what they define by value, and another file may
+    have others of the same names.
     """
     try:
         path = path.resolve(strict=True)
@@ -60,6 +60,7 @@ def _run(path: Path) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    known = set(sys.modules)
     sys.modules[spec.name] = module
     sys.path.insert(0, str(path.parent))  # a file may have helpers beside it
     try:
@@ -73,12 +74,17 @@ def _run(path: Path) -> ModuleType:
         rule = f"raises {type(error).__name__}{_line(error, path)}: {error}"
         raise InvalidValue("study", str(path), rule) from error
     finally:
-        sys.modules.pop(spec.name, None)
         sys.path.remove(str(path.parent))
-    for found in vars(module).values():
-        if isinstance(found, type) and found.__module__ == spec.name and issubclass(found, Measure):
-            found.source = path.read_text()
+        for name in [n for n in sys.modules if n not in known and _is_beside(n, path)]:
+            del sys.modules[name]
     return module
+
+
+def _is_beside(name: str, path: Path) -> bool:
+    """Whether a module is a file, or in a package, in the same directory."""
+    top = sys.modules.get(name.partition(".")[0])
+    places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
+    return any(Path(place).parent == path.parent for place in places if place)
 
 
 def _line(error: BaseException, path: Path) -> str:

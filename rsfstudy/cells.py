@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import functools
 import itertools
 import math
 import os
@@ -15,9 +16,11 @@ import zlib
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rsfstudy import provenance
+import cloudpickle
+
+from rsfstudy import own_code, provenance
 from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.errors import RunError
+from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.journal import Finished
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.scene import Scene
@@ -51,6 +54,8 @@ class Task:
         Time in s a cell may take on a worker. Nothing bounds it in the user's own process.
     code : mapping
         Versions of all that decides a number, which every worker must have.
+    own_code : str
+        Digest of the code of the measure, where it is a user's own: the same.
     home : str
         The process that made the task.
     """
@@ -59,6 +64,7 @@ class Task:
     accuracy: Accuracy
     time_limit: float = DEFAULT_TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
+    own_code: str = "none"
     home: str = _HERE
 
 
@@ -81,12 +87,60 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
     yield found
 
 
+def sendable(task: Task) -> bytes:
+    """A task as workers are given it: with all that they cannot import.
+
+    Raises
+    ------
+    InvalidValue
+        Where the measure holds what cannot be sent.
+    """
+    try:
+        return bytes(cloudpickle.dumps(task))
+    except Exception as error:
+        rule = f"cannot be sent to a worker ({error})"
+        remedy = "Compute in this process: --serial (workers=0)."
+        raise InvalidValue("measure", task.measure.name, rule, remedy=remedy) from error
+
+
+@functools.lru_cache(maxsize=4)
+def _received(sent: bytes) -> Task:
+    """A task in a worker process, which must have the code it was made with.
+
+    Raises
+    ------
+    RunError
+        Where the worker has not.
+    """
+    try:
+        task: Task = cloudpickle.loads(sent)
+    except Exception as error:
+        raise RunError(
+            f"a worker cannot load the measure ({type(error).__name__}: {error}). Give the workers "
+            "the files it needs, or put them beside the study file"
+        ) from error
+    ours = provenance.code()
+    for name, wanted in task.code.items():
+        if ours.get(name) != wanted:
+            raise RunError(
+                f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
+                "mix. Give the workers the same versions"
+            )
+    if own_code.digest(type(task.measure)) != task.own_code:
+        raise RunError(
+            f"a worker has another {type(task.measure).__name__}, or other code it draws on, than "
+            "this run: their numbers would mix. Give the workers the same files, and start them "
+            "again"
+        )
+    return task
+
+
 def packed(batch: Batch) -> bytes:
     """A batch as little as can be: Dask's scheduler holds on to what it has passed on."""
     return zlib.compress(pickle.dumps(batch), level=1)
 
 
-def on_worker(task: Task, batch: bytes) -> Found:
+def on_worker(sent: bytes, batch: bytes) -> Found:
     """A packed batch in a worker process, which ends itself at a cell that is over its time limit.
 
     Returns
@@ -97,15 +151,9 @@ def on_worker(task: Task, batch: bytes) -> Found:
     Raises
     ------
     RunError
-        Where the worker runs other versions than the run was started with.
+        Where the worker cannot load the task, or runs other code than it was made with.
     """
-    ours = provenance.code()
-    for name, wanted in task.code.items():
-        if ours.get(name) != wanted:
-            raise RunError(
-                f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
-                "mix. Give the workers the same versions"
-            )
+    task = _received(sent)
     found: Found = []
     began = time.monotonic()
     try:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import inspect
 import os
 import platform
 import subprocess
@@ -16,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from rsfstudy.measures import Measure
+from rsfstudy import own_code
 from rsfstudy.study import Study
 
 _PACKAGE = Path(__file__).parent
@@ -44,10 +43,18 @@ def physics_digest() -> str:
     return digest.hexdigest()[:16]
 
 
+#: What runs is what was imported, whatever becomes of the files.
+_PHYSICS_AS_IMPORTED = physics_digest()
+
+
 @functools.cache
 def code() -> dict[str, str]:
     """Versions of everything that decides the number of a cell, whatever the study."""
-    return {"physics": physics_digest(), "numpy": version("numpy"), "scipy": version("scipy")}
+    return {
+        "physics": _PHYSICS_AS_IMPORTED,
+        "numpy": version("numpy"),
+        "scipy": version("scipy"),
+    }
 
 
 def fingerprint(study: Study) -> dict[str, Any]:
@@ -55,23 +62,12 @@ def fingerprint(study: Study) -> dict[str, Any]:
     return {
         "study": f"{study.name} version {study.version}",
         "measure": study.measure.describe(),
-        "own_code": _own_code(type(study.measure)),
+        "own_code": own_code.digest(type(study.measure)),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
         "methods": [list(pair) for pair in study.accuracy.methods],
         **code(),
     }
-
-
-def _own_code(measure: type[Measure]) -> str:
-    """Digest of the source of a measure that is not part of the package."""
-    if measure.__module__.startswith(f"{_PACKAGE.name}."):
-        return "none"
-    try:
-        source = measure.source or inspect.getsource(measure)
-    except (OSError, TypeError):
-        return "unknown"
-    return hashlib.sha256(source.encode()).hexdigest()[:16]
 
 
 def provenance(study: Study, command: str) -> dict[str, Any]:

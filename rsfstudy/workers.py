@@ -18,7 +18,7 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import Any
 
-from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed
+from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed, sendable
 from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -38,13 +38,13 @@ def on_client(client: Any) -> Mapper:
     """On the workers of a Dask client; they need no shared file system."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-        waiting = _Waiting(batches)
+        sent, waiting = sendable(task), _Waiting(batches)
         running: dict[Any, Batch] = {}
         suspects: list[Any] = []
         try:
             while True:
                 if not suspects:
-                    _fill(client, task, waiting, running)
+                    _fill(client, sent, waiting, running)
                 if running:
                     for future in _finished(client, running):
                         batch = running.pop(future)
@@ -81,11 +81,11 @@ class _Waiting(Iterator[Batch]):
         self._left += [rest] if rest else []
 
 
-def _fill(client: Any, task: Task, waiting: _Waiting, running: dict[Any, Batch]) -> None:
+def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]) -> None:
     """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
     enough = 4 + 2 * threads(client)
     for batch in itertools.islice(waiting, max(0, enough - len(running))):
-        running[client.submit(on_worker, task, packed(batch), pure=False)] = batch
+        running[client.submit(on_worker, sent, packed(batch), pure=False)] = batch
 
 
 def threads(client: Any) -> int:
@@ -152,7 +152,7 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
     """A suspect by itself; the culprit where its worker dies again."""
     for _ in range(_TRIES):
         began = time.monotonic()
-        future = client.submit(on_worker, task, packed(batch), pure=False)
+        future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
         try:
             _finished(client, [future])
             found = _result(future)

@@ -11,7 +11,6 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -92,10 +91,6 @@ class Faulty(Measure):
             return FAULTS[self.fault](meter)
         meter.charge("any", 7)
         return Outcome(Status.OK, {"total": scene.b_over_a})
-
-
-#: the same code, whether it is imported or run as a study file
-Faulty.source = Path(__file__).read_text()
 
 
 def declared(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Study:

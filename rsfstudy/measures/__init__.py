@@ -49,8 +49,6 @@ class Measure:
 
     #: File and registry name.
     name: ClassVar[str]
-    #: Source of a measure of the user's own, where it cannot be looked up.
-    source: ClassVar[str] = ""
 
     @property
     def headline(self) -> str:

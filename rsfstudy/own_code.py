@@ -1,0 +1,189 @@
+"""The code of a user's own measure: a digest of all it draws on, as it is in memory.
+
+Files tell no more than what was there when they were last written; here the functions themselves
+are followed, from the class of the measure through every name they use, so that the digest is the
+same for the same code, be it a study file, a script, a notebook or a worker, and another as soon as
+a function, a constant or a helper is. Modules that a function imports when it runs are not
+followed. Python, installed packages and rsfstudy itself have versions, and end the search.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pickle
+import site
+import sys
+import sysconfig
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+_PACKAGE = Path(__file__).parent.name
+_INSTALLED = tuple(
+    Path(path).resolve()
+    for path in {
+        *(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")),
+        *site.getsitepackages(),
+        site.getusersitepackages(),
+    }
+)
+#: Made for every class, or every dataclass, and deciding no number.
+_MADE = {
+    *("__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__"),
+    *("__annotate__", "__annotate_func__", "__annotations_cache__", "__firstlineno__"),
+    *("__static_attributes__", "__match_args__", "__slotnames__", "__abstractmethods__"),
+    *("__dataclass_fields__", "__dataclass_params__", "__init__", "__repr__", "__eq__"),
+    *("__hash__", "__setattr__", "__delattr__", "__replace__", "__getstate__", "__setstate__"),
+    "_abc_impl",
+}
+_PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
+
+
+def digest(measure: type) -> str:
+    """Digest of the class of a measure and of all it draws on; "none" for a class of rsfstudy."""
+    if not _is_own(measure.__module__):
+        return "none"
+    found = hashlib.sha256()
+    for part in _Walk().parts(measure, ()):
+        found.update(part.encode(errors="surrogatepass") + b"\0")
+    return found.hexdigest()[:16]
+
+
+class _Walk:
+    """Texts that tell one state of the code from another; each object is met once."""
+
+    def __init__(self) -> None:
+        self._met: dict[Hashable, Any] = {}
+
+    def parts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        """What tells a value from others, for code that uses these names."""
+        if isinstance(value, _PLAIN):
+            yield repr(value)
+            return
+        if isinstance(value, ModuleType):
+            yield from self._module(value, names)
+            return
+        if isinstance(value, CodeType):
+            yield from self._code(value)
+        elif isinstance(value, tuple):  # may be one object here and two elsewhere
+            yield from self._all(value, names)
+        elif id(value) not in self._met:
+            self._met[id(value)] = value
+            yield from self._met_first(value, names)
+
+    def _met_first(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        if isinstance(value, FunctionType):
+            yield from self._function(value)
+        elif isinstance(value, type):
+            yield from self._class(value)
+        elif isinstance(value, property):
+            yield from self._all((value.fget, value.fset), names)
+        elif isinstance(value, classmethod | staticmethod):
+            yield from self.parts(value.__func__, names)
+        elif isinstance(value, functools.cached_property):
+            yield from self.parts(value.func, names)
+        elif isinstance(value, functools.partial):
+            yield from self._all((value.func, value.args, value.keywords), names)
+        elif hasattr(value, "__wrapped__"):
+            yield from self.parts(value.__wrapped__, names)
+        else:
+            yield from self._data(value, names)
+
+    def _all(self, values: Iterable[Any], names: Iterable[str]) -> Iterator[str]:
+        for value in values:
+            yield from self.parts(value, names)
+
+    def _module(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
+        """A module counts for what is used of it."""
+        if not _is_own(module.__name__):
+            yield module.__name__
+            return
+        asked = (id(module), *names)
+        if asked not in self._met:
+            self._met[asked] = module
+            for name in names:
+                if name in vars(module):
+                    yield from self.parts(vars(module)[name], names)
+
+    def _function(self, function: FunctionType) -> Iterator[str]:
+        yield function.__qualname__
+        if not _is_own(function.__module__):
+            return
+        yield from self._code(function.__code__)
+        cells = [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
+        names = tuple(_names(function.__code__))
+        yield from self._all((function.__defaults__, function.__kwdefaults__, *cells), names)
+        for name in names:
+            if name in function.__globals__:
+                yield name
+                yield from self.parts(function.__globals__[name], names)
+
+    def _code(self, code: CodeType) -> Iterator[str]:
+        yield from (code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
+        yield from self._all(code.co_consts, ())
+
+    def _class(self, kind: type) -> Iterator[str]:
+        yield kind.__qualname__
+        if not _is_own(kind.__module__):
+            return
+        yield from self._all(kind.__bases__, ())
+        for name, value in sorted(vars(kind).items()):
+            if name not in _MADE:
+                yield name
+                yield from self.parts(value, ())
+
+    def _data(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        if isinstance(value, Mapping):
+            for key, item in value.items():
+                yield from self._all((key, item), names)
+        elif isinstance(value, list):
+            yield from self._all(value, names)
+        elif isinstance(value, set | frozenset):
+            yield from sorted(map(repr, value))
+        elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
+            yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
+        else:
+            yield from self._class(type(value))
+            yield from self._state(value, names)
+
+    def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        if _is_own(type(value).__module__):
+            yield from self.parts(getattr(value, "__dict__", None), names)
+            return
+        try:
+            yield pickle.dumps(value, protocol=4).hex()
+        except Exception:  # a lock or a file decides no number
+            yield type(value).__qualname__
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    """Names a function uses, those of the functions within it included."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _is_filled(cell: Any) -> bool:
+    try:
+        cell.cell_contents  # noqa: B018
+    except ValueError:
+        return False
+    return True
+
+
+def _is_own(name: str | None) -> bool:
+    """Whether a module is neither Python's nor installed nor of rsfstudy."""
+    top = (name or "").partition(".")[0]
+    if not top or top == _PACKAGE or (top in sys.stdlib_module_names and top != "__main__"):
+        return False
+    return not _is_installed(getattr(sys.modules.get(top), "__file__", None))
+
+
+@functools.cache
+def _is_installed(file: str | None) -> bool:
+    return file is not None and any(Path(file).resolve().is_relative_to(p) for p in _INSTALLED)

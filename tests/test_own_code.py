@@ -1,0 +1,210 @@
+"""The digest of a user's own measure: the same for the same code wherever it runs, another as soon
+as anything it draws on is another, and its cells are not mixed.
+"""
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+import rsfstudy
+from rsfstudy import catalogue, own_code
+from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.measures.critical_step import CriticalStep
+
+HELPER = """
+import functools
+import numpy as np
+
+FACTOR = 1.0
+TABLE = {"x": [1.0, 2.0], "y": np.ones(2)}
+UNUSED = 3.0
+
+def twice(x):
+    return 2.0 * x * len(TABLE["x"])
+
+@functools.lru_cache
+def kept(x):
+    return x
+
+class Base:
+    offset = 0.0
+
+    @property
+    def more(self):
+        return self.offset + FACTOR
+
+class Tool(Base):
+    @staticmethod
+    def shifted(x):
+        return x + 1.0
+
+def unused():
+    return 1
+"""
+
+MEASURE = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+import helper
+from helper import Tool, kept
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+SCALE = 1.0
+TOOL = Tool()
+
+
+def inner(x):
+    return (lambda y: y * SCALE)(x)
+
+
+@dataclass(frozen=True)
+class Own(Measure):
+    name: ClassVar[str] = "own"
+    headline = "total"
+    variables = {"total": ()}
+    typical_work = 1
+    least: float = 0.0
+
+    def find(self, scene, accuracy, meter):
+        total = inner(helper.twice(scene.b_over_a)) + kept(Tool.shifted(TOOL.more))
+        if total in {4.0, 5.0, 6.0}:
+            total += 1.0
+        return Outcome(Status.OK, {"total": total})
+
+
+study = Study(
+    name="own", title="My own", base=Scene(), axes=[Axis("b_over_a", [2.0, 3.0])], measure=Own()
+)
+"""
+
+
+def study_in(place, *, helper=HELPER, measure=MEASURE):
+    place.mkdir(exist_ok=True)
+    (place / "helper.py").write_text(helper)
+    (place / "mine.py").write_text(measure)
+    return catalogue.load(str(place / "mine.py"))
+
+
+def digest(study):
+    return own_code.digest(type(study.measure))
+
+
+def test_a_measure_of_rsfstudy_has_its_version():
+    assert own_code.digest(CriticalStep) == "none"
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new"),
+    [
+        ("helper", "FACTOR = 1.0", "FACTOR = 100.0"),
+        ("helper", '"x": [1.0, 2.0]', '"x": [1.0, 2.5]'),
+        ("helper", "np.ones(2)", "np.zeros(2)"),
+        ("helper", "return 2.0 * x", "return 3.0 * x"),
+        ("helper", "    return x\n", "    return -x\n"),
+        ("helper", "offset = 0.0", "offset = 1.0"),
+        ("helper", "self.offset + FACTOR", "self.offset - FACTOR"),
+        ("helper", "return x + 1.0", "return x - 1.0"),
+        ("measure", "SCALE = 1.0", "SCALE = 2.0"),
+        ("measure", "y * SCALE", "y / SCALE"),
+        ("measure", "5.0, 6.0}", "5.0, 7.0}"),
+        ("measure", "total += 1.0", "total += 2.0"),
+    ],
+)
+def test_whatever_a_measure_draws_on_changes_its_digest(part, old, new, tmp_path):
+    before = {"helper": HELPER, "measure": MEASURE}
+    assert old in before[part]
+    after = {**before, part: before[part].replace(old, new)}
+    same = study_in(tmp_path / "again")
+    assert digest(study_in(tmp_path / "before", **before)) == digest(same)
+    assert digest(study_in(tmp_path / "after", **after)) != digest(same)
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new"),
+    [
+        ("helper", "UNUSED = 3.0", "UNUSED = 4.0"),
+        ("helper", "    return 1\n", "    return 2\n"),
+        ("measure", "[2.0, 3.0]", "[2.0, 2.5, 3.0]"),
+        ("measure", "SCALE = 1.0", "# a remark\n\nSCALE = 1.0"),
+    ],
+)
+def test_what_it_does_not_draw_on_does_not(part, old, new, tmp_path):
+    before = {"helper": HELPER, "measure": MEASURE}
+    assert old in before[part]
+    after = {**before, part: before[part].replace(old, new)}
+    assert digest(study_in(tmp_path / "a", **after)) == digest(study_in(tmp_path / "b"))
+
+
+def test_it_is_the_same_in_other_processes(tmp_path):
+    """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
+    expected = digest(study_in(tmp_path))
+    script = tmp_path / "script.py"
+    ask = "\nfrom rsfstudy import own_code\nprint(own_code.digest(Own))"
+    script.write_text(MEASURE + ask)
+    for words in ([str(script)], ["-c", MEASURE + ask]):
+        for seed in "12":
+            said = subprocess.run(
+                [sys.executable, *words],
+                capture_output=True,
+                text=True,
+                check=True,
+                cwd=tmp_path,
+                env={"PYTHONHASHSEED": seed, "PYTHONPATH": str(tmp_path)},
+            )
+            assert said.stdout.strip() == expected
+
+
+def test_cells_of_other_code_are_not_mixed(tmp_path):
+    options = {"output": tmp_path / "results", "workers": 0, "progress": False}
+    first = rsfstudy.run(study_in(tmp_path), **options)
+    longer = study_in(tmp_path).with_(b_over_a=[2.0, 3.0, 4.0])
+    assert rsfstudy.run(longer, **options).total.values[:2].tolist() == first.total.values.tolist()
+    edited = HELPER.replace("return 2.0 * x", "return 200.0 * x")
+    with pytest.raises(DataError, match="own_code: .* there, .* now"):
+        rsfstudy.run(study_in(tmp_path, helper=edited), **options)
+
+
+def test_helpers_reach_the_workers_and_those_of_other_files_do_not_mix(tmp_path, cluster):
+    """Two files, each with a helper of the same name, in one process."""
+    plain = HELPER.replace("@functools.lru_cache\n", "")  # which cannot be sent
+    other = plain.replace("return 2.0 * x", "return 3.0 * x")
+    one, two = study_in(tmp_path / "one", helper=plain), study_in(tmp_path / "two", helper=other)
+    assert "helper" not in sys.modules
+    for study in (one, two):
+        here = rsfstudy.run(study, workers=0, output=None, progress=False)
+        there = rsfstudy.run(study, client=cluster, output=None, progress=False)
+        assert here.total.values.tolist() == there.total.values.tolist()
+        factor = 2.0 if study is one else 3.0
+        assert here.total.values.tolist() == [factor * 2 * b + 2.0 for b in (2.0, 3.0)]
+
+
+def test_a_measure_that_cannot_be_sent_is_told_before_any_work(tmp_path):
+    study = study_in(tmp_path)
+    with pytest.raises(
+        InvalidValue, match=r"'own': cannot be sent to a worker.*lru_cache.*--serial"
+    ):
+        rsfstudy.run(study, output=tmp_path / "results", progress=False)
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster):
+    """Here a module that both import, and only one has edited."""
+    text = textwrap.dedent(
+        HELPER + MEASURE.replace("import helper\nfrom helper import Tool, kept", "")
+    )
+    (tmp_path / "shared_by_both.py").write_text(text.replace("helper.twice", "twice"))
+    monkeypatch.syspath_prepend(tmp_path)
+    import shared_by_both
+
+    with pytest.raises(RunError, match="a worker cannot load the measure.*'shared_by_both'"):
+        rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
+    cluster.run(lambda place: sys.path.insert(0, place), str(tmp_path))
+    assert rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
+    monkeypatch.setattr(shared_by_both, "FACTOR", 100.0)
+    with pytest.raises(RunError, match="a worker has another Own, or other code"):
+        rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
