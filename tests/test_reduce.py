@@ -77,6 +77,49 @@ def test_failed_cells_within_the_support_are_refused(status):
     assert "failed or are missing" in result.zeta.attrs["refused"]
 
 
+CHAIN = (
+    Difference(name="gain", of="critical_velocity_ratio", along="case", reference="reference"),
+    RelativeDifference(
+        name="lowering", of="critical_velocity_ratio", along="case", reference="reference"
+    ),
+    LinearFit(name="slope", of="gain", on="a_over_b_minus_a"),
+    Spread(name="apart", of="gain", on="a_over_b_minus_a"),
+    Boundary(name="edge", of="gain", on="a_over_b_minus_a", level=2.5),
+)
+
+
+@pytest.mark.parametrize(
+    "place", [("reference", 1), ("other", 1)], ids=["of the reference", "of the cell"]
+)
+@pytest.mark.parametrize("failure", [Status.UNVERIFIED, Status.INTEGRATION_FAILED])
+def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
+    """Through any number of reductions; what does not draw on them stays."""
+    values = np.array([1.0 + X, 1.0 + 2.0 * X])
+    row = ["reference", "other"].index(place[0])
+    clean = reduced(lattice(values), CHAIN)
+    assert float(clean.slope.sel(case="other")) == pytest.approx(1.0)
+    codes = np.zeros(values.shape)
+    values[row, place[1]], codes[row, place[1]] = 1e6, failure
+    result = reduced(lattice(values, codes), CHAIN)
+    for name in ("gain", "lowering"):
+        assert np.isnan(result[name].sel(case="other")[1])
+        assert "failed" in result[name].attrs["refused"]
+        others = [0, 2, 3, 4]
+        np.testing.assert_array_equal(result[name][:, others], clean[name][:, others])
+    for name in ("slope", "apart", "edge"):
+        assert np.isnan(result[name].sel(case="other"))
+        assert "failed" in result[name].attrs["refused"]
+    left_out = reduced(lattice(values, codes), CHAIN, despite_failures=True)
+    assert float(left_out.slope.sel(case="other")) == pytest.approx(1.0)
+    assert int(left_out.slope_points.sel(case="other")) == 4
+
+
+@pytest.mark.parametrize("name", ["critical_velocity_ratio", "status", "b_over_a"])
+def test_a_reduction_replaces_nothing(name):
+    with pytest.raises(InvalidValue, match=f"would replace '{name}'"):
+        reduced(lattice(1.0 + X), (Spread(name, "critical_velocity_ratio", "b_over_a"),))
+
+
 def test_failed_cells_outside_of_the_support_do_not_matter():
     codes = np.zeros(5)
     codes[4] = Status.INTEGRATION_FAILED

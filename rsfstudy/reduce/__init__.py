@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from rsfstudy.reduce.base import Reduction, failed, without_failures
+from rsfstudy.errors import InvalidValue
+from rsfstudy.reduce.base import Reduction, failed, known, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.fits import LinearFit, ProportionalFit
@@ -48,18 +49,37 @@ def reduced(
     """
     lost = int((failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum())
     despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
+    drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
         support = without_failures(dataset) if despite else dataset
-        for name, values in reduction(support).data_vars.items():
-            about = quantity(str(name))
-            own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
-            scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
-            kind = {"coverage_content_type": coverage(str(name))}
-            named = {"long_name": about.long_name, "units": about.units}
-            values.attrs = {**named, **scale, **kind, **own}
-            dataset = dataset.assign({name: values.assign_attrs(despite)})
+        support = known(support, reduction.of, drawn.get(reduction.of, support["status"]))
+        made = reduction(support)
+        _check_new(reduction, made, dataset)
+        for name, values in made.data_vars.items():
+            drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
+            if bool(failed(drawn[str(name)]).any()):
+                values.attrs.setdefault("refused", "cells it draws on failed or are missing")
+            values.attrs = {**_about(str(name), values), **despite}
+            dataset = dataset.assign({name: values})
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:
                     about = quantity(str(coordinate))
                     dataset[coordinate].attrs = {"long_name": about.long_name, "units": about.units}
     return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})
+
+
+def _about(name: str, values: xr.DataArray) -> dict[str, str]:
+    """Attributes of a result: what the vocabulary says of it, and what its reduction does."""
+    about = quantity(name)
+    own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
+    scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
+    kind = {"coverage_content_type": coverage(name)}
+    return {"long_name": about.long_name, "units": about.units, **scale, **kind, **own}
+
+
+def _check_new(reduction: Reduction, made: xr.Dataset, dataset: xr.Dataset) -> None:
+    """Raise InvalidValue where a reduction would take the place of what is there."""
+    for name in made.data_vars:
+        if name in dataset:
+            rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
+            raise InvalidValue("reduction", reduction.name, rule)

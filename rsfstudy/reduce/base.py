@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Hashable
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
+
+Data = TypeVar("Data", xr.Dataset, xr.DataArray)
 
 #: Values of a coordinate count as within a range they miss by a rounding error.
 ROUNDING = 1e-9
@@ -29,6 +32,12 @@ class Reduction:
         """The new variables."""
         raise TypeError(f"{type(self).__name__} reduces nothing")
 
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """The status of what each result draws on, from that of what is reduced; `worst` leaves the
+        dimensions out that the results have lost.
+        """
+        return status
+
     def describe(self) -> dict[str, Any]:
         """The reduction as plain data."""
         return {"kind": self.kind, **asdict(self)}
@@ -37,6 +46,23 @@ class Reduction:
 def failed(status: xr.DataArray) -> xr.DataArray:
     """Where a cell failed or was not computed."""
     return status >= int(Status.WORK_BUDGET_SPENT)
+
+
+def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
+    """Status without the dimensions that are not among some; failures, which have the largest
+    codes, stay.
+    """
+    return status.max([d for d in status.dims if d not in dims])
+
+
+def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
+    """The dataset as a reduction of `of` may see it: with the status of what that draws on, and
+    without the numbers that failures left behind.
+    """
+    bad = failed(status)
+    if bool(bad.any()) and dataset[of].dtype.kind == "f":
+        dataset = dataset.assign({of: dataset[of].where(~bad)})
+    return dataset.assign(status=status)
 
 
 def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
@@ -57,7 +83,7 @@ def without_failures(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign({**kept, "status": status})
 
 
-def dimension_of(dataset: xr.Dataset, on: str) -> str:
+def dimension_of(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
     """The one dimension a coordinate lies along.
 
     Raises
@@ -77,7 +103,7 @@ def dimension_of(dataset: xr.Dataset, on: str) -> str:
     return str(dataset[on].dims[0])
 
 
-def within(dataset: xr.Dataset, on: str, span: tuple[float, float] | None) -> xr.Dataset:
+def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
     """The part of a dataset in a range of a coordinate, both ends included."""
     if span is None:
         return dataset

@@ -38,6 +38,11 @@ class _Against(Reduction):
         """The comparison."""
         raise TypeError(f"{type(self).__name__} compares nothing")
 
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """The point itself and the reference: where one failed, there is nothing to compare."""
+        reference = status.sel({self.along: self.reference}, drop=True)
+        return status.where(status >= reference, reference)
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare along `along`; nothing if the lattice has no reference point."""
         values = dataset[self.of]
@@ -131,6 +136,10 @@ class Spread(Reduction):
     on: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "spread"
+
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """The points in range."""
+        return within(status, self.on, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Along the dimension of `on`; nothing where fewer than two points are in range."""

@@ -42,6 +42,10 @@ class _Fit(Reduction):
         """Values as they enter a fit through the origin."""
         raise TypeError(f"{type(self).__name__} fits no law")
 
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """The points in range."""
+        return within(status, self.on, self.within)
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Fit along the dimension of `on`, for each point of the others; nothing where no point is
         in range.
