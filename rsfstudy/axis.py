@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import is_name
 from rsfstudy.scene import FIELDS, unknown_field
 
 Row = Mapping[str, Any]
@@ -42,8 +43,9 @@ class Axis:
     def __init__(
         self, dimension: str, values: Sequence[Any] | np.ndarray | Mapping[str, Row]
     ) -> None:
-        if not isinstance(dimension, str) or not dimension.isidentifier():
-            raise InvalidValue("axis", dimension, "must be named by a Python identifier")
+        if not is_name(dimension):
+            rule = "must be named by a Python identifier, its accents composed (NFC)"
+            raise InvalidValue("axis", dimension, rule)
         labels: tuple[str, ...] | None = None
         if isinstance(values, Mapping):
             labels, rows = tuple(values), _rows(dimension, values)
@@ -137,7 +139,7 @@ def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             new = f"{name} = {value}"
             if changed == row:
                 new = label
-            elif new in spread:
+            elif new in spread or new in axis.labels:
                 new = f"{label}, {new}"
             spread[new] = changed
     return Axis(axis.dimension, spread)

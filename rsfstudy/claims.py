@@ -16,6 +16,7 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
 
 REPRODUCED = "reproduced"
 DIFFERS = "differs"
@@ -81,11 +82,20 @@ class Claim:
                 "expected", self.expected, "is no verdict", choices=(REPRODUCED, DIFFERS)
             )
 
+        for name in ("published", "tolerance"):
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise InvalidValue(name, value, f"must be a number, in claim {self.id}")
+        for name in ("where", "minus"):
+            if not isinstance(getattr(self, name), Mapping):
+                rule = f"must map coordinates to values, in claim {self.id}"
+                raise InvalidValue(name, getattr(self, name), rule)
+
     def describe(self) -> dict[str, Any]:
         """The claim as plain data."""
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
 
-    def check_names(self, dataset: xr.Dataset) -> None:
+    def check_place(self, dataset: xr.Dataset) -> None:
         """Raise InvalidValue where the claim speaks of what a dataset does not have: its verdict
         would always be that it is not applicable.
         """
@@ -98,6 +108,9 @@ class Claim:
             if name not in coordinates:
                 rule = f"is no coordinate of the results, in claim {self.id}"
                 raise InvalidValue("where", name, rule, choices=sorted(coordinates))
+        if self.verdict(dataset)[1] == NOT_APPLICABLE:
+            rule = f"is no place of the lattice, in claim {self.id}"
+            raise InvalidValue("where", {**self.where, **self.minus}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
         """Our value, and whether it reproduces the published one.
@@ -185,4 +198,6 @@ def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float
         values = values.isel({dimension: int(matches[0])})
     if values.ndim:
         raise KeyError(variable)  # the lattice has more dimensions than the claim speaks of
+    if variable == "status" and int(values) == int(Status.PENDING):
+        return math.nan
     return float(values)

@@ -95,9 +95,9 @@ def coordinates(study: Study) -> dict[Any, Any]:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
         for name in axis.fields:
-            # a plain axis bears its own values, even where a first cell has no use for them
-            own = [row[name] for row in axis.rows] if axis.labels is None else None
-            varied = _array(own or [getattr(scene, name) for scene in along])
+            # an axis bears its own values, even where a first cell has no use for them
+            pairs = zip(axis.rows, along, strict=True)
+            varied = _array([row.get(name, getattr(scene, name)) for row, scene in pairs])
             coords[name] = (axis.dimension, varied, _about(name))
     for name in FIELDS:
         present = {getattr(scene, name) for scene in sample} - {None}

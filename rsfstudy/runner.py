@@ -110,7 +110,7 @@ class Run:
                 rule = f"does not fit this lattice: {type(error).__name__}: {error}"
                 raise InvalidValue("reduction", reduction.name, rule) from error
         for claim in () if self.study.overrides else self.study.claims:
-            claim.check_names(lattice)
+            claim.check_place(lattice)
 
     def path(self, ending: str) -> Path:
         """A file of this run."""

@@ -17,10 +17,9 @@ from rsfstudy.axis import Axis, Row, check_text, is_list, plain, select, spread
 from rsfstudy.claims import Claim
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure
+from rsfstudy.measures import TAKEN, Measure, is_name
 from rsfstudy.reduce import Reduction
 from rsfstudy.scene import FIELDS, Scene
-from rsfstudy.vocabulary import DERIVED
 
 #: Fields that only scenes with variable normal stress have.
 _OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
@@ -118,13 +117,15 @@ class Study:
                     raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
         if not self.axes:
             raise InvalidValue("axes", self.axes, "must hold at least one axis")
+        self.measure.check()
         known = list(self.measure.variables)
         for reduction in self.reductions:
+            if not is_name(reduction.name) or reduction.name in TAKEN:
+                raise InvalidValue("reduction", reduction.name, "names something else, or nothing")
             if reduction.of not in known:
                 raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
             known.append(reduction.name)
-        kept = ("status", "message", "rhs_evaluations", "wall_time")
-        taken = {*known, *kept, *self.measure.inner_coordinates, *DERIVED}
+        taken = {*known, *self.measure.inner_coordinates, *(TAKEN - set(FIELDS))}
         for axis in self.axes:
             self._check_sought(axis.fields)
             if axis.dimension in taken:

@@ -228,6 +228,12 @@ def test_claims_on_places_that_are_not_there_do_not_apply():
     assert (table.verdict[0], table.moved[0]) == ("not applicable", False)
 
 
+def test_a_claim_on_a_status_that_is_not_known_yet_is_undecided():
+    pending = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
+    on_status = claim(variable="status", where={"b_over_a": 2.0}, published=0.0)
+    assert verdicts(pending, [on_status], {}).verdict[0] == "undecided"
+
+
 def test_claims_do_not_apply_to_another_scene():
     table = verdicts(lattice(np.full(5, 9.0)), [claim()], {"stiffness_ratio": 1.1})
     assert table.verdict[0] == "not applicable"
@@ -235,7 +241,16 @@ def test_claims_do_not_apply_to_another_scene():
     assert other_axis.verdict[0] == "differs"
 
 
-@pytest.mark.parametrize("fields", [{"relation": "near"}, {"expected": "maybe"}])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"relation": "near"},
+        {"expected": "maybe"},
+        {"published": "5"},
+        {"tolerance": np.nan},
+        {"where": ["case"]},
+    ],
+)
 def test_claims_are_checked(fields):
     with pytest.raises(InvalidValue):
         claim(**fields)

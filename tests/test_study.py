@@ -4,6 +4,9 @@ starts.
 
 import json
 import math
+import re
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,8 +15,10 @@ from hypothesis import strategies as st
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
+from rsfstudy.lattice import coordinates
+from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import ProportionalFit
+from rsfstudy.reduce import ProportionalFit, Spread
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -180,3 +185,75 @@ def test_names_that_are_no_file_names_are_refused(name):
             axes=[Axis("b_over_a", [2.0])],
             measure=CriticalStep(),
         )
+
+
+# ---- what a measure of one's own may declare ------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Own(Measure):
+    phases: object = 2
+    name: ClassVar[str] = "own"
+    headline: ClassVar[str] = "total"
+    variables: ClassVar = {"total": ()}
+    typical_work: ClassVar[object] = 1
+
+
+def declared(**fields) -> Study:
+    common = {"axes": [Axis("b_over_a", [2.0])], "measure": CriticalStep()}
+    return Study(**{"name": "trial", "title": "Trial", "base": Scene(), **common, **fields})
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"typical_work": 0}, "typical_work = 0: must be a number greater than 0"),
+        ({"typical_work": float("nan")}, "typical_work = nan"),
+        ({"variables": {}}, "must name a number, in measure own"),
+        ({"variables": {"other": ()}}, "headline = 'total': is not measured"),
+        ({"variables": {"total": ("phase",)}}, "'phase': of 'total' has no coordinate values"),
+        ({"variables": {"total": (), "a/b": ()}}, "'a/b': names something else, or nothing"),
+        ({"variables": {"total": (), "phi": ()}}, "'phi': names something else"),
+        ({"variables": {"total": (), "status": ()}}, "'status': names something else"),
+        ({"variables": {"total": (), "e\u0301tude": ()}}, "names something else, or nothing"),
+        ({"inner_coordinates": {"total": np.arange(2.0)}}, "'total': names something else"),
+    ],
+)
+def test_a_measure_declares_what_a_lattice_can_hold(fields, complaint):
+    kind = type("Odd", (Own,), fields)
+    with pytest.raises(InvalidValue, match=re.escape(complaint)):
+        declared(measure=kind())
+
+
+@pytest.mark.parametrize("value", [np.int64(2), np.ones(2), print])
+def test_a_measure_is_plain_data(value):
+    with pytest.raises(InvalidValue, match="'own': is no plain data .*Python's own numbers"):
+        declared(measure=Own(value))
+
+
+@pytest.mark.parametrize("name", ["a/b", "status", "phi", "", 3])
+def test_a_reduction_names_something_new(name):
+    with pytest.raises(InvalidValue, match="names something else, or nothing"):
+        declared(reductions=[Spread(name, "critical_velocity_ratio", "b_over_a")])
+
+
+def test_an_axis_is_named_as_a_file_gives_it_back():
+    with pytest.raises(InvalidValue, match=re.escape("composed (NFC)")):
+        Axis("e\u0301tude", {"one": {"phi": 55.0}})
+
+
+@pytest.mark.parametrize("order", [["constant", "variable"], ["variable", "constant"]])
+def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order):
+    case = Axis("case", {"weak": {"alpha": 0.25}, "strong": {"alpha": 0.5}})
+    study = declared(axes=[Axis("normal_stress", order), case])
+    assert coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
+
+
+def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
+    points = {
+        "first": {"alpha": 0.56, "stiffness_ratio": 2.0},
+        "alpha = 0.25": {"alpha": 0.25, "stiffness_ratio": 1.0},
+    }
+    (axis,) = declared(axes=[Axis("case", points)]).with_(alpha=[0.25]).axes
+    assert [row["stiffness_ratio"] for row in axis.rows] == [2.0, 1.0]
+    assert axis.labels == ("first, alpha = 0.25", "alpha = 0.25")

@@ -97,6 +97,7 @@ study = dataclasses.replace(study, claims=[Claim(
             'variable="critical_displacement", where={"phi": 55.0}, minus={"b": 1.0}',
             "'b': is no coordinate.*M1",
         ),
+        ('variable="critical_displacement", where={"phi": 50.0}', "'phi': 50.0.*no place.*M1"),
     ],
 )
 def test_a_claim_on_what_is_not_there_is_told_before_anything_is_computed(

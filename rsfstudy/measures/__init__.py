@@ -7,6 +7,8 @@ so Dask can send it, and describes itself as plain data, so a NetCDF file can ho
 
 from __future__ import annotations
 
+import json
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
@@ -16,8 +18,9 @@ import numpy as np
 from rsfstudy.core.accuracy import Accuracy, relative_work
 from rsfstudy.core.stepping import Halt, Meter
 from rsfstudy.errors import InvalidValue
-from rsfstudy.scene import Scene
+from rsfstudy.scene import FIELDS, Scene
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import DERIVED
 
 Value = float | np.ndarray
 
@@ -41,6 +44,15 @@ class Outcome:
     values: Mapping[str, Value] = field(default_factory=dict)
     message: str = ""
     rhs_evaluations: int = 0
+
+
+#: Names that are there whatever is measured.
+TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
+
+
+def is_name(name: object) -> bool:
+    """Whether a text can name a variable: an identifier, as a file gives it back."""
+    return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
 
 @dataclass(frozen=True)
@@ -91,6 +103,31 @@ class Measure:
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The physics: measure one scene, charging `meter`."""
         raise TypeError(f"{type(self).__name__} measures nothing")
+
+    def check(self) -> None:
+        """Raise InvalidValue where the measure declares what no lattice can hold."""
+        names = [*self.variables, *self.inner_coordinates]
+        if not self.variables:
+            raise InvalidValue("variables", {}, f"must name a number, in measure {self.name}")
+        if self.headline not in self.variables:
+            raise InvalidValue("headline", self.headline, "is not measured", choices=self.variables)
+        for name in names:
+            if not is_name(name) or name in TAKEN or names.count(name) > 1:
+                rule = f"names something else, or nothing, in measure {self.name}"
+                raise InvalidValue("variable", name, rule)
+        for name, dims in self.variables.items():
+            for dim in dims:
+                if dim not in self.inner_coordinates:
+                    raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+        work = self.typical_work
+        if not isinstance(work, int | float) or not 0 < work < np.inf:
+            raise InvalidValue("typical_work", work, "must be a number greater than 0")
+        try:
+            json.dumps(self.describe())
+        except (TypeError, ValueError) as error:
+            remedy = "Use Python's own numbers and texts, and tuples of them."
+            rule = f"is no plain data ({error})"
+            raise InvalidValue("measure", self.name, rule, remedy=remedy) from error
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""

@@ -52,7 +52,8 @@ def reduced(
     drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
         support = without_failures(dataset) if despite else dataset
-        support = known(support, reduction.of, drawn.get(reduction.of, support["status"]))
+        own = worst(support["status"], support[reduction.of].dims)
+        support = known(support, reduction.of, drawn.get(reduction.of, own))
         made = reduction(support)
         _check_new(reduction, made, dataset)
         for name, values in made.data_vars.items():

@@ -104,8 +104,10 @@ def dimension_of(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
 
 
 def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
-    """The part of a dataset in a range of a coordinate, both ends included."""
-    if span is None:
+    """The part of a dataset in a range of a coordinate, both ends included; all of what does not
+    lie along that coordinate.
+    """
+    if span is None or on not in dataset.coords:
         return dataset
     values, (lowest, highest) = dataset[on].values, span
     inside = (values >= lowest - ROUNDING * abs(lowest)) & (
