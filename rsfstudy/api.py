@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,10 @@ import pandas as pd
 import xarray as xr
 from rich import progress as bars
 
-from rsfstudy import catalogue, own_code, restore, runner, store
+from rsfstudy import catalogue, own_code, provenance, restore, runner, store
 from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
 from rsfstudy.claims import Claim, verdicts
-from rsfstudy.comparison import cell_number, compared
+from rsfstudy.comparison import cell_number, compared, differences, fingerprint_of
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.runner import Keeping, Progress
@@ -204,7 +205,29 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     path = Path(name)
     if path.suffix == ".py":
         name = catalogue.load(str(path)).name
-    return store.read(path if path.suffix in (".nc", ".zarr") else Path(output) / f"{name}.nc")
+    if path.suffix not in (".nc", ".zarr"):
+        try:
+            path = _results(str(name), Path(output))
+        except OSError as error:
+            raise DataError(f"{name} cannot be looked for: {error}") from error
+    return store.read(path)
+
+
+def _results(name: str, output: Path) -> Path:
+    """The results of a study, by its name."""
+    file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
+    if file.exists() and in_pieces.exists():
+        raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
+    if file.exists() or in_pieces.exists():
+        return file if file.exists() else in_pieces
+    partial = output / f"{name}.partial.nc"
+    if partial.exists():
+        raise DataError(
+            f"{file} does not exist, but {partial} does: run the study again, or name it."
+        )
+    if not any(output.glob(f"{name}.*")) and name not in catalogue.names():
+        raise InvalidValue("study", name, f"has no results in {output}", choices=catalogue.names())
+    return file
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
@@ -264,9 +287,10 @@ def rerun(
     theirs = open(file)
     declared = study_of(theirs, study)
     directory = _directory(output)
-    if directory is not None and directory.resolve() == Path(file).resolve().parent:
-        rule = "would take the place of what it is held against"
-        raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
+    if directory is not None:
+        for taken in directory.glob(f"{declared.name}.*"):
+            rule = f"holds {taken.name}, which this would take the place of"
+            raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
     keeping = Keeping(
         output=directory,
         fresh=True,
@@ -284,6 +308,10 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """
     declared = store.declaration(results)
     if file is None:
+        if fingerprint_of(results)["own_code"] != "none":
+            rule = "is a user's own, and code is never taken from a results file"
+            remedy = "Name the file that declares it: --study FILE (study=)."
+            raise InvalidValue("measure", declared["measure"]["name"], rule, remedy=remedy)
         return restore.study(declared)
     named = catalogue.load(str(file))
     if named.name != declared["name"]:
@@ -314,9 +342,17 @@ def cell(
     ------
     InvalidValue
         Where there is no such cell.
+
+    Warns
+    -----
+    UserWarning
+        Where what decides its numbers is not what it was for the file.
     """
     results = open(file)
     number = cell_number(results, place)
     declared = study_of(results, study)
+    now = provenance.fingerprint(declared)
+    for name, (then, ours) in differences(fingerprint_of(results), now).items():
+        warnings.warn(f"{name}: {then} then, {ours} now", stacklevel=2)
     scene = declared.scene(number)
     return scene, declared.measure(scene, declared.accuracy)

@@ -6,6 +6,7 @@ import contextlib
 import math
 import shlex
 import sys
+import warnings
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,6 @@ from typing import Any
 import click
 import numpy as np
 import xarray as xr
-from rich.console import Console
 from rich.table import Table
 
 from rsfstudy import api, catalogue, terminal
@@ -30,7 +30,7 @@ _MOST_POINTS = 1_000_000
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 RESULTS = (".nc", ".zarr")
 
-_stderr = Console(stderr=True, markup=False, emoji=False, highlight=False)
+_stderr = terminal.Plain(stderr=True, markup=False, emoji=False, highlight=False)
 
 _all = click.option("--all", "every", is_flag=True, help="Every named study.")
 _output = click.option(
@@ -168,8 +168,9 @@ def run(
                 **choices,
             )
             files = [output / f"{study.name}.{_ENDINGS[choices['format']]}"]
-            files += _drawn(dataset, output / f"{study.name}.png")
-            status = max(status, terminal.report(dataset, study.name, files))
+            drawn = _drawn(dataset, output / f"{study.name}.png")
+            status = max(status, terminal.report(dataset, study.name, files + drawn))
+            status = status if drawn else FAILED
     return status
 
 
@@ -210,7 +211,9 @@ def rerun(
 ) -> int:
     """Compute a results file anew from what it says of itself, and compare every number."""
     if place:
-        return terminal.outcome(*api.cell(file, dict(map(_place, place)), study=study))
+        with warnings.catch_warnings(record=True) as told:
+            scene, found = api.cell(file, dict(map(_place, place)), study=study)
+        return terminal.outcome(scene, found, [str(warning.message) for warning in told])
     with _client(scheduler, serial) as client:
         table = api.rerun(
             file,
@@ -246,15 +249,19 @@ def check(name: str | None, every: bool, output: Path) -> int:
 @click.argument("name", required=False)
 @_all
 @_output
-def plot(name: str | None, every: bool, output: Path) -> None:
+def plot(name: str | None, every: bool, output: Path) -> int:
     """Draw the figure of a named study's results, or of a file, beside it."""
+    status = OK
     for what in _results(name, every):
         dataset = api.open(what, output)
         named = Path(what)
         beside = named if named.suffix in RESULTS else output / f"{dataset.attrs['id']}.png"
         path = beside.with_suffix(".png")
-        for file in _drawn(dataset, path):
+        drawn = _drawn(dataset, path)
+        status = status if drawn else FAILED
+        for file in drawn:
             terminal.console.print(f"{file}", highlight=False)
+    return status
 
 
 # ---- what was asked for ---------------------------------------------------------------------

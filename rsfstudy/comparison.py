@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,7 +44,7 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
             continue  # a reduction over cells that one of them has not
         rows.append({"variable": name, **_agreement(a.values[known], b.values[known])})
     frame = pd.DataFrame(rows)
-    frame.attrs["differs"] = _differences(*(_fingerprint(d) for d in (theirs, ours)))
+    frame.attrs["differs"] = differences(fingerprint_of(theirs), fingerprint_of(ours))
     return frame
 
 
@@ -57,11 +58,16 @@ def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
     return {"values": same.size, "identical": int(same.sum()), "largest_difference": largest}
 
 
-def _fingerprint(dataset: xr.Dataset) -> dict[str, Any]:
+def fingerprint_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """What decided the numbers of a results dataset, as it says."""
     return dict(json.loads(dataset.attrs["provenance"])["fingerprint"])
 
 
-def _differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """What decides numbers and is not the same in two fingerprints, be they read from a file or
+    not: theirs and ours.
+    """
+    theirs, ours = (json.loads(json.dumps(fingerprint)) for fingerprint in (theirs, ours))
     return {
         name: (theirs.get(name), ours.get(name))
         for name in sorted({*theirs, *ours})
@@ -103,6 +109,8 @@ def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
         try:
             number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
         except (TypeError, ValueError):
+            return None
+        if not math.isfinite(number):
             return None
         gaps = np.abs(values - number)
         nearest = int(np.argmin(gaps))

@@ -21,12 +21,11 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.journal import Columns
 from rsfstudy.lattice import attributes, coordinates, variables
 from rsfstudy.status import Status
-from rsfstudy.store import Digests
+from rsfstudy.store import ZARR, Digests
 from rsfstudy.study import Study
 
 #: Numbers in one piece: 32 MB of float64.
 _NUMBERS = 4_000_000
-_OPEN: Mapping[str, Any] = {"engine": "zarr", "chunks": None, "consolidated": False, "cache": False}
 
 #: What is known of the cells from one number to another, in row-major order.
 Read = Callable[[int, int], Columns]
@@ -68,24 +67,24 @@ def write(
         digests = Digests()
         for name in coords.variables:
             digests.add(str(name), coords[name].values)
-            digests.describe(str(name), coords[name].attrs)
+            digests.describe(str(name), coords[name].sizes, coords[name].attrs)
         known = _lattice(study, read, beside, digests)
-        lattice = xr.open_dataset(beside, **_OPEN)
+        lattice = xr.open_dataset(beside, **ZARR)
         made = reduce(lattice)
         new = made.drop_vars([name for name in made.variables if name in lattice.variables])
         for name in new.variables:
             digests.add(str(name), new[name].values)
-            digests.describe(str(name), new[name].attrs)
+            digests.describe(str(name), new[name].sizes, new[name].attrs)
         about = {**attributes(study, known, provenance), **made.attrs, **_named(lattice)}
         sealed = digests.sealing(_as_objects(new).assign_attrs(about))
         sealed.to_zarr(beside, mode="a", consolidated=False)
-        digests.check(xr.open_dataset(beside, **_OPEN), str(path))
+        digests.check(xr.open_dataset(beside, **ZARR), str(path))
         beside.rename(path)
     except OSError as error:
         raise DataError(f"cannot write {path}: {error}.") from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-    return xr.open_dataset(path, **_OPEN)
+    return xr.open_dataset(path, **ZARR)
 
 
 def _named(lattice: xr.Dataset) -> dict[str, str]:
@@ -127,7 +126,8 @@ def _lattice(study: Study, read: Read, path: Path, digests: Digests) -> int:
                 )
             arrays[name][region] = values
             digests.add(name, values)
-            digests.describe(name, about)
+            sizes = dict(zip(dims, arrays[name].shape, strict=True))
+            digests.describe(name, sizes, about)
     return known
 
 

@@ -23,7 +23,19 @@ from rsfstudy.errors import DataError
 
 #: Root attributes that a verdict or a rerun turns on.
 _SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
+#: What no results are without; a user may add variables, which have no digests.
+_OF_EVERY_LATTICE = ("status", "message", "rhs_evaluations", "wall_time")
 _DIGESTS = "digests"
+#: How Zarr stores are opened: lazily, and none of an older format.
+ZARR: Mapping[str, Any] = {
+    "engine": "zarr",
+    "chunks": None,
+    "consolidated": False,
+    "cache": False,
+    "zarr_format": 3,
+}
+#: Codecs of our Zarr stores. Others may run code of the store's own.
+_CODECS = {"bytes", "vlen-utf8", "zstd"}
 _MARK = b"\nrsfstudy sha256 "
 _TRAILER = len(_MARK) + 64
 
@@ -44,9 +56,10 @@ class Digests:
             little = values.dtype.newbyteorder("<")
             digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
 
-    def describe(self, name: str, attrs: Mapping[Any, Any]) -> None:
-        """The attributes of a variable, as they are written."""
+    def describe(self, name: str, sizes: Mapping[Any, int], attrs: Mapping[Any, Any]) -> None:
+        """The dimensions of a variable and its attributes, as they are written."""
         plain = {str(key): np.asarray(value).tolist() for key, value in attrs.items()}
+        self._about[f"{name}()"] = json.dumps([[str(d), int(n)] for d, n in sizes.items()])
         self._about[f"{name}:"] = json.dumps(plain, sort_keys=True)
 
     def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -73,6 +86,8 @@ class Digests:
                 f"{where} carries no digests: it was not written by rsfstudy, or damaged."
             ) from error
         ours = _digests_of(dataset)._all(dataset.attrs)
+        for name in [n for n in ours if n.startswith(":") or n in _OF_EVERY_LATTICE]:
+            carried.setdefault(name, "")
         for name, digest in carried.items():
             if ours.get(name) != digest:
                 what = "missing" if name not in ours else "not what was written"
@@ -84,6 +99,8 @@ class Digests:
 
 def _named(name: str) -> str:
     """A variable, an attribute of one, or a root attribute, as their digests are named."""
+    if name.endswith("()"):
+        return f"the shape of {name[:-2]!r}"
     if name.endswith(":"):
         return f"an attribute of {name[:-1]!r}"
     return f"the attribute {name[1:]!r}" if name.startswith(":") else repr(name)
@@ -93,7 +110,7 @@ def _digests_of(dataset: xr.Dataset) -> Digests:
     digests = Digests()
     for name in dataset.variables:
         digests.add(str(name), dataset[name].values)
-        digests.describe(str(name), dataset[name].attrs)
+        digests.describe(str(name), dataset[name].sizes, dataset[name].attrs)
     return digests
 
 
@@ -186,19 +203,30 @@ def read(path: Path) -> xr.Dataset:
         if not path.exists():
             raise DataError(f"{path} does not exist. Run the study first, or name another file.")
         if path.is_dir():
-            dataset = xr.open_dataset(
-                path, engine="zarr", chunks=None, consolidated=False, cache=False
-            )
+            _check_codecs(path)
+            dataset = xr.open_dataset(path, **ZARR)
         else:
             _check_bytes(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
+        declaration(dataset, str(path))
+        Digests().check(dataset, str(path))
     except DataError:
         raise
-    except Exception as error:  # damage makes HDF5, netCDF4 and xarray raise almost anything
+    except Exception as error:  # damage makes HDF5, Zarr, netCDF4 and xarray raise almost anything
         raise DataError(f"{path} cannot be read: {error}") from error
-    declaration(dataset, str(path))
-    Digests().check(dataset, str(path))
     return dataset
+
+
+def _check_codecs(path: Path) -> None:
+    """Refuse a Zarr store that is to be decoded by anything but what ours are."""
+    for file in path.rglob("zarr.json"):
+        about = json.loads(file.read_text())
+        for codec in about.get("codecs", []):
+            if codec["name"] not in _CODECS:
+                raise DataError(
+                    f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
+                    f"{codec['name']!r}, which may run code."
+                )
 
 
 def declaration(dataset: xr.Dataset, where: str = "the dataset") -> dict[str, Any]:
@@ -215,7 +243,10 @@ def declaration(dataset: xr.Dataset, where: str = "the dataset") -> dict[str, An
         raise DataError(
             f"{where} carries no study declaration: it was not written by rsfstudy, or damaged."
         ) from error
-    if not isinstance(found, dict) or not {"name", "claims", "plot"} <= set(found):
+    parts = {"name": str, "claims": list, "plot": str, "overrides": dict}
+    if not isinstance(found, dict) or any(
+        not isinstance(found.get(name), kind) for name, kind in parts.items()
+    ):
         raise DataError(f"{where} carries a study declaration that is damaged.")
     return found
 

@@ -23,6 +23,8 @@ from rsfstudy.scene import FIELDS, Scene
 
 #: Fields that only scenes with variable normal stress have.
 _OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
+#: Most values of a list that are shown.
+_MOST_SHOWN = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,3 +259,21 @@ def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:
         name: [plain(v) for v in value] if is_list(value) else plain(value)
         for name, value in overrides.items()
     }
+
+
+def settings(overrides: Mapping[str, Any]) -> str:
+    """Overrides as one types them, long lists cut short."""
+    texts = {
+        name: value if isinstance(value, list) else [value] for name, value in overrides.items()
+    }
+    return ", ".join(f"{name}={_listed(values)}" for name, values in texts.items())
+
+
+def _listed(values: Sequence[Any]) -> str:
+    shown = [short(value) for value in values]
+    return ",".join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
+
+
+def short(value: Any) -> str:
+    """A value with the digits a reader wants."""
+    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)

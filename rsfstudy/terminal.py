@@ -22,13 +22,25 @@ from rsfstudy.measures import Outcome
 from rsfstudy.plan import Plan
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Study
+from rsfstudy.study import Study, settings, short
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
 
-#: What a user or a cell wrote is printed as it is, brackets and all.
-console = Console(markup=False, emoji=False)
+
+class Plain(Console):
+    """A console that prints what a user, a cell or a file wrote as it is, brackets and all, but
+    for what would steer the terminal.
+    """
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Text with control characters spelt out."""
+        spelt = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+        shown = "".join(c if isinstance(c, str) else c.decode() for c in spelt)
+        return super().render_str(shown, **options)
+
+
+console = Plain(markup=False, emoji=False)
 
 
 def declaration(study: Study) -> None:
@@ -105,8 +117,10 @@ def results(dataset: xr.Dataset, file: str) -> int:
     return failures(dataset, file)
 
 
-def outcome(scene: Scene, found: Outcome) -> int:
-    """One cell: its scene, its numbers and how it ended."""
+def outcome(scene: Scene, found: Outcome, warned: Sequence[str] = ()) -> int:
+    """One cell: what there was to warn of, its scene, its numbers and how it ended."""
+    for text in warned:
+        console.print(text, style="yellow")
     fields = {name: value for name, value in scene.as_dict().items() if value is not None}
     console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()))
     for name, value in found.values.items():
@@ -188,7 +202,7 @@ def claims(dataset: xr.Dataset) -> int:
     overrides = store.declaration(dataset)["overrides"]
     console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
     if overrides:
-        console.print(f"not as declared: {_settings(overrides)}")
+        console.print(f"not as declared: {settings(overrides)}")
     if (table_of.empty or table_of["verdict"].eq(NOT_APPLICABLE).all()) and not _undone(dataset):
         console.print("no claim applies")
         return OK
@@ -228,14 +242,6 @@ def _table(claims: pd.DataFrame) -> int:
     for row in moved.itertuples(index=False):
         console.print(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
     return FAILED if len(moved) else OK
-
-
-def _settings(overrides: Mapping[str, Any]) -> str:
-    texts = {
-        name: ",".join(map(short, value)) if isinstance(value, list) else short(value)
-        for name, value in overrides.items()
-    }
-    return ", ".join(f"{name}={text}" for name, text in texts.items())
 
 
 def _undone(dataset: xr.Dataset) -> int:
@@ -299,8 +305,3 @@ def _reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> st
     for name, value in place.items():
         words += ["--cell", f"{name}={value}"]
     return shlex.join(words)
-
-
-def short(value: Any) -> str:
-    """A value with the digits a reader wants."""
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)

@@ -7,17 +7,20 @@ import os
 import string
 import sys
 import threading
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from faulty import declared
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from running import FAULTY, SMALL, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, catalogue, cli, plots, restore, store
+from rsfstudy import Axis, Scene, Study, catalogue, cli, plots, restore, store, terminal
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.scene import FIELDS
@@ -363,10 +366,53 @@ def test_an_error_on_the_command_line_is_one_message(tmp_path):
 def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
     (tmp_path / "faulty.png").mkdir()
     code, out, said = ended(command("run", FAULTY, "--serial", "--output", tmp_path))
-    assert code == 0
+    assert code == 1
     assert "no figure:" in said
     assert "faulty.png" not in out
     assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"
+
+
+def test_a_figure_that_does_not_fit_is_told(tmp_path):
+    study = replace(declared(), plot="rate_step_boundary")
+    results = run(study)
+    with pytest.raises(InvalidValue, match="plot = 'rate_step_boundary': does not fit these"):
+        plots.save(results, tmp_path / "faulty.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    results = run(declared())
+    plots.save(results, tmp_path / "faulty.png")
+    old = (tmp_path / "faulty.png").read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", lambda *_args: os.truncate(tmp_path, 0))
+        with pytest.raises(OSError, match="Is a directory"):
+            plots.save(results, tmp_path / "faulty.png")
+    assert (tmp_path / "faulty.png").read_bytes() == old
+    assert os.listdir(tmp_path) == ["faulty.png"]
+
+
+def test_what_would_steer_the_terminal_is_spelt_out(capsys):
+    """A title from a file could rewrite what stands above it."""
+    terminal.console.print("a\x1b[2J\x07b\n[red]")
+    assert capsys.readouterr().out == "a\\x1b[2J\\x07b\n[red]\n"
+
+
+def test_a_time_limit_beyond_all_clocks():
+    for limit in (1e10, float("inf")):
+        with pytest.raises(InvalidValue, match="must be a number greater than 0, up to 1e"):
+            run(time_limit=limit)
+
+
+@pytest.mark.parametrize("command_", ["check", "plot"])
+def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(command_, tmp_path):
+    code, _out, said = ended(command(command_, "stress_drp", "--output", tmp_path))
+    assert (code, "Did you mean 'stress_drop'" in said) == (2, True)
+    code, _out, said = ended(command(command_, "stress_drop", "--output", tmp_path))
+    assert (code, "Run the study first" in said) == (1, True)
+    (tmp_path / "stress_drop.partial.nc").touch()
+    code, _out, said = ended(command(command_, "stress_drop", "--output", tmp_path))
+    assert (code, "stress_drop.partial.nc does" in said) == (1, True)
 
 
 @pytest.mark.parametrize("workers", [-1, 1.5, "two", None, True])

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, command, ended, run
+from running import FAULTY, SMALL, command, ended, run
 
 import rsfstudy
 from rsfstudy import Scene, catalogue, plots, restore, store
@@ -237,6 +237,25 @@ def test_what_a_notebook_adds_is_left_alone(small, tmp_path):
     assert "log" in rsfstudy.open(tmp_path / "mine.nc")
 
 
+def test_numbers_that_lie_otherwise_are_noticed(small, tmp_path):
+    """The same bytes under other dimensions are other numbers."""
+    dataset = xr.load_dataset(small)
+    values = dataset.critical_velocity_ratio
+    other = dataset.assign(critical_velocity_ratio=(values.dims[::-1], values.data.reshape(3, 2)))
+    other.critical_velocity_ratio.attrs = values.attrs
+    other.to_netcdf(tmp_path / "turned.nc")
+    with pytest.raises(DataError, match="the shape of 'critical_velocity_ratio' is not what"):
+        rsfstudy.open(tmp_path / "turned.nc")
+
+
+def test_a_file_that_carries_no_digest_of_its_cells_is_refused(small, tmp_path):
+    dataset = xr.load_dataset(small)
+    dataset["critical_velocity_ratio"][:] = 99.0
+    dataset.assign_attrs(digests="{}").to_netcdf(tmp_path / "x.nc")
+    with pytest.raises(DataError, match="is not what was written"):
+        rsfstudy.open(tmp_path / "x.nc")
+
+
 def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
     """Not even where its declaration names a measure or a plot that could be imported."""
     (tmp_path / "evil.py").write_text("raise SystemExit('the code of a results file ran')")
@@ -319,6 +338,52 @@ def test_a_rerun_does_not_take_the_place_of_what_it_is_held_against(small):
         rsfstudy.rerun(small, workers=0, output=small.parent, progress=False)
 
 
+def test_a_rerun_takes_no_place_of_other_results(small, tmp_path):
+    run(SMALL, output=tmp_path)
+    with pytest.raises(InvalidValue, match=r"holds small\.(nc|cells\.sqlite), which this would"):
+        rsfstudy.rerun(small, workers=0, output=tmp_path, progress=False)
+
+
+def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
+    other = xr.load_dataset(small)
+    about = json.loads(other.attrs["provenance"])
+    about["fingerprint"]["physics"] = "older"
+    store.write(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    place = {"case": "constant", "b_over_a": "2.5"}
+    with pytest.warns(UserWarning, match="physics: older then, .* now"):
+        rsfstudy.cell(tmp_path / "other.nc", place)
+    with pytest.raises(InvalidValue, match="inf.* is not on its axis"):
+        rsfstudy.cell(small, {**place, "b_over_a": "inf"})
+    words = [f"--cell={name}={value}" for name, value in place.items()]
+    code, out, _said = ended(command("rerun", tmp_path / "other.nc", *words))
+    assert (code, "physics: older then" in out) == (0, True)
+
+
+def test_a_measure_of_ones_own_is_not_taken_for_one_of_ours(tmp_path):
+    """Not even where it bears the name of one."""
+    (tmp_path / "mine.py").write_text(OWN_CRITICAL_STEP)
+    rsfstudy.run(tmp_path / "mine.py", workers=0, output=tmp_path, progress=False)
+    for again in (rsfstudy.rerun, lambda file: rsfstudy.cell(file, {"b_over_a": 2.0})):
+        with pytest.raises(InvalidValue, match="'critical_step': is a user's own.*--study"):
+            again(tmp_path / "mine.nc")
+
+
+OWN_CRITICAL_STEP = """
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures.critical_step import CriticalStep
+
+
+class Mine(CriticalStep):
+    def find(self, scene, accuracy, meter):
+        raise ZeroDivisionError
+
+
+study = Study(
+    name="mine", title="Mine", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=Mine()
+)
+"""
+
+
 def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
     empty = xr.load_dataset(small)
     empty["status"][:] = 25
@@ -337,7 +402,7 @@ def test_a_rerun_on_the_command_line(small):
 def test_a_rerun_of_a_study_of_ones_own(tmp_path):
     """Its code is in its own file, which has to be named."""
     run(FAULTY, output=tmp_path)
-    with pytest.raises(InvalidValue, match="'faulty': is not part of rsfstudy"):
+    with pytest.raises(InvalidValue, match="'faulty': is a user's own.*--study FILE"):
         rsfstudy.rerun(tmp_path / "faulty.nc", workers=0, progress=False)
     table = rsfstudy.rerun(tmp_path / "faulty.nc", study=FAULTY, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()

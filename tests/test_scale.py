@@ -1,5 +1,6 @@
 """Large lattices: little memory and few messages a cell, and stores that are written in pieces."""
 
+import json
 import os
 
 import numpy as np
@@ -127,6 +128,36 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
             run(SMALL, output=tmp_path, format="zarr")
     assert os.listdir(tmp_path) == ["small.cells.sqlite"]
     same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), run(SMALL))
+
+
+def test_a_chunk_that_is_damaged_is_told(tmp_path):
+    run(SMALL, output=tmp_path, format="zarr")
+    chunk = tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0"
+    whole = chunk.read_bytes()
+    chunk.write_bytes(whole[:8] + b"\xff" * 8 + whole[16:])
+    with pytest.raises(DataError, match=r"small\.zarr (cannot be read|is damaged)"):
+        rsfstudy.open(tmp_path / "small.zarr")
+
+
+@pytest.mark.parametrize("codec", ["numcodecs.pickle", "gzip"])
+def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
+    """It may run code of its own."""
+    run(SMALL, output=tmp_path, format="zarr")
+    file = tmp_path / "small.zarr" / "message" / "zarr.json"
+    about = json.loads(file.read_text())
+    about["codecs"].append({"name": codec, "configuration": {}})
+    file.write_text(json.dumps(about))
+    with pytest.raises(DataError, match=f"message is coded by '{codec}', which may run code"):
+        rsfstudy.open(tmp_path / "small.zarr")
+
+
+def test_a_file_and_a_store_of_one_name_are_told_apart(tmp_path):
+    run(SMALL, output=tmp_path, format="zarr")
+    assert rsfstudy.open("small", tmp_path).encoding["source"].endswith("small.zarr")
+    run(SMALL, output=tmp_path)
+    with pytest.raises(DataError, match=r"small\.nc and .*small\.zarr are both there"):
+        rsfstudy.open("small", tmp_path)
+    same_numbers(rsfstudy.open(tmp_path / "small.nc"), run(SMALL))
 
 
 def test_a_chunk_that_is_lost_is_noticed(tmp_path):

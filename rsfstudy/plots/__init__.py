@@ -7,6 +7,8 @@ A figure of several panels lists its functions of that kind in ``PANELS``.
 from __future__ import annotations
 
 import importlib
+import io
+import os
 import pkgutil
 from collections.abc import Callable
 from pathlib import Path
@@ -16,8 +18,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, RsfStudyError
+from rsfstudy.reduce.base import failed as is_failed
+from rsfstudy.status import Status
 from rsfstudy.store import declaration
+from rsfstudy.study import settings
 
 Panel = Callable[[xr.Dataset, Axes], Axes]
 
@@ -42,6 +47,9 @@ def figure(dataset: xr.Dataset) -> Figure:
     found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):
         draw(dataset, found.add_subplot(rows, columns, number), panel)
+    overrides = declaration(dataset)["overrides"]
+    if overrides:
+        found.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
     return found
 
 
@@ -50,10 +58,21 @@ def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
     module = _module(dataset)
     chosen: Panel = panel or module.draw
     drawn = chosen(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
-    completeness = dataset.attrs.get("completeness", "complete")
-    if completeness != "complete":
-        drawn.set_title(f"{drawn.get_title()} [{completeness}]".strip(), color="tab:red")
+    lacking = _lacking(dataset)
+    if lacking:
+        drawn.set_title(f"{drawn.get_title()} [{lacking}]".strip(), color="tab:red")
     return drawn
+
+
+def _lacking(dataset: xr.Dataset) -> str:
+    """What cells a figure cannot show."""
+    completeness = dataset.attrs.get("completeness", "complete")
+    failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
+    parts = [
+        "" if completeness == "complete" else completeness,
+        f"{failed} cells failed" * (failed > 0),
+    ]
+    return ", ".join(filter(None, parts))
 
 
 def _module(dataset: xr.Dataset) -> ModuleType:
@@ -77,6 +96,27 @@ def _single(dataset: xr.Dataset, module: ModuleType) -> set[str]:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write the figure of a results dataset as PNG."""
+    """Write the figure of a results dataset as PNG: the old file stays, or the whole new one.
+
+    Raises
+    ------
+    InvalidValue
+        Where the figure the study declares does not fit its results.
+    OSError
+        Where it cannot be written.
+    """
+    image = io.BytesIO()
+    try:
+        figure(dataset).savefig(image, format="png", dpi=160)
+    except RsfStudyError:
+        raise
+    except Exception as error:
+        rule = f"does not fit these results ({type(error).__name__}: {error})"
+        raise InvalidValue("plot", declaration(dataset)["plot"], rule, choices=NAMES) from error
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure(dataset).savefig(path, dpi=160)
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        beside.write_bytes(image.getvalue())
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
