@@ -49,7 +49,11 @@ _set = click.option(
 )
 
 
-_rtol = click.option("--rtol", type=float, help="Accuracy of each cell.")
+_rtol = click.option(
+    "--rtol",
+    type=float,
+    help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
+)
 _workers = click.option(
     "--workers",
     type=click.IntRange(1),
@@ -77,6 +81,7 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
+    warnings.showwarning = lambda message, *_place: _stderr.print(f"warning: {message}")
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
@@ -136,7 +141,7 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
     type=click.Choice(FORMATS),
     default="netcdf",
     show_default=True,
-    help="One NetCDF file, or a Zarr store written in pieces.",
+    help="One NetCDF file, or a Zarr store written in pieces, which never replaces another.",
 )
 @_quiet
 def run(
@@ -191,7 +196,7 @@ def run(
 @click.option(
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Directory to keep the new results in.",
+    help="Directory to keep the new results in; nothing is written without it.",
 )
 @_workers
 @_serial

@@ -188,7 +188,7 @@ class Run:
         if self.keeping.output is None:
             return store.sealed(found)
         written = found if zarr else store.write(found, self.path(".nc"))
-        for stale in (".partial.nc", ".unreduced.nc"):
+        for stale in (".partial.nc", ".partial.png", ".unreduced.nc", ".unreduced.png"):
             self.path(stale).unlink(missing_ok=True)
         return written
 

@@ -157,7 +157,9 @@ def _reductions(dataset: xr.Dataset) -> None:
         rows = frame.to_dataframe().reset_index()
         columns = [*dataset[slope].dims, slope, "standard error", "largest misfit", "points"]
         table = Table(
-            *map(str, columns), title=dataset[slope].attrs["comment"], title_justify="left"
+            *(Column(str(name), overflow="fold") for name in columns),
+            title=dataset[slope].attrs["comment"],
+            title_justify="left",
         )
         wanted = [
             *dataset[slope].dims,
@@ -166,8 +168,10 @@ def _reductions(dataset: xr.Dataset) -> None:
             f"{slope}_misfit",
             f"{slope}_points",
         ]
-        for row in rows[wanted].itertuples(index=False):
-            table.add_row(*(short(value) for value in row))
+        for *place, value, error, misfit, points in rows[wanted].itertuples(index=False):
+            table.add_row(
+                *map(short, place), short(value), f"{error:.2g}", f"{misfit:.2g}", str(points)
+            )
         console.print(table)
 
 

@@ -12,10 +12,14 @@ import contextlib
 import itertools
 import logging
 import math
+import signal
 import sys
+import threading
 import time
+import warnings
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
+from multiprocessing import resource_tracker
 from typing import Any
 
 from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed, sendable
@@ -29,9 +33,6 @@ PATIENCE = 60.0
 _LOOK = 2.0
 #: How often a cell may kill its worker before it is recorded as the culprit.
 _TRIES = 2
-#: Run by each worker process at its start: on Ctrl-C it is the driver that ends a run, and its
-#: workers.
-_IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
 def on_client(client: Any) -> Mapper:
@@ -116,8 +117,13 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
             ).done
             return done
         except TimeoutError:
+            waiting = time.monotonic() - seen
             if threads(client):
                 seen = time.monotonic()
+            elif waiting < 2 * _LOOK:
+                warnings.warn(
+                    f"the Dask cluster has no worker: waiting {PATIENCE:g} s", stacklevel=2
+                )
             elif time.monotonic() - seen > PATIENCE:
                 raise RunError(
                     f"the Dask cluster has had no worker for {PATIENCE:g} s: start some"
@@ -201,6 +207,34 @@ def _script_not_imported() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits until this is over, and never reaches a process that is started within: on
+    Ctrl-C it is the driver that ends a run, and its workers. Pressed twice, it does not wait.
+    """
+    held: list[int] = []
+
+    def hold(number: int, _frame: object) -> None:
+        if held:
+            raise KeyboardInterrupt
+        held.append(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, hold)
+    resource_tracker.ensure_running()  # which would lift what is blocked
+    # threads that are started now, and their processes, keep what is blocked now
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        signal.signal(signal.SIGINT, handler)
+    if held:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
 def local_cluster(workers: int) -> Iterator[Any]:
     """A Dask client of worker processes on this machine, with one thread each."""
     import dask
@@ -219,6 +253,8 @@ def local_cluster(workers: int) -> Iterator[Any]:
         ),
     }
     with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
+        started = stack.enter_context(contextlib.ExitStack())
+        started.enter_context(_interrupts_held())
         cluster = stack.enter_context(
             LocalCluster(
                 n_workers=workers,
@@ -227,9 +263,9 @@ def local_cluster(workers: int) -> Iterator[Any]:
                 dashboard_address=":0",
                 scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.CRITICAL,
-                preload=[_IGNORE_INTERRUPTS],
             )
         )
+        started.close()
         yield stack.enter_context(Client(cluster))
 
 
@@ -261,7 +297,7 @@ def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
             client = Client(address, timeout=timeout)
         except Exception as error:  # what Dask makes of an address that is none has no end
             raise RunError(
-                f"no Dask scheduler answers at {address!r}: {error}. "
+                f"no Dask scheduler answers at {address!r}: {str(error) or 'it took too long'}. "
                 "Start one with `dask scheduler`, or leave --scheduler out."
             ) from error
         with client:

@@ -135,6 +135,14 @@ def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_
     assert not (tmp_path / "faulty.nc").exists()
 
 
+def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
+    """The first cells are a sample of all, wherever they stand on their axis."""
+    corner = tuple(2.0 + 0.5 * i for i in range(100))
+    status = run(declared("raises", at=corner, cells=400)).status.values
+    assert (status[:100] == Status.CELL_RAISED).all()
+    assert (status[100:] == Status.OK).all()
+
+
 def test_it_goes_on_when_told_to():
     dataset = run(declared("raises", cells=100), keep_going=True)
     assert (dataset.status == int(Status.CELL_RAISED)).all()
@@ -294,6 +302,7 @@ def test_workers_that_never_come(monkeypatch):
             n_workers=0, dashboard_address=":0", scheduler_kwargs={"dashboard": False}
         ) as cluster,
         Client(cluster) as client,
+        pytest.warns(UserWarning, match="has no worker: waiting 1 s"),
         pytest.raises(RunError, match="no worker for 1 s: start some"),
     ):
         run(declared(), client=client)

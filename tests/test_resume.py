@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import psutil
 import pytest
 from faulty import declared
@@ -102,6 +101,17 @@ def test_ctrl_c(options, tmp_path):
     assert (partial.status == int(Status.PENDING)).sum() == CELLS - done
     assert 0 < done < CELLS
     goes_on(tmp_path, done)
+
+
+def test_ctrl_c_while_the_workers_start(tmp_path):
+    """They never see it, and the run ends in order once they are there."""
+    process = command("run", FAULTY, "--output", tmp_path, **SLOW)
+    until(lambda: len(psutil.Process(process.pid).children()) > 0, process)
+    os.killpg(process.pid, signal.SIGINT)
+    code, _out, said = ended(process)
+    assert code == 1
+    assert f"0 of {CELLS} cells are finished and kept in" in said
+    assert len(said.strip().splitlines()) == 1, said
 
 
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
@@ -271,13 +281,18 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
         run(output=tmp_path)
 
 
-def test_failures_are_tried_again(tmp_path):
+def test_failures_are_tried_again(tmp_path, monkeypatch):
     """A cell that failed has no answer: the next run computes it, and only it."""
     failing = declared("raises", at=(2.5,))
     assert run(failing, output=tmp_path).status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
-    known = cells_in(tmp_path / "faulty.cells.sqlite")
-    assert known == 4
-    time.sleep(0.01)
-    again = run(failing, output=tmp_path)
-    first = rsfstudy.open("faulty", tmp_path)
-    np.testing.assert_array_equal(again.wall_time[[0, 2, 3]], first.wall_time[[0, 2, 3]])
+    assert cells_in(tmp_path / "faulty.cells.sqlite") == 4
+    asked = []
+    original = cells.computed
+
+    def counted(task, scene, **options):
+        asked.append(scene.b_over_a)
+        return original(task, scene, **options)
+
+    monkeypatch.setattr(cells, "computed", counted)
+    run(failing, output=tmp_path)
+    assert asked == [2.5]
