@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from rich import box
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
@@ -26,6 +27,8 @@ from rsfstudy.study import Study, settings, short
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
+#: Characters of a number, as `short` writes it.
+_A_NUMBER = 10
 
 
 class Plain(Console):
@@ -155,9 +158,16 @@ def _reductions(dataset: xr.Dataset) -> None:
     for slope in [str(n) for n in dataset.data_vars if f"{n}_stderr" in dataset]:
         frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
         rows = frame.to_dataframe().reset_index()
-        columns = [*dataset[slope].dims, slope, "standard error", "largest misfit", "points"]
+        places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
+        numbers = (slope, "standard error", "largest misfit", "points")
+        widths = (_A_NUMBER, len("1.0e-05"), len("1.0e-05"), len("points"))
         table = Table(
-            *(Column(str(name), overflow="fold") for name in columns),
+            *places,
+            *(
+                Column(n, overflow="fold", min_width=w)
+                for n, w in zip(numbers, widths, strict=True)
+            ),
+            box=box.SIMPLE_HEAD,
             title=dataset[slope].attrs["comment"],
             title_justify="left",
         )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.plots._text import with_error
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -27,7 +26,7 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
         row = dataset.sel(case=case)
         text = str(case).replace("alpha", r"$\alpha$")
         if "zeta" in row:
-            text += f": {_slope(float(row['zeta']), float(row['zeta_stderr']))}"
+            text += rf": $\zeta$ = {with_error(float(row['zeta']), float(row['zeta_stderr']))}"
         points = axes.errorbar(
             x,
             row["critical_velocity_ratio"],
@@ -48,8 +47,3 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.set_ylim(1.0, 1.0 + reach[1])
     axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(0.0, 0.93))
     return axes
-
-
-def _slope(zeta: float, error: float) -> str:
-    digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
-    return rf"$\zeta$ = {zeta:.{digits}f} $\pm$ {error:.{digits}f}"

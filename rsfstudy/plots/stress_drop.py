@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.plots._text import with_error
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -33,7 +34,7 @@ def _drops(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
             text = f"{case}, {drop}"
             if f"{drop}_slope" in row:
                 slope, error = float(row[f"{drop}_slope"]), float(row[f"{drop}_slope_stderr"])
-                text += rf": {slope:.4f} $\pm$ {error:.4f}"
+                text += f": {with_error(slope, error)}"
                 centre = float(x.where(values.notnull()).mean())
                 line = (float(values.mean()) + slope * (x - centre)).where(values.notnull())
                 axes.plot(x, line, color=f"C{number}", linewidth=0.8)
@@ -65,7 +66,7 @@ def draw_scaled(dataset: xr.Dataset, axes: Axes) -> Axes:
     axes.set_xlabel(quantity("stiffness_ratio").symbol)
     axes.set_ylabel(r"Slope of static drop over $(a-b)\,\sigma_*$")
     axes.set_title("Dependence of the slopes on stiffness, $f(k)$", fontsize="medium")
-    axes.legend(fontsize="x-small")
+    axes.legend(fontsize="x-small", handlelength=4.0)
     axes.grid(alpha=0.3)
     return axes
 
