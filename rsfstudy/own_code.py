@@ -36,7 +36,7 @@ _MADE = {
     *("__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__"),
     *("__annotate__", "__annotate_func__", "__annotations_cache__", "__firstlineno__"),
     *("__static_attributes__", "__match_args__", "__slotnames__", "__abstractmethods__"),
-    *("__dataclass_fields__", "__dataclass_params__", "__init__", "__repr__", "__eq__"),
+    *("__dataclass_fields__", "__dataclass_params__", "__repr__", "__eq__"),
     *("__hash__", "__setattr__", "__delattr__", "__replace__", "__getstate__", "__setstate__"),
     "_abc_impl",
 }
@@ -131,8 +131,9 @@ class _Walk:
         if not _is_own(kind.__module__):
             return
         yield from self._all(kind.__bases__, ())
+        made = _MADE | ({"__init__"} if _inits_itself(kind) else set())
         for name, value in sorted(vars(kind).items()):
-            if name not in _MADE:
+            if name not in made:
                 yield name
                 yield from self.parts(value, ())
 
@@ -158,6 +159,12 @@ class _Walk:
             yield pickle.dumps(value, protocol=4).hex()
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
+
+
+def _inits_itself(kind: type) -> bool:
+    """Whether a class is a dataclass whose ``__init__`` was made for it."""
+    params = vars(kind).get("__dataclass_params__")
+    return params is not None and params.init
 
 
 def _names(code: CodeType) -> Iterator[str]:

@@ -15,6 +15,7 @@ import xarray as xr
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
 
 SMALL = Study(
@@ -33,6 +34,22 @@ FAULTY = Path(__file__).with_name("faulty.py")
 def run(study=SMALL, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def named_results(study: str | Study, tmp_path_factory) -> tuple[xr.Dataset, Path]:
+    """Results of a named study, and their file, computed once for all processes of the tests."""
+    place = tmp_path_factory.getbasetemp()
+    output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
+    for _ in range(600):
+        try:
+            dataset = rsfstudy.run(study, output=output, progress=False)
+        except DataError as error:
+            if "another run uses" not in str(error):
+                raise
+            time.sleep(0.5)
+            continue
+        return dataset, output / f"{dataset.attrs['id']}.nc"
+    raise AssertionError("another process never finished it")
 
 
 def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:

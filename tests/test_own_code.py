@@ -36,6 +36,9 @@ class Base:
         return self.offset + FACTOR
 
 class Tool(Base):
+    def __init__(self):
+        self.extra = 0.0
+
     @staticmethod
     def shifted(x):
         return x + 1.0
@@ -107,6 +110,7 @@ def test_a_measure_of_rsfstudy_has_its_version():
         ("helper", "return 2.0 * x", "return 3.0 * x"),
         ("helper", "    return x\n", "    return -x\n"),
         ("helper", "offset = 0.0", "offset = 1.0"),
+        ("helper", "self.extra = 0.0", "self.extra = 1.0"),
         ("helper", "self.offset + FACTOR", "self.offset - FACTOR"),
         ("helper", "return x + 1.0", "return x - 1.0"),
         ("measure", "SCALE = 1.0", "SCALE = 2.0"),

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from running import named_results
 
 import rsfstudy
 from rsfstudy import catalogue, plots, vocabulary
@@ -44,9 +45,7 @@ def declared(name: str) -> Study:
 )
 def result(request, tmp_path_factory):
     """The default lattice of each study, on two workers, and where its file is."""
-    output = tmp_path_factory.mktemp(request.param)
-    dataset = rsfstudy.run(declared(request.param), output=output, progress=False)
-    return dataset, output / f"{request.param}.nc"
+    return named_results(declared(request.param), tmp_path_factory)
 
 
 def test_the_study_is_named_as_its_file(result):
