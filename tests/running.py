@@ -89,16 +89,18 @@ def ended(process: subprocess.Popen, seconds: float = 120) -> tuple[int, str, st
 
 def cells_in(journal: Path) -> int:
     """Number of cells another process has kept so far, which lets nobody else read while it runs:
-    then what is on disk is looked at without asking.
+    then what is on disk is looked at without asking. Where nobody runs, what a killed one left
+    unfinished is rolled back, as by the next run.
     """
-    for way in ("mode=ro", "immutable=1"):
+    for way in ("mode=rw", "immutable=1"):
         try:
             with contextlib.closing(
                 sqlite3.connect(f"file:{journal}?{way}", uri=True, timeout=0)
             ) as db:
                 return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
-        except sqlite3.Error:
-            continue
+        except sqlite3.Error as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+                return 0
     return 0
 
 
