@@ -255,7 +255,7 @@ def test_what_a_worker_has_finished_is_kept_before_its_batch_is_done(tmp_path):
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     kept = cells_in(tmp_path / "faulty.cells.sqlite")
-    assert 4 <= kept < 60
+    assert 8 <= kept < 60
 
 
 def test_two_runs_at_a_time_are_refused(tmp_path):
