@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import psutil
@@ -16,7 +17,7 @@ from faulty import declared
 from running import FAULTY, SMALL, cells_in, command, ended, run, same_numbers, until
 
 import rsfstudy
-from rsfstudy import cells
+from rsfstudy import cells, workers
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.status import Status
 
@@ -114,12 +115,37 @@ def commands_under(process):
 def test_ctrl_c_while_the_workers_start(tmp_path):
     """They never see it, and the run ends in order once they are there."""
     process = command("run", FAULTY, "--output", tmp_path, **SLOW)
-    until(lambda: any("resource_tracker" in said for said in commands_under(process)), process)
+    until(lambda: any("spawn_main" in said for said in commands_under(process)), process)
     os.killpg(process.pid, signal.SIGINT)
     code, _out, said = ended(process)
     assert code == 1
     assert f"0 of {CELLS} cells are finished and kept in" in said
     assert len(said.strip().splitlines()) == 1, said
+
+
+def test_ctrl_c_waits_until_the_workers_are_there():
+    """Also where another thread gets the signal; pressed twice, it does not wait."""
+    before, done = signal.signal(signal.SIGINT, signal.default_int_handler), threading.Event()
+    other = threading.Thread(target=done.wait, args=(30,))
+    other.start()
+    reached = []
+
+    @workers._interrupts_held()
+    def pressed(times):
+        for press in range(times):
+            signal.pthread_kill(other.ident, signal.SIGINT)
+            time.sleep(0.05)
+            reached.append(press)
+
+    for times in (1, 2):
+        reached.clear()
+        with pytest.raises(KeyboardInterrupt):
+            pressed(times)
+        assert reached == [0]
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    done.set()
+    other.join()
+    signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
