@@ -18,15 +18,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rsfstudy.effects import inclined_driving, inertia, linker_dieterich, radiation_damping
-from rsfstudy.laws import evolution_of
+from rsfstudy.laws import Evolution, evolution_of
 from rsfstudy.scene import Scene
 
-#: Exponents beyond this only occur in trial steps; the clamp keeps their squares finite.
+#: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
+#: ln(V/V_*) = 276 (`slip_rate_unbounded`).
 LARGEST_EXPONENT = 300.0
 
-#: Rates beyond this, per inertial time, only occur in trial steps; the integrator rejects those
-#: that meet it.
+#: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
+#: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
+
+#: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
+SLOWEST = -290.0 * math.log(10.0)
+
+#: Where slip is slower than V_0 by this in ln V, contact is stationary: the state then changes by
+#: less than exp(-100) of itself over all the slip there is.
+STATIONARY = 100.0
 
 #: g -> (strength, d strength/dg, Psi - Theta)
 Strength = Callable[[float], tuple[float, float, float]]
@@ -125,6 +133,23 @@ def radiated(scene: Scene, log_rate: float) -> float:
     return radiation_damping.radiated(log_rate, scene.radiation_damping)
 
 
+def combined_rate(x: float, load_velocity: float) -> float:
+    """Rate (V + V_0)/V_* of slip and load point displacement together, at ln(V/V_*) = x."""
+    return math.exp(max(min(x, LARGEST_EXPONENT), SLOWEST)) + load_velocity
+
+
+def evolving(evolution: Evolution, x: float, load: float, state: float, b: float) -> float:
+    """Evolution of the state per unit of slip and load point displacement together:
+    ``V/(V + V_0) dTheta/d(delta)``.
+
+    Evolution per unit slip may grow like 1/V as slip slows down, so that the product has a limit,
+    that of stationary contact. There it is taken a little faster than slip goes, because its
+    factors would underflow and overflow.
+    """
+    x = max(x, load - STATIONARY)
+    return evolution(x, state, b) / (1.0 + math.exp(load - x))
+
+
 def quasi_static(scene: Scene, *, clock: bool) -> Equations:
     """Without mass: two unknowns, f and Psi, and time as a passenger where a `clock` is wanted.
 
@@ -137,16 +162,16 @@ def quasi_static(scene: Scene, *, clock: bool) -> Equations:
     """
     strength, evolution = strength_of(scene), evolution_of(scene.law)
     a, b, stiffness = scene.a, scene.b, scene.stiffness
-    load = scene.log_load_rate
+    load, load_velocity = scene.log_load_rate, scene.load_velocity
 
     def rate(_: float, state: State) -> list[float]:
         spring, psi = state[0], state[1]
         value, _slope, shift = strength(spring)
         x = (value - psi) / a
-        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
-        rates = [-stiffness * math.tanh(0.5 * (x - load)), share * evolution(x, psi - shift, b)]
+        loading = -stiffness * math.tanh(0.5 * (x - load))
+        rates = [loading, evolving(evolution, x, load, psi - shift, b)]
         if clock:
-            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+            rates.append(1.0 / combined_rate(x, load_velocity))
         return rates
 
     def point(state: State, rates: State) -> Point:
@@ -168,17 +193,16 @@ def quasi_dynamic(scene: Scene, *, clock: bool) -> Equations:
     """
     strength, evolution = strength_of(scene), evolution_of(scene.law)
     a, b, stiffness, damping = scene.a, scene.b, scene.stiffness, scene.radiation_damping
-    load = scene.log_load_rate
+    load, load_velocity = scene.log_load_rate, scene.load_velocity
     balanced_rate = radiation_damping.balanced_rate
 
     def rate(_: float, state: State) -> list[float]:
         x, friction = balanced_rate(state[0], state[1], strength, a, damping)
-        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
         shift = strength(friction)[2]
         loading = -stiffness * math.tanh(0.5 * (x - load))
-        rates = [loading, share * evolution(x, state[1] - shift, b)]
+        rates = [loading, evolving(evolution, x, load, state[1] - shift, b)]
         if clock:
-            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+            rates.append(1.0 / combined_rate(x, load_velocity))
         return rates
 
     def point(state: State, rates: State) -> Point:
@@ -205,37 +229,32 @@ def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
     """
     strength, evolution = strength_of(scene), evolution_of(scene.law)
     a, b, stiffness = scene.a, scene.b, scene.stiffness
-    load = scene.log_load_rate
-    log_time = math.log(scene.inertial_time)
+    load, load_velocity = scene.log_load_rate, scene.load_velocity
+    log_time, load_norm = math.log(scene.inertial_time), scene.load_velocity * scene.inertial_time
 
-    def shares(x: float) -> tuple[float, float, float]:
-        share = 1.0 / (1.0 + math.exp(min(load - x, LARGEST_EXPONENT)))
-        norm = math.exp(min(x + log_time, LARGEST_EXPONENT))
-        return share, -stiffness * math.tanh(0.5 * (x - load)), norm * norm / max(share, 1e-300)
-
-    def balance(spring: float, psi: float) -> tuple[float, float, float, float]:
-        """Slip rate on the slow manifold, friction, d strength/df, and the growth of ln V without
-        mass.
+    def balance(spring: float, psi: float) -> tuple[float, float, float]:
+        """Slip rate on the slow manifold, friction, and the growth of ln V without mass.
         """
         value, slope, shift = strength(spring)
         x = (value - psi) / a
-        share, loading, norm_squared = shares(x)
-        growth = (slope * loading - share * evolution(x, psi - shift, b)) / a
-        friction = spring - inertia.inertial_resistance(growth, stiffness, norm_squared)
-        return (strength(friction)[0] - psi) / a, friction, slope, growth
+        loading = -stiffness * math.tanh(0.5 * (x - load))
+        growth = (slope * loading - evolving(evolution, x, load, psi - shift, b)) / a
+        norm = math.exp(min(x + log_time, LARGEST_EXPONENT / 4.0))
+        friction = spring - inertia.inertial_resistance(growth, stiffness, norm, load_norm, most=a)
+        return (strength(friction)[0] - psi) / a, friction, growth
 
     def rate(_: float, state: State) -> list[float]:
-        spring, psi = state[0], state[1]
-        x, friction, _slope, _growth = balance(spring, psi)
-        share, loading, _norm = shares(x)
-        rates = [loading, share * evolution(x, psi - strength(friction)[2], b)]
+        psi = state[1]
+        x, friction, _growth = balance(state[0], psi)
+        loading = -stiffness * math.tanh(0.5 * (x - load))
+        rates = [loading, evolving(evolution, x, load, psi - strength(friction)[2], b)]
         if clock:
-            rates.append(share * math.exp(min(-x, LARGEST_EXPONENT)))
+            rates.append(1.0 / combined_rate(x, load_velocity))
         return rates
 
     def point(state: State, _rates: State) -> Point:
         spring, psi = float(state[0]), float(state[1])
-        x, friction, _slope, growth = balance(spring, psi)
+        x, friction, growth = balance(spring, psi)
         return Point(x, growth, spring, friction, psi, psi - strength(friction)[2] + b * x)
 
     massless = quasi_static(scene, clock=clock)

@@ -29,6 +29,7 @@ class Status(IntEnum):
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
     UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
     NO_STEP = 13, "the scene has no step to respond to"
+    SLIP_STOPPED = 14, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
     STABLE_AT_ANY_STIFFNESS = 12, "radiation damps every perturbation however soft the spring"
 
     # failures, from here on

@@ -12,6 +12,7 @@ from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Halt, Meter, Step, steps
 from rsfstudy.equations import (
     LARGEST_EXPONENT,
+    SLOWEST,
     Equations,
     Point,
     inertial,
@@ -200,6 +201,8 @@ def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
             raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
         if ratio >= LOCKED:
             raise Halt(Status.LOCKED, f"normal stress grew to {ratio:.3g} sigma_* and goes on")
+        if step.after.log_rate <= SLOWEST and scene.load_velocity == 0.0:
+            raise Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
         if step.after.log_rate >= UNBOUNDED:
             raise Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")
         yield step

@@ -30,9 +30,11 @@ def acceleration(spring: float, friction: float, stiffness: float, norm: float) 
     return (spring - friction) / (stiffness * norm)
 
 
-def inertial_resistance(growth: float, stiffness: float, norm_squared: float) -> float:
-    """Part of the spring stress that accelerates the mass, to first order in inertia: ``K w**2
-    dx``.
+def inertial_resistance(
+    growth: float, stiffness: float, norm: float, load_norm: float, most: float
+) -> float:
+    """Part of the spring stress that accelerates the mass, to first order in inertia:
+    ``K w (w + w_0) dx``.
 
     With the quasi-static growth dx of ln V it moves the quasi-static form onto the slow manifold of
     the full equations, with an error of order w**4.
@@ -43,8 +45,10 @@ def inertial_resistance(growth: float, stiffness: float, norm_squared: float) ->
         Quasi-static growth of ln V per unit of combined displacement (slip and load point).
     stiffness : float
         K = k D_c/sigma_*.
-    norm_squared : float
-        w (w + w_0), slip rate norm times that of slip and load point together; capped at 1 because
-        larger values only occur in trial steps.
+    norm, load_norm : float
+        w and w_0: T/(2 pi D_c) times the slip rate, and times the load point velocity.
+    most : float
+        Bound of the result: far more than the motion meets before it leaves the slow manifold, so
+        that trial steps beyond keep their sense of direction.
     """
-    return stiffness * min(norm_squared, 1.0) * growth
+    return max(-most, min(stiffness * norm * (norm + load_norm) * growth, most))

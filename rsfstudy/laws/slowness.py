@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-#: Exponents beyond this only occur in trial steps; the clamp keeps their squares finite.
-LARGEST_EXPONENT = 300.0
+#: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
+#: motion stop at slip rates of 10^-290 V_*.
+LARGEST_EXPONENT = 700.0
 
 
 def evolution(log_rate: float, state: float, b: float) -> float:
