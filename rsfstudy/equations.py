@@ -29,6 +29,14 @@ LARGEST_EXPONENT = 300.0
 #: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
 
+#: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
+LONGEST_STEP = 1e9
+
+#: Longest step in slip plus load point displacement, over D_c: longer ones may pass a turn of the
+#: motion that none of their stages sees. Stationary contact has no turns, up to a few units of ln V
+#: before slip takes up again; and normal stress stretches them all.
+LONGEST_STRIDE, FEW = 3.0, 10.0
+
 #: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
 SLOWEST = -290.0 * math.log(10.0)
 
@@ -67,6 +75,10 @@ class Point:
     imbalance: float
 
 
+def _any_step(_point: Point) -> float:
+    return LONGEST_STEP
+
+
 @dataclass(frozen=True)
 class Equations:
     """A system of ordinary differential equations in its own clock.
@@ -83,6 +95,9 @@ class Equations:
         ``rate(clock, state) -> list``: derivatives of the unknowns.
     point : callable
         ``point(state, derivatives) -> Point``.
+    longest : callable
+        ``longest(point)``: longest step of the clock, beyond which an integrator's estimate of its
+        local error cannot be trusted.
     """
 
     regime: str
@@ -90,6 +105,7 @@ class Equations:
     scales: tuple[float, ...]
     rate: Callable[[float, State], list[float]]
     point: Callable[[State, State], Point]
+    longest: Callable[[Point], float] = _any_step
 
 
 def strength_of(scene: Scene) -> Strength:
@@ -150,6 +166,18 @@ def evolving(evolution: Evolution, x: float, load: float, state: float, b: float
     return evolution(x, state, b) / (1.0 + math.exp(load - x))
 
 
+def stride(scene: Scene) -> Callable[[Point], float]:
+    """Longest step of a form whose clock is slip plus load point displacement."""
+    load, cot_phi = scene.log_load_rate, scene.cot_phi
+
+    def longest(point: Point) -> float:
+        stationary = max(1.0, (load - point.log_rate) / FEW)
+        normal_stress = max(1.0, 1.0 + cot_phi * point.friction)
+        return min(LONGEST_STRIDE * stationary * normal_stress, LONGEST_STEP)
+
+    return longest
+
+
 def quasi_static(scene: Scene, *, clock: bool) -> Equations:
     """Without mass: two unknowns, f and Psi, and time as a passenger where a `clock` is wanted.
 
@@ -184,7 +212,7 @@ def quasi_static(scene: Scene, *, clock: bool) -> Equations:
     unknowns, scales = ("spring", "psi"), (a, a)
     if clock:
         unknowns, scales = (*unknowns, "time"), (*scales, 1.0)  # type: ignore[assignment]
-    return Equations("quasi_static", unknowns, scales, rate, point)
+    return Equations("quasi_static", unknowns, scales, rate, point, stride(scene))
 
 
 def quasi_dynamic(scene: Scene, *, clock: bool) -> Equations:
@@ -214,7 +242,9 @@ def quasi_dynamic(scene: Scene, *, clock: bool) -> Equations:
         return Point(x, growth, spring, friction, psi, psi - shift + b * x)
 
     undamped = quasi_static(scene, clock=clock)
-    return Equations("quasi_dynamic", undamped.unknowns, undamped.scales, rate, point)
+    return Equations(
+        "quasi_dynamic", undamped.unknowns, undamped.scales, rate, point, stride(scene)
+    )
 
 
 def without_mass(scene: Scene, *, clock: bool) -> Equations:
@@ -233,8 +263,7 @@ def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
     log_time, load_norm = math.log(scene.inertial_time), scene.load_velocity * scene.inertial_time
 
     def balance(spring: float, psi: float) -> tuple[float, float, float]:
-        """Slip rate on the slow manifold, friction, and the growth of ln V without mass.
-        """
+        """Slip rate on the slow manifold, friction, and the growth of ln V without mass."""
         value, slope, shift = strength(spring)
         x = (value - psi) / a
         loading = -stiffness * math.tanh(0.5 * (x - load))
@@ -258,7 +287,15 @@ def slow_manifold(scene: Scene, *, clock: bool) -> Equations:
         return Point(x, growth, spring, friction, psi, psi - strength(friction)[2] + b * x)
 
     massless = quasi_static(scene, clock=clock)
-    return Equations("slow_manifold", massless.unknowns, massless.scales, rate, point)
+    return Equations(
+        "slow_manifold", massless.unknowns, massless.scales, rate, point, stride(scene)
+    )
+
+
+def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
+    """The form of a scene where mass, if it has any, hardly acts."""
+    assemble = slow_manifold if scene.inertia else without_mass
+    return assemble(scene, clock=clock)
 
 
 def inertial(scene: Scene) -> Equations:

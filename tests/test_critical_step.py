@@ -13,11 +13,12 @@ from scipy.integrate import solve_ivp
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.motion import error_of_slow_manifold
 from rsfstudy.core.stepping import Meter
 from rsfstudy.equations import log_rate_at, quasi_static
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep, error_of_leaving_mass_out
-from rsfstudy.measures.swing import swing
+from rsfstudy.measures import critical_step, swing
+from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.touching import touching_point
 from rsfstudy.status import Status
 
@@ -262,31 +263,125 @@ def test_variable_normal_stress_hardly_moves_the_displacement_boundary():
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
-def test_mass_below_the_norm_of_the_paper_makes_no_difference(law, of):
-    """Why a boundary at norm 5e-4 is computed without mass even where the scene has it."""
+def test_mass_hardly_moves_a_boundary_at_the_norm_of_the_paper(law, of):
+    """By less than (K/a) w**2 = 5e-7 of it."""
     without = found(Scene(law=law), of)
     with_mass = found(Scene(law=law, inertia=True), of)
-    assert with_mass[0] == without[0]
-    assert with_mass[1] >= without[1]
+    assert with_mass[0] == pytest.approx(without[0], rel=5e-7)
 
 
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize(("of", "b_over_a"), [(RATE, 2.0), (RATE, 5.0), (DISPLACEMENT, 2.0)])
-def test_error_of_leaving_mass_out(law, of, b_over_a):
-    """The estimate 0.05 (K/a) w**2 covers what mass does to the boundary at norm w, and is no idle
-    bound.
-    """
-    scene = Scene(law=law, b_over_a=b_over_a, instability_norm=0.01)
-    without = found(scene, of, rtol=1e-9)[0]
-    with_mass = found(scene.with_(inertia=True), of, rtol=1e-8)[0]
-    moved = (
-        abs(math.log(with_mass / without) / math.log(without))
-        if of == RATE
-        else abs(with_mass / without - 1.0)
+#: Where the norm is a slip rate of a few V_*, mass matters most: (law, b/a, k/k_cr, V/V_* at it).
+SLOW_NORMS = [("slip", 3.0, 1.9, 1.5), ("slip", 3.0, 1.9, 4.0), ("slowness", 3.0, 1.2, 10.0)]
+
+
+def whose_norm_is_slow(law, b_over_a, stiffness_ratio, rate, norm) -> Scene:
+    return Scene(
+        law=law,
+        b_over_a=b_over_a,
+        stiffness_ratio=stiffness_ratio,
+        inertia=True,
+        instability_norm=norm,
+        period=1000.0,
+        reference_rate=norm * 2.0 * math.pi / 1000.0 / rate,
+        **CONSTANT,
     )
-    assert moved < error_of_leaving_mass_out(scene) + 3e-8
-    if law == "slowness" and of == RATE:
-        assert moved > 0.02 * error_of_leaving_mass_out(scene)
+
+
+@pytest.mark.parametrize("case", SLOW_NORMS)
+def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(case, monkeypatch):
+    """A second formulation of what mass does to a boundary: by paths that hold its first order,
+    and by motions that integrate it; which of the two is right where neither is exact shows the
+    bound of the error.
+    """
+    scene = whose_norm_is_slow(*case, norm=0.01)
+    without = found(scene.with_(inertia=False), rtol=1e-8)[0]
+    values = {}
+    for heavy in (False, True):
+        for module in (critical_step, swing):
+            monkeypatch.setattr(module, "mass_acts", lambda *_scene, heavy=heavy: heavy)
+        values[heavy] = found(scene, rtol=1e-8)[:2]
+    (path, error), (forward, its_error) = values[False], values[True]
+    assert abs(path - forward) <= error + its_error
+    moved = abs(math.log(without / path) / math.log(path))
+    weight = scene.stiffness / scene.a * scene.instability_norm**2
+    # the first order of mass is there, and what is left is within the bound of the second
+    assert 0.05 * weight < moved < 0.8 * weight
+    left = abs(math.log(forward / path) / math.log(path))
+    assert left < error_of_slow_manifold(scene) + 1e-8
+
+
+def test_mass_counts_at_a_norm_just_above_the_loading_rate():
+    """Left out, it would be missed by 2.0e-7 of V_0/V_* here: more than the accuracy asked for."""
+    scene = whose_norm_is_slow("slip", 3.0, 1.9, 1.5, norm=5e-4)
+    value, error, _outcome = found(scene)
+    without = found(scene.with_(inertia=False))[0]
+    assert without - value == pytest.approx(2.0e-7, abs=1e-8)
+    assert error < 5e-9
+
+
+#: Scenes in which the tolerance used to decide the status: (fields, direction, status).
+DECIDED = [
+    (
+        {
+            "law": "slowness",
+            "a": 0.021181644904389653,
+            "b_over_a": 1.137092583705905,
+            "mu_star": 0.5552661225537985,
+            "period": 0.7568223330364047,
+            "reference_rate": 1.1289390053970302e-08,
+            "phi": 53.38530796435979,
+            "alpha": 0.0617045668824441,
+            "stiffness_ratio": 1.8731115660211108,
+            "load_velocity_ratio": 11.030784157843362,
+        },
+        "down",
+        Status.STABLE_FOR_ALL_STEPS,  # the critical path starts beyond the end of shear stress
+    ),
+    (
+        {
+            "law": "slowness",
+            "a": 0.0074952301383459955,
+            "b_over_a": 3.409016633081082,
+            "period": 0.11388174879575831,
+            "reference_rate": 1.2408525574485156e-08,
+            "stiffness_ratio": 1.5381593043991868,
+            "load_velocity_ratio": 6.78099797865174,
+            "inertia": True,
+            **CONSTANT,
+        },
+        "up",
+        Status.OK,  # the jump of slip rate, which mass delays
+    ),
+]
+
+
+@pytest.mark.parametrize(("fields", "direction", "status"), DECIDED)
+def test_the_tolerance_does_not_decide_the_status(fields, direction, status):
+    measure = CriticalStep(of=DISPLACEMENT, direction=direction)
+    outcomes = [measure(Scene(**fields), Accuracy(rtol)) for rtol in (1e-4, 1e-7, 1e-9)]
+    assert {outcome.status for outcome in outcomes} == {status}
+    if status is Status.OK:
+        values = [outcome.values["critical_displacement"] for outcome in outcomes]
+        assert values == pytest.approx([values[-1]] * 3, rel=1e-5)
+
+
+def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
+    """A drop of V_0 that ends in a cycle: by a root of its peak, in 5 times the usual work."""
+    scene = Scene(
+        law="slip",
+        a=0.007085837776968529,
+        b_over_a=1.2474392015687674,
+        mu_star=0.8169914402658061,
+        period=45.49055212614619,
+        reference_rate=1.9386488840293015e-07,
+        phi=84.62982593790218,
+        alpha=0.4888343561900566,
+    )
+    value, error, outcome = found(scene, direction="down")
+    tight = found(scene, direction="down", rtol=1e-9)[0]
+    assert abs(value - tight) <= error
+    assert error < 1e-5 * (1.0 - value)
+    assert outcome.rhs_evaluations < 100_000
 
 
 def test_mass_moves_the_boundary_where_it_acts():
@@ -377,9 +472,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_norm_rate
-        assert not swing(scene, Accuracy(1e-6), Meter(500_000)).reached
+        assert not swing.swing(scene, Accuracy(1e-6), Meter(500_000)).reached
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert swing(low, Accuracy(1e-6), Meter(500_000)).reached
+    assert swing.swing(low, Accuracy(1e-6), Meter(500_000)).reached
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():

@@ -52,6 +52,7 @@ DEAR = {
     "tiny step, k = (1 -0.001) k_cr": "a growth of 1e-3 an orbit, followed up to the norm",
     "critical step, k = (1 -1e-08) k_cr": "a growth that no motion can show is sought by motions",
     "phi = atan(mu_*) + 0.01": "k_cr falls so steeply that only motions tell the boundary",
+    "lambda = 0.01": "orbits a hundred times as long, followed on either side of the boundary",
     "norm beyond the inertial peak": "ruptures up to the largest step, none of which is enough",
 }
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene, laws
 from rsfstudy.core.stepping import Meter, steps
-from rsfstudy.equations import rigid
+from rsfstudy.equations import evolving, rigid
 from rsfstudy.laws import slip, slowness
 
 
@@ -70,3 +70,19 @@ def test_slowness_law_needs_3p5_slip_distances_to_lose_1_minus_1_over_e():
     total = Scene().b * log_rate
     left = total + state_after("slowness", log_rate, 3.4978)
     assert left / total == pytest.approx(math.exp(-1.0), abs=1e-5)  # slip is given to 4 decimals
+
+
+@given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
+def test_evolution_goes_over_to_that_of_stationary_contact(log_rate, log_theta, log_load):
+    """Slowness law, in time: b (V_*/theta - V)/(V + V_0) per unit of slip and load point
+    displacement, whatever the slip rate; slip law: none without slip.
+    """
+    b, slip_rate, load = 0.03, math.exp(log_rate), math.exp(log_load)
+    exact = b * (math.exp(-log_theta) - slip_rate) / (slip_rate + load)
+    rounding = b * 1e-13 * (math.exp(-log_theta) + slip_rate) / (slip_rate + load)
+    ours = evolving(slowness.evolution, log_rate, log_load, b * log_theta, b)
+    # exp(-100) of the slip rate is taken too much where slip is slower than that
+    assert ours == pytest.approx(exact, abs=100.0 * rounding + 1e-40)
+    slipping = evolving(slip.evolution, log_rate, log_load, b * log_theta, b)
+    share = slip_rate / (slip_rate + load)
+    assert slipping == pytest.approx(-share * b * (log_theta + log_rate), rel=1e-12, abs=1e-40)

@@ -181,3 +181,63 @@ def test_cycles_near_their_onset_are_waited_for(law, load, drop):
     assert outcome.values["static_stress_drop"] == pytest.approx(drop, abs=1e-4)
     beyond = LimitCycle(phases=2)(scene.with_(load_velocity_ratio=145.0), Accuracy(1e-6))
     assert beyond.status is Status.NO_LIMIT_CYCLE
+
+
+#: Cycles in which slip nearly stops, and their recurrence intervals by a code of its own (other
+#: unknowns, time as the clock), to the digits it gives.
+NEARLY_STOPPED = [
+    (
+        {
+            "law": "slip",
+            "a": 0.008794017206350683,
+            "b_over_a": 4.941051988536554,
+            "mu_star": 0.6383162760615213,
+            "period": 407.6129114047208,
+            "reference_rate": 3.2171954288536213e-10,
+            "phi": 54.42406958714466,
+            "alpha": 0.5377004681414724,
+            "stiffness_ratio": 0.3804142175724484,
+            "load_velocity_ratio": 86.431987832162,
+        },
+        0.798761,
+    ),
+    (
+        {
+            "law": "slowness",
+            "a": 0.004822260947305701,
+            "b_over_a": 5.36849678524829,
+            "mu_star": 0.6052299536973429,
+            "period": 2.621331736312295,
+            "reference_rate": 8.347835049891749e-07,
+            "phi": 38.97235270206339,
+            "alpha": 0.44646546358794825,
+            "stiffness_ratio": 0.573530636703891,
+            "load_velocity_ratio": 1.2036896528515733,
+        },
+        49.20716,
+    ),
+]
+
+
+@pytest.mark.parametrize(("fields", "interval"), NEARLY_STOPPED)
+def test_time_goes_on_where_slip_nearly_stops(fields, interval):
+    """At 10^-137 and 10^-1745 V_*. The spring takes the static drop back at the rate K V_0 while
+    hardly anything slips, which bounds the interval from below.
+    """
+    slider = Scene(inertia=True, **fields)
+    found = measured(slider)
+    assert found["recurrence_interval"] == pytest.approx(interval, rel=1e-6)
+    assert found["min_log10_slip_rate"] < -130.0
+    reloading = found["static_stress_drop"] / (slider.stiffness * slider.load_velocity)
+    assert reloading < interval < 1.1 * reloading
+
+
+def test_cycles_that_come_closer_slowly_are_leapt_ahead_of():
+    """A return map whose derivative is 0.06 takes six cycles to seven digits; its fixed point is
+    known after three.
+    """
+    outcome = measured(scene(law="slowness", normal_stress="constant"))
+    assert outcome["events_until_repeat"] < 9
+    assert outcome["recurrence_interval"] == pytest.approx(
+        23.93999870907226927, abs=outcome["recurrence_interval_error"]
+    )

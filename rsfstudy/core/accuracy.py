@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 
 from rsfstudy.errors import InvalidValue
@@ -12,6 +12,11 @@ from rsfstudy.errors import InvalidValue
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
+#: Part of the accuracy asked for that errors come to where they cancel by chance (the study
+#: coverage measures it).
+_BY_CHANCE = 0.03
+#: Relative error that rounding alone explains.
+ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class Accuracy:
         Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
     methods : tuple of (str, str)
         Regimes and the SciPy integrators that serve them, where not the default one.
+    refinement : float
+        Part of the usual tolerances that the integration is given; see `refined`.
 
     Raises
     ------
@@ -37,6 +44,7 @@ class Accuracy:
     rtol: float = DEFAULT_RTOL
     budget: int = DEFAULT_BUDGET
     methods: tuple[tuple[str, str], ...] = ()
+    refinement: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("rtol", "budget"):
@@ -52,12 +60,21 @@ class Accuracy:
         if self.budget < 1:
             raise InvalidValue("budget", self.budget, "must be at least 1")
 
+    def refined(self) -> Accuracy:
+        """The accuracy of a second run, which tells the error of the first: every tolerance is a
+        tenth.
+
+        At order eight it costs a third more than the first. The errors of the two are far apart,
+        and nothing is shared that could be wrong in both.
+        """
+        return replace(self, refinement=0.1 * self.refinement)
+
     @property
     def solver(self) -> float:
         """Local tolerance for the integrator: local errors add up over a motion, so a part of
         `rtol`.
         """
-        return 0.07 * self.rtol
+        return 0.07 * self.rtol * self.refinement
 
     @property
     def switch_norm(self) -> float:
@@ -66,7 +83,9 @@ class Accuracy:
         The error of leaving it at w is 0.03 w**4 for the paper's slider and up to 0.08 w**4 for one
         of T = 1e4 s (the tests and the study hard_cases measure it).
         """
-        return min(math.sqrt(math.sqrt(10.0 * self.rtol)), 0.05)
+        return min(math.sqrt(math.sqrt(10.0 * self.rtol)), 0.05) * math.sqrt(
+            math.sqrt(self.refinement)
+        )
 
     @property
     def switch_correction(self) -> float:
@@ -76,14 +95,24 @@ class Accuracy:
         At a usual stiffness `switch_norm` comes first; this bound holds for stiff and strongly
         weakening scenes.
         """
-        return min(25.0 * math.sqrt(self.rtol), 0.03)
+        return min(25.0 * math.sqrt(self.rtol), 0.03) * math.sqrt(self.refinement)
 
     @property
     def landing(self) -> float:
         """Slip in D_c that may remain when the inertial equations hand back to the slow
         manifold.
         """
-        return 0.3 * self.rtol
+        return 0.3 * self.rtol * self.refinement
+
+
+def error_between(number: float, refined: float, rtol: float) -> float:
+    """Error estimate of a number, from what `Accuracy.refined` makes of it.
+
+    Twice the difference, which misses only where the second error is more than half of the first; a
+    small part of the accuracy asked for, where both are small by chance; and rounding.
+    """
+    number = float(number)
+    return 2.0 * abs(number - float(refined)) + (_BY_CHANCE * rtol + ROUNDING) * abs(number)
 
 
 def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
-from rsfstudy.equations import Equations, Point
+from rsfstudy.equations import LONGEST_STEP, Equations, Point
 from rsfstudy.status import Status
 
 Vector = np.ndarray
@@ -20,9 +20,11 @@ METHODS: Mapping[str, type[OdeSolver]] = {
     method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
 }
 DEFAULT_METHOD = "DOP853"
-
-#: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
-_LONGEST_STEP = 1e9
+#: Local tolerance at which the longest steps of equations hold as they are; at others they change
+#: as steps of order eight do.
+_TOLERANCE_OF_STRIDES = 1e-7
+#: Local tolerance below which rounding decides, and SciPy warns.
+_TIGHTEST = 5e-14
 
 
 class Halt(Exception):
@@ -157,8 +159,8 @@ def steps(
         or a number is not finite.
     """
     regime = equations.regime
-
     method = meter.method_of(regime)
+    tolerance = max(tolerance, _TIGHTEST)
 
     def rate(clock: float, unknowns: Vector) -> list[float]:
         meter.charge(regime, 1)
@@ -172,14 +174,17 @@ def steps(
             -math.inf if backward else math.inf,
             rtol=tolerance,
             atol=tolerance * np.asarray(equations.scales),
-            max_step=_LONGEST_STEP,
+            max_step=LONGEST_STEP,
         )
 
+    # what limits a step must differ between two tolerances whose results are to tell errors
+    finer = (tolerance / _TOLERANCE_OF_STRIDES) ** 0.125
     solver, jacobians = started(np.asarray(state, dtype=float)), 0
     before = equations.point(solver.y.tolist(), _rates(solver, rate))
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
         # checked
+        solver.max_step = equations.longest(before) * finer
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             failure = solver.step()
         meter.steps += 1

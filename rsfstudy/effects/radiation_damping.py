@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 _MOST_ITERATIONS = 200
 _SETTLED = 1e-15
+#: ln V beyond which only trial steps look for a balance: radiation would be 10^300 eta.
+_FASTEST = 690.0
 
 #: g -> (strength, d strength/dg, Psi - Theta)
 Strength = Callable[[float], tuple[float, float, float]]
@@ -53,7 +55,7 @@ def balanced_rate(
         eta V_*/sigma_*.
     """
     # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
-    low, high = -math.inf, (strength(spring + damping)[0] - psi) / a
+    low, high = -math.inf, min((strength(spring + damping)[0] - psi) / a, _FASTEST)
     # a good guess where radiation takes most of the stress
     x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
     before = math.inf

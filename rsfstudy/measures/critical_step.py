@@ -2,27 +2,28 @@
 instability.
 
 A step is critical when the peak slip rate of the motion it sets off just touches the instability
-norm. Where mass does not act up to the norm, the touching path is known at its end: ln V is at the
+norm. Where mass hardly acts up to the norm, the touching path is known at its end: ln V is at the
 norm and at rest there. Followed against time, where it attracts its neighbours, it leads to the
 step that started it; see `touching`. Where mass acts below the norm, the peak is followed forward;
-see `peaks`. Either way the answer counts only once a motion on each side of it has confirmed it.
+see `swing`. Either way the answer counts only once a motion on each side of it has confirmed it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.core.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.core.accuracy import ROUNDING, Accuracy, error_between
+from rsfstudy.core.motion import error_of_slow_manifold, mass_acts
 from rsfstudy.core.stepping import Halt, Meter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.sought import DisplacementSteps, RateSteps, Steps
-from rsfstudy.measures.swing import Swing, settles, swing
+from rsfstudy.measures.swing import Swing, settles, stability_margin, swing
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
@@ -32,11 +33,8 @@ KINDS: Mapping[str, type[Steps]] = {
 }
 DIRECTIONS = ("up", "down")
 
-#: Relative error of a root that rounding alone explains.
-ROUNDING = 1e-13
-
-#: Local tolerance below which rounding decides.
-_TIGHTEST_PATH = 5e-14
+#: Accuracy of a boundary that is a limit cycle, whatever is asked for.
+_CAREFUL = 1e-8
 
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
@@ -100,29 +98,32 @@ class CriticalStep(Measure):
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Find the boundary, then confirm it with a motion on each side.
 
-        Without mass below the norm it is found from the `touching` path; where there is no such
-        path, or mass acts below the norm, from motions followed forward.
+        Where mass hardly acts below the norm it is found from the `touching` path; where there is
+        no such path, or mass acts, from motions followed forward.
         """
         sign = 1 if self.direction == "up" else -1
-        left_out = 0.0
-        if scene.inertia and error_of_leaving_mass_out(scene) <= 0.5 * accuracy.rtol:
-            left_out = error_of_leaving_mass_out(scene)
-            scene = scene.with_(inertia=False)
         steps = KINDS[self.of](scene, sign)
         if steps.largest <= steps.smallest:
             return Outcome(
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        if not scene.inertia:
-            boundary = _from_touching_path(steps, accuracy, meter)
-            if boundary is not None and _smaller_steps_decay(steps, boundary.size):
-                boundary = replace(boundary, relative_error=boundary.relative_error + left_out)
-                outcome = self._verified(steps, boundary, accuracy, meter)
-                if outcome.status is Status.OK:
-                    return outcome
+        if _neutral(scene, accuracy):
+            return Outcome(
+                Status.UNVERIFIED,
+                message="stiffness is critical to within the accuracy: ask for a smaller rtol",
+            )
+        if not mass_acts(scene, accuracy):
+            # a cycle attracts no path, and takes more care
+            careful = replace(accuracy, rtol=min(accuracy.rtol, _CAREFUL))
+            for find, asked in ((_from_touching_path, accuracy), (_from_touching_cycle, careful)):
+                boundary = find(steps, asked, meter)
+                if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
+                    outcome = self._verified(steps, boundary, asked, meter)
+                    if outcome.status is Status.OK:
+                        return outcome
             return self._surveyed(steps, accuracy, meter)
-        near = _without_mass(steps, meter)
+        near = _at_light_norm(steps, meter)
         if near is not None and _smaller_steps_decay(steps, near):
             bracket = _neighbours(steps, near, accuracy, meter)
             if bracket is not None:
@@ -211,24 +212,26 @@ class CriticalStep(Measure):
         """Boundary between a stable and an unstable log size, where the excess of the swings
         changes sign.
         """
-        tolerance = 0.5 * accuracy.rtol
-        log_size = toms748(
-            lambda p: swing(steps.scene_at(math.exp(p)), accuracy, meter).excess,
-            *bracket,
-            xtol=tolerance,
-            rtol=1e-15,
-        )
-        # the swings that found it would confirm their own errors: the verdicts come from tighter
-        # ones
-        tighter = replace(accuracy, rtol=max(0.03 * accuracy.rtol, TIGHTEST_RTOL))
+        try:
+            log_size = toms748(
+                lambda p: swing(steps.scene_at(math.exp(p)), accuracy, meter).excess,
+                *bracket,
+                xtol=0.5 * accuracy.rtol,
+                rtol=1e-15,
+            )
+        except Halt as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+            return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
+        # the swings that found it would confirm their own errors: the verdicts come from others
         boundary = Boundary(math.exp(log_size), accuracy.rtol, by_motions=True)
-        return self._verified(steps, boundary, tighter, meter)
+        return self._verified(steps, boundary, accuracy.refined(), meter)
 
     def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
         """No step up to the largest reached the norm: because nothing is unstable, or because of
         mass.
         """
-        if steps.scene.inertia and _without_mass(steps, meter) is not None:
+        if steps.scene.inertia and _at_light_norm(steps, meter) is not None:
             return Outcome(
                 Status.NORM_UNREACHABLE,
                 self._values(steps, stable=steps.value(largest)),
@@ -245,26 +248,56 @@ class CriticalStep(Measure):
         )
 
 
-def error_of_leaving_mass_out(scene: Scene) -> float:
-    """Relative error of a boundary computed without mass up to the norm w of a scene: 0.05 (K/a)
-    w**2.
-
-    Mass moves the boundary in proportion to w**2; the factor bounds what was measured for both laws
-    and both kinds of step, (b-a)/a from 0.25 to 10 and k/k_cr from 1 to 2 (up to 0.032 K/a).
-    """
-    return 0.05 * scene.stiffness / scene.a * scene.instability_norm**2
-
-
 def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
-    """Boundary from the critical path; the difference between two tolerances is its error."""
-    tolerances = accuracy.solver, max(0.1 * accuracy.solver, _TIGHTEST_PATH)
-    sizes = steps.sizes_on_path(tolerances, meter)
-    if sizes is None:
+    """Boundary from the critical path, unless smaller steps may be unstable; None where there is no
+    such path.
+    """
+    boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
+    if boundary is None or not _smaller_steps_decay(steps, boundary.size):
         return None
-    coarse, fine = sizes
-    # the difference is the error of the coarser; two tolerances may agree by chance, hence the
-    # floor
-    return Boundary(fine, 2.0 * abs(coarse - fine) / fine + 0.05 * accuracy.rtol + ROUNDING)
+    return boundary
+
+
+def _from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
+    """Boundary where the motion ends in a limit cycle that touches the norm: where larger steps
+    make steady sliding less stable, and the largest unstable.
+    """
+    small, large = (
+        stability_margin(steps.scene_at(size)) for size in (steps.smallest, steps.largest)
+    )
+    if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
+        return None
+    boundary = _boundary(steps, steps.sizes_of_cycle, accuracy, meter)
+    # a cycle attracts little: the two errors may have much in common
+    return boundary and replace(boundary, relative_error=5.0 * boundary.relative_error)
+
+
+def _neutral(scene: Scene, accuracy: Accuracy) -> bool:
+    """Whether stiffness lies so little below the critical one that growth cannot be told from none,
+    at any load point velocity.
+    """
+    margin = scene.stiffness_ratio - 1.0
+    damped = scene.radiation_damping > 0.0
+    return scene.normal_stress == "constant" and not damped and -10.0 * accuracy.rtol < margin < 0.0
+
+
+def _boundary(
+    steps: Steps,
+    sizes_by: Callable[[Sequence[float], Meter], list[float] | None],
+    accuracy: Accuracy,
+    meter: Meter,
+) -> Boundary | None:
+    """A boundary with the error that a second, smaller tolerance tells; None where there is none
+    within the steps of the search.
+    """
+    sizes = sizes_by((accuracy.solver, accuracy.refined().solver), meter)
+    if sizes is None or not steps.smallest <= sizes[0] <= steps.largest:
+        return None
+    # a path attracts its neighbours, which halves what chance may hide
+    error = error_between(sizes[0], sizes[1], 0.5 * accuracy.rtol) / sizes[0]
+    if steps.scene.inertia:
+        error += error_of_slow_manifold(steps.scene)
+    return Boundary(sizes[0], error)
 
 
 def _smaller_steps_decay(steps: Steps, size: float) -> bool:
@@ -276,7 +309,7 @@ def _smaller_steps_decay(steps: Steps, size: float) -> bool:
     return all(settles(steps.scene_at(end)) for end in (steps.smallest, size))
 
 
-def _without_mass(steps: Steps, meter: Meter) -> float | None:
+def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
     """Size of the critical step for a norm low enough to leave mass out: close by, and cheap."""
     norm = min(steps.scene.instability_norm, _LIGHT_NORM)
     massless = type(steps)(steps.scene.with_(inertia=False, instability_norm=norm), steps.sign)

@@ -1,9 +1,11 @@
 """The stick-slip limit cycle: recurrence interval, stress drops and range of slip rate, once cycles
 repeat.
 
-A cycle runs from one maximum of spring stress, where V rises through V_0, to the next. It is
-accepted when it repeats the one before to the tolerance; the event that the step itself sets off is
-never taken for it.
+A cycle runs from one maximum of spring stress, where V rises through V_0, to the next. The stress
+at one maximum decides that at the next: a return map of one variable, whose fixed point is the
+limit cycle. Where cycles approach it slowly, the motion leaps to the fixed point that the last two
+imply. A cycle is accepted when it repeats the one before to the tolerance; the event that the step
+itself sets off is never taken for it.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
+from rsfstudy.core.accuracy import Accuracy, error_between
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Halt, Meter, Step
 from rsfstudy.core.timeline import OBSERVED, along_path, elapsed, sampled, timed
@@ -33,6 +35,13 @@ LN10 = math.log(10.0)
 _STEADY, _SHRINKING = 1e-3, 30
 #: Displacement in D_c that sets off a motion where the scene has no step.
 _NUDGE = 0.1
+#: Part of their distance to the limit that cycles keep each time: above the first they are leapt
+#: ahead of, above the second they approach none.
+_SLOW_APPROACH, _DIVERGES = 0.03, 0.98
+#: Longest leap, as a part of the swing of ln V.
+_NEAR = 0.1
+#: Relative accuracy with which a limit cycle is looked for, before it is followed as asked.
+_LOW = 1e-4
 
 _HEADLINES = (
     "recurrence_interval",
@@ -60,8 +69,8 @@ class Cycle:
     landed, rested : Point
         Where friction balances the spring again below V_0 after the rupture, and at the slowest
         slip rate.
-    end : tuple of float
-        Spring stress and state (f, Psi) at the maximum that ends the cycle.
+    begin, end : tuple of float
+        Spring stress and state (f, Psi) at the maxima that begin and end the cycle.
     """
 
     interval: float
@@ -73,7 +82,13 @@ class Cycle:
     fastest: float
     landed: Point
     rested: Point
+    begin: tuple[float, float]
     end: tuple[float, float]
+
+    @property
+    def swing(self) -> float:
+        """How far ln V swings."""
+        return self.fastest - self.slowest
 
     def numbers(self) -> np.ndarray:
         """The headline numbers, in the order of their names."""
@@ -129,71 +144,171 @@ class LimitCycle(Measure):
         return 15_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow events until one repeats; go round once more to record it and once loosely for its
-        error.
+        """Follow events until one repeats, then go round once more with smaller tolerances: for the
+        error, and to record the orbit.
         """
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
             # steady sliding left alone never leaves its steady state, stable or not
             scene = scene.with_(load_velocity_ratio=1.0, displacement_step=_NUDGE)
-        count, last, spent = 0, None, meter.spent
-        change: np.ndarray | None = None
-        for cycle in cycles(scene, accuracy, meter, None):
-            if cycle is None or count >= self.events:
-                break
-            count += 1
-            if last is not None:
-                before, change = change, np.abs(cycle.numbers() - last.numbers())
-                if (change <= accuracy.rtol * np.abs(cycle.numbers())).all():
-                    work, left = meter.spent - spent, _still_to_come(change, before)
-                    return self._recorded(scene, cycle, left, count, work, accuracy, meter)
-            last, spent = cycle, meter.spent
-        if count >= self.events:
+        approach = _approach(scene, accuracy, meter, self.events)
+        if approach is None:
+            return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+        cycle = approach.seen[-1]
+        again, rows = _recorded(scene, cycle.end, accuracy.refined(), meter)
+        if again is None:
             return Outcome(
-                Status.WORK_BUDGET_SPENT, message=f"no cycle repeats within {self.events} events"
+                Status.UNVERIFIED,
+                message="with smaller tolerances the motion settles: ask for a smaller rtol",
             )
-        return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
-
-    def _recorded(
-        self,
-        scene: Scene,
-        cycle: Cycle,
-        left: np.ndarray,
-        count: int,
-        work: int,
-        accuracy: Accuracy,
-        meter: Meter,
-    ) -> Outcome:
-        coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
-        again = next(iter(cycles(scene, coarse, meter, cycle.end)))
-        assert again is not None
-        numbers = cycle.numbers()
-        errors = np.abs(again.numbers() - numbers) + left + 0.05 * accuracy.rtol * np.abs(numbers)
         values: dict[str, float | np.ndarray] = {}
-        for name, number, error in zip(_HEADLINES, numbers, errors, strict=True):
-            values[name], values[f"{name}_error"] = float(number), float(error)
-        healed = cycle.rested.imbalance - cycle.landed.imbalance
-        slowed = cycle.rested.log_rate - cycle.landed.log_rate
-        values["slip_per_event"] = scene.load_velocity * cycle.interval
+        both = zip(*map(approach.of_limit_cycle, (cycle, again)), strict=True)
+        for name, (number, refined) in zip(_HEADLINES, both, strict=True):
+            values[name] = float(number)
+            values[f"{name}_error"] = error_between(number, refined, accuracy.rtol)
+        values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
+        values |= _properties(scene, cycle)
+        values["events_until_repeat"] = float(approach.events)
+        values["work_per_cycle"] = float(approach.work)
+        return Outcome(Status.OK, values | along_path(rows, self.phases))
+
+
+def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
+    """What else is told of a cycle."""
+    healed = cycle.rested.imbalance - cycle.landed.imbalance
+    slowed = cycle.rested.log_rate - cycle.landed.log_rate
+    stress = scene.mu_star + cycle.sliding
+    return {
         # d ln(theta)/d ln(V), with Theta = imbalance - b ln V = b ln(theta/theta_*)
-        values["healing_exponent"] = (
-            healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan
-        )
-        stress = scene.mu_star + cycle.sliding
-        values["residual_friction"] = stress / (1.0 + scene.cot_phi * cycle.sliding)
-        values["drop_asymmetry"] = (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest)
-        values["events_until_repeat"], values["work_per_cycle"] = float(count), float(work)
-        orbit = along_path(list(_orbit(scene, cycle.end, accuracy, meter)), self.phases)
-        return Outcome(Status.OK, values | orbit)
+        "healing_exponent": healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan,
+        "residual_friction": stress / (1.0 + scene.cot_phi * cycle.sliding),
+        "drop_asymmetry": (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest),
+    }
 
 
-def _still_to_come(change: np.ndarray, before: np.ndarray | None) -> np.ndarray:
-    """How far the numbers may still be from those of the limit, from their last two changes."""
-    if before is None:
-        return change
-    contraction = min(float(change.max()) / max(float(before.max()), 1e-300), 0.999)
-    return change * max(contraction / (1.0 - contraction), 0.1)
+class Approach:
+    """The way to the limit cycle of a scene, along the map from one maximum of spring stress to the
+    next.
+
+    Attributes
+    ----------
+    seen : list of Cycle
+        The cycles so far; the last is the limit cycle once `follow` has returned true.
+    events, work : int
+        How many cycles it took, and the right-hand sides of the last.
+    """
+
+    def __init__(self, scene: Scene, accuracy: Accuracy, after: Approach | None = None) -> None:
+        self._scene, self._accuracy = scene, accuracy
+        self.seen: list[Cycle] = []
+        self.events: int = after.events if after else 0
+        self.work = 0
+        self._start = after.fixed_point() if after else None
+        #: Derivatives of the stress at the next maximum, and of the numbers of a cycle, with
+        #: respect to the stress at its beginning.
+        self._known: bool = after is not None and after._known
+        self._return: float = after._return if after else 0.0
+        self._slopes: np.ndarray = after._slopes if after else np.zeros(len(_HEADLINES))
+
+    def follow(self, meter: Meter, events: int) -> bool:
+        """Follow cycles until one is the limit cycle; false where the motion settles to steady
+        sliding.
+
+        Raises
+        ------
+        Halt
+            With `work_budget_spent` where none is within so many events.
+        """
+        while True:
+            spent = meter.spent
+            for cycle in cycles(self._scene, self._accuracy, meter, self._start):
+                if cycle is None:
+                    return False
+                self.work, spent = meter.spent - spent, meter.spent
+                self.events += 1
+                self.seen.append(cycle)
+                self._learn()
+                if self._repeats():
+                    return True
+                if self.events >= events:
+                    text = f"no cycle repeats within {events} events"
+                    raise Halt(Status.WORK_BUDGET_SPENT, text)
+                if self._may_leap():
+                    self._start = self.fixed_point()
+                    break
+
+    def of_limit_cycle(self, cycle: Cycle) -> np.ndarray:
+        """Numbers of the limit cycle that a cycle close to it implies."""
+        return cycle.numbers() + self._slopes * self._ahead(cycle)
+
+    def fixed_point(self) -> tuple[float, float]:
+        """Where the limit cycle begins, as the last cycle implies: spring stress and state."""
+        cycle = self.seen[-1]
+        moves = cycle.end[0] - cycle.begin[0]
+        stride = self._ahead(cycle) / moves if moves else 0.0
+        spring, psi = (x + stride * (y - x) for x, y in zip(cycle.begin, cycle.end, strict=True))
+        return spring, psi
+
+    def _ahead(self, cycle: Cycle) -> float:
+        """Stress from the beginning of a cycle to that of the limit cycle."""
+        return (cycle.end[0] - cycle.begin[0]) / (1.0 - min(self._return, _DIVERGES))
+
+    def _learn(self) -> None:
+        """Take the derivatives from the last two cycles, as long as numerical errors allow."""
+        if len(self.seen) < 2:
+            return
+        before, now = self.seen[-2:]
+        apart = now.begin[0] - before.begin[0]
+        noise = self._accuracy.solver * self._scene.a
+        if abs(apart) > (1000.0 if self._known else 1.0) * noise:
+            self._known = True
+            self._return = (now.end[0] - before.end[0]) / apart
+            self._slopes = (now.numbers() - before.numbers()) / apart
+
+    def _repeats(self) -> bool:
+        """Whether the next cycles would all be the same: as the derivatives say, or because the
+        last two are.
+        """
+        cycle = self.seen[-1]
+        allowed = 0.3 * self._accuracy.rtol * np.abs(cycle.numbers())
+        if self._known and self._return < _DIVERGES:
+            to_come = np.abs(self._slopes * self._ahead(cycle))
+            if (to_come <= allowed).all():
+                return True
+        if len(self.seen) < 2 or self.seen[-2].end != cycle.begin:
+            return False
+        change = np.abs(cycle.numbers() - self.seen[-2].numbers())
+        left = min(max(self._return, 0.0), _DIVERGES)
+        return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
+
+    def _may_leap(self) -> bool:
+        """Whether to leap to the fixed point: not where the next cycle comes as close, nor where
+        that is far, because the swings may be headed for steady sliding.
+        """
+        cycle = self.seen[-1]
+        noise = self._accuracy.solver * self._scene.a
+        still = abs(cycle.end[0] - cycle.begin[0]) < 10.0 * noise
+        if still or not _SLOW_APPROACH < self._return < _DIVERGES:
+            return False
+        slowest, fastest = (self._slopes * self._ahead(cycle))[-2:] * LN10
+        return bool(abs(fastest - slowest) < _NEAR * cycle.swing)
+
+
+def _approach(scene: Scene, accuracy: Accuracy, meter: Meter, events: int) -> Approach | None:
+    """The way to the limit cycle, most of it at a low accuracy; None where the motion settles."""
+    if accuracy.rtol < _LOW:
+        low = Approach(scene, replace(accuracy, rtol=_LOW))
+        try:
+            if low.follow(meter, events):
+                approach = Approach(scene, accuracy, after=low)
+                if approach.follow(meter, events):
+                    return approach
+        except Halt as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+    approach = Approach(scene, accuracy)
+    return approach if approach.follow(meter, events) else None
 
 
 def cycles(
@@ -204,12 +319,12 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch = _Watch(scene, started=start is not None)
+    watch = _Watch(scene, start)
     swings: list[float] = []
     for step, now in timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
         cycle = watch.see(step, now)
         if cycle is not None:
-            swings.append(cycle.fastest - cycle.slowest)
+            swings.append(cycle.swing)
             if swings[-1] < _STEADY or (settles(scene) and _dies_down(swings)):
                 yield None
                 return
@@ -235,11 +350,13 @@ def _dies_down(swings: list[float]) -> bool:
 class _Watch:
     """Sees steps go by and puts cycles together."""
 
-    def __init__(self, scene: Scene, *, started: bool) -> None:
+    def __init__(self, scene: Scene, start: tuple[float, float] | None) -> None:
         self._scene = scene
+        started = start is not None
         self._started = started
         self._fallen = not started
         self._begun = 0.0
+        self._begin = start
         self._clear()
         self._farthest = 0.0
 
@@ -267,6 +384,7 @@ class _Watch:
         now = begin + elapsed(self._scene, step, clock)
         cycle = self._complete(turning, now) if self._started else None
         self._started, self._begun, self._fallen = True, now, False
+        self._begin = (turning.spring, turning.psi)
         self._clear()
         self._extremes(step.after)
         return cycle
@@ -286,6 +404,7 @@ class _Watch:
         assert self._arrested is not None
         assert self._rested is not None
         assert self._fastest is not None
+        assert self._begin is not None
         return Cycle(
             interval=now - self._begun,
             highest=turning.spring,
@@ -296,6 +415,7 @@ class _Watch:
             fastest=self._fastest.log_rate,
             landed=self._landed or self._rested,
             rested=self._rested,
+            begin=self._begin,
             end=(turning.spring, turning.psi),
         )
 
@@ -307,18 +427,16 @@ class _Watch:
         return away < 1e-6 * self._farthest
 
 
-def _orbit(
+def _recorded(
     scene: Scene, start: tuple[float, float], accuracy: Accuracy, meter: Meter
-) -> Iterator[tuple[float, ...]]:
-    """What is observed along one cycle, from the maximum of spring stress on."""
-    load, risen = scene.log_load_rate, False
-    moving = motion(scene, accuracy, meter, start=start, clock=True)
-    for step, begin in timed(scene, moving):
-        ends = risen and step.before.log_rate < load <= step.after.log_rate
-        if ends:
-            step = step.until(step.locate(lambda point: point.log_rate - load))
-        yield from sampled(scene, step, begin, start[0])
-        risen = risen or step.after.log_rate < load
-        if ends:
-            return
+) -> tuple[Cycle | None, list[tuple[float, ...]]]:
+    """One cycle, and what is observed along it; no cycle where the motion settles instead."""
+    watch, rows = _Watch(scene, start), list[tuple[float, ...]]()
+    for step, begin in timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
+        cycle = watch.see(step, begin)
+        if cycle is not None:
+            step = step.until(step.locate(lambda point: point.log_rate - scene.log_load_rate))
+        rows += sampled(scene, step, begin, start[0])
+        if cycle is not None or watch.at_rest(step):
+            return cycle, rows
     raise Halt(Status.INTEGRATION_FAILED, "a motion ended by itself")

@@ -15,7 +15,11 @@ from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
 from rsfstudy.equations import log_rate_at, radiated, strength_of
 from rsfstudy.measures.swing import swing
-from rsfstudy.measures.touching import displacement_on_path, rate_step_misfit
+from rsfstudy.measures.touching import (
+    cycle_misfit,
+    displacement_on_path,
+    rate_step_misfit,
+)
 from rsfstudy.scene import Scene
 
 #: Smallest step the search tries, and slowest load point velocity over V_* it goes down to.
@@ -29,6 +33,8 @@ _MOST_CORRECTIONS = 8
 _LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
 #: Strides without a critical path on either side after which shooting is given up.
 _GIVE_UP = 3
+#: How much farther in ln V a displacement step may jump where mass delays the rise of slip rate.
+_RISE_OF_MASS = 5.0
 
 
 class Steps:
@@ -84,6 +90,18 @@ class Steps:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
+    def sizes_of_cycle(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Size of the step after which the motion ends in a limit cycle that touches the norm, by
+        each local tolerance; None where there is none.
+        """
+        return None
+
+    def mass_delays(self, size: float, rtol: float) -> bool:
+        """Whether the critical size is not that of the critical path's start, because slip rate
+        takes time to rise to that after the step.
+        """
+        return False
+
     def _largest(self) -> float:
         raise TypeError(f"{type(self).__name__} steps nothing")
 
@@ -105,27 +123,44 @@ class RateSteps(Steps):
     def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
         """Shoot: find the V_0 whose critical path comes from the state before the step.
 
-        A loose root and its slope come first; the slope then serves Newton's method at the tighter
-        tolerances, which costs them one or two paths each.
+        A loose root and its slope come first; from there the tighter tolerances take one to three
+        paths each.
         """
         loose = self._loose_root(meter)
         if loose is None:
             return None
         log_size, slope = loose
-        sizes = []
-        for tolerance in tolerances:
-            for _ in range(_MOST_CORRECTIONS):
-                misfit = rate_step_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
-                if misfit is None:
-                    return None
-                correction = misfit / slope
-                log_size -= correction
-                if abs(correction) < 30.0 * tolerance:
-                    break
-            else:
-                return None
-            sizes.append(math.exp(log_size))
-        return sizes
+        return _refined(
+            log_size,
+            slope,
+            tolerances,
+            lambda size, tolerance: rate_step_misfit(self.scene_at(size), tolerance, meter),
+        )
+
+    def sizes_of_cycle(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Find the V_0 whose limit cycle touches the norm, from one orbit each: the smallest step
+        after which that orbit stops shrinking.
+        """
+
+        def misfit(log_size: float, tolerance: float = _LOOSE) -> float:
+            found = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
+            return math.nan if found is None else found
+
+        stride = math.log(1.5)
+        smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
+        before = misfit(smaller)
+        while larger <= math.log(self.largest):
+            now = misfit(larger)
+            if before < 0.0 <= now:
+                root, slope = _root(misfit, smaller, larger)
+                return _refined(
+                    root,
+                    slope,
+                    tolerances,
+                    lambda size, tolerance: misfit(math.log(size), tolerance),
+                )
+            smaller, larger, before = larger, larger + stride, now
+        return None
 
     def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
         """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
@@ -142,11 +177,7 @@ class RateSteps(Steps):
             return math.nan if found is None else found
 
         bracket = self._bracket(misfit)
-        if bracket is None:
-            return None
-        root = float(brentq(misfit, *bracket, xtol=1e-4))
-        slope = (misfit(root + _NEAR) - misfit(root - _NEAR)) / (2.0 * _NEAR)
-        return (root, slope) if math.isfinite(slope) and slope != 0.0 else None
+        return None if bracket is None else _root(misfit, *bracket)
 
     def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
         """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
@@ -217,6 +248,17 @@ class DisplacementSteps(Steps):
     def error(self, size: float, relative_error: float) -> float:
         return size * relative_error
 
+    def mass_delays(self, size: float, rtol: float) -> bool:
+        """The slider falls behind by less than (K/a) w**2 of slip, w the norm just after the step.
+        That is a delay on the same path, but for what the load point moves meanwhile.
+        """
+        scene = self.scene_at(size)
+        if not scene.inertia:
+            return False
+        rate = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
+        behind = scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2
+        return behind * scene.load_velocity / rate > 0.1 * rtol * size
+
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13)."""
 
@@ -240,8 +282,8 @@ class DisplacementSteps(Steps):
         return sizes
 
     def _largest(self) -> float:
-        """Up: the step that itself takes the slip rate to the norm. Down: the step that ends shear
-        stress.
+        """Up: the step that itself takes the slip rate to the norm, and somewhat farther with mass,
+        because slip rate rises to that while stress relaxes. Down: the step that ends shear stress.
         """
         scene = self.scene
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
@@ -249,7 +291,8 @@ class DisplacementSteps(Steps):
         if self.sign < 0:
             limit = scene.mu_star
             return (min(limit, 1.0 / scene.cot_phi) if scene.cot_phi else limit) / scene.stiffness
-        strength, norm = strength_of(scene), scene.a * scene.log_norm_rate
+        farther = _RISE_OF_MASS if scene.inertia else 0.0
+        strength, norm = strength_of(scene), scene.a * (scene.log_norm_rate + farther)
         reach = norm
         while strength(reach)[0] < norm and reach < 1e6:
             reach *= 2.0
@@ -258,3 +301,40 @@ class DisplacementSteps(Steps):
         self.jumps_to_norm = True
         friction = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
         return (friction + radiated(scene, scene.log_norm_rate)) / scene.stiffness
+
+
+def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, float]:
+    """Log size at which a misfit vanishes, and its slope there."""
+    root = float(brentq(misfit, *bracket, xtol=1e-4))
+    return root, (misfit(root + _NEAR) - misfit(root - _NEAR)) / (2.0 * _NEAR)
+
+
+def _refined(
+    log_size: float,
+    slope: float,
+    tolerances: Sequence[float],
+    misfit: Callable[[float, float], float | None],
+) -> list[float] | None:
+    """Sizes at which a misfit vanishes, by each local tolerance, from a loose root and its slope,
+    by the secant method; None where it leads nowhere.
+    """
+    if not math.isfinite(slope) or slope == 0.0:
+        return None
+    sizes = []
+    for tolerance in tolerances:
+        before: tuple[float, float] | None = None
+        for _ in range(_MOST_CORRECTIONS):
+            # the error of V_0 itself is that of its logarithm times V_0
+            value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
+            if value is None or not math.isfinite(value):
+                return None
+            if before is not None and value != before[1]:
+                slope = (value - before[1]) / (log_size - before[0])
+            before = log_size, value
+            log_size -= value / slope
+            if min(abs(value), abs(value / slope)) < 30.0 * tolerance:
+                break
+        else:
+            return None
+        sizes.append(math.exp(log_size))
+    return sizes

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
+from rsfstudy.core.accuracy import Accuracy, error_between
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Meter
 from rsfstudy.core.timeline import OBSERVED, along_path, sampled, timed
@@ -72,18 +72,13 @@ class StepResponse(Measure):
         return 10_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion, and once more at a looser tolerance for the error of its peaks."""
+        """Follow the motion, and once more with smaller tolerances for the error of its peaks."""
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
             return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
         peaks, rows = self._follow(scene, accuracy, meter)
-        coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
-        again, _rows = self._follow(scene, coarse, meter)
-        common = min(len(peaks), len(again))
-        errors = np.abs(peaks[:common] - again[:common]) + 0.05 * accuracy.rtol * np.abs(
-            peaks[:common]
-        )
+        again, _rows = self._follow(scene, accuracy.refined(), meter)
         heights = peaks - scene.log_load_rate / LN10
         found = np.full(self.peaks, np.nan)
         found[: len(peaks)] = peaks
@@ -91,7 +86,7 @@ class StepResponse(Measure):
             Status.OK,
             {
                 "max_log10_slip_rate": float(peaks.max()),
-                "max_log10_slip_rate_error": float(errors[peaks[:common].argmax()]),
+                "max_log10_slip_rate_error": error_between(peaks.max(), again.max(), accuracy.rtol),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": found,
                 **along_path(rows, self.phases),

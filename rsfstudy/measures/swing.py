@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rsfstudy import steady_state
 from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.motion import check_start, motion
+from rsfstudy.core.motion import check_start, mass_acts, motion
 from rsfstudy.core.stepping import Halt, Meter, Step, steps
 from rsfstudy.effects import radiation_damping
 from rsfstudy.equations import radiated, strength_of, without_mass
+from rsfstudy.measures.touching import cycle_misfit
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
+#: Part of the critical stiffness below it that no motion can tell from none.
+_NEUTRAL = 1e-9
 #: Swings this small follow linear theory.
 _LINEAR = 0.05
 #: Factor from one orbit to the next larger one when growth is slow; limit cycles closer together
@@ -34,8 +37,8 @@ class Swing:
         Whether the slip rate reaches the instability norm.
     excess : float
         Positive where it does, negative where not; continuous across the boundary as far as the
-        motion allows: the peak's distance in ln V from the norm with mass, the growth from one peak
-        to the next without.
+        motion allows: the peak's distance in ln V from the norm where mass acts, the growth from
+        one peak to the next where it does not.
     """
 
     reached: bool
@@ -58,18 +61,19 @@ class _Steady:
 
     @property
     def stable(self) -> bool:
-        return self.margin >= 0.0
+        return self.margin >= -_NEUTRAL
 
 
 @dataclass(frozen=True)
 class _Orbit:
-    """One orbit: its peaks of ln V, whether it reached the norm, and where it grows too slowly to
-    follow.
+    """One orbit: its peaks of ln V, whether it reached the norm, where it grows too slowly to
+    follow, and ln V at its beginning where it slows down from there.
     """
 
     peaks: tuple[float, ...]
     reached: bool
     slow_growth_at: State | None = None
+    top_at_start: float = -math.inf
 
 
 def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
@@ -90,17 +94,17 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     if scene.log_load_rate == -math.inf:
         return _held(scene, accuracy, meter)
     steady = _steady(scene)
-    norm = scene.log_norm_rate
+    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     damped = scene.radiation_damping > 0.0
     if scene.normal_stress == "constant" and abs(steady.margin) < accuracy.rtol and not damped:
         top = _top_of_closed_orbit(scene, accuracy, meter)
-        if not scene.inertia or top < min(norm, -math.log(scene.inertial_time) - 7.0):
+        if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return Swing(top >= norm, top - norm)
     first = _orbit(scene, steady, None, accuracy, meter)
     reached = first.reached
     if first.slow_growth_at is not None:
         reached = _grows_to_the_norm(scene, steady, first.slow_growth_at, accuracy, meter)
-    excess = _excess(first.peaks, norm, with_mass=scene.inertia)
+    excess = _excess(first, norm, heavy=heavy)
     return Swing(reached, max(excess, 1e-12) if reached else min(excess, -1e-12))
 
 
@@ -108,18 +112,41 @@ def settles(scene: Scene) -> bool:
     """Whether steady sliding at the scene's load point velocity is linearly stable; a held load
     point is.
     """
-    return scene.log_load_rate == -math.inf or _steady(scene).stable
+    return stability_margin(scene) >= -_NEUTRAL
+
+
+def stability_margin(scene: Scene) -> float:
+    """By how much stiffness exceeds the critical one at the scene's load point velocity, over that;
+    infinite where every stiffness is stable.
+    """
+    return math.inf if scene.log_load_rate == -math.inf else _steady(scene).margin
 
 
 def _held(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     """With the load point at rest: up to the only peak."""
-    norm = scene.log_norm_rate
-    top = -math.inf
-    for step in motion(scene, accuracy, meter):
-        top = max(top, _highest(step))
-        if step.after.growth < 0.0 or (top >= norm and not scene.inertia):
+    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
+    for step, top in _tops(motion(scene, accuracy, meter), from_start=True):
+        highest = step.after.log_rate if top is None else top
+        if top is not None or (highest >= norm and not heavy):
             break
-    return Swing(top >= norm, top - norm if scene.inertia else math.copysign(1.0, top - norm))
+    return Swing(highest >= norm, highest - norm if heavy else math.copysign(1.0, highest - norm))
+
+
+def _tops(moving: Iterator[Step], *, from_start: bool) -> Iterator[tuple[Step, float | None]]:
+    """Steps of a motion, each with the maximum of ln V that it passes or begins at.
+
+    A motion may peak between two regimes; and where it slows down from its start, it peaked there:
+    with mass, slip rate rises to that within the inertial time.
+    """
+    rising, latest = from_start, -math.inf
+    for step in moving:
+        top = None
+        if step.before.growth > 0.0 >= step.after.growth:
+            top = step.point_at(step.locate(lambda point: point.growth)).log_rate
+        elif rising and step.before.growth <= 0.0:
+            top = max(latest, step.before.log_rate)
+        yield step, top
+        rising, latest = step.after.growth > 0.0, step.after.log_rate
 
 
 def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
@@ -145,6 +172,14 @@ def _first_peak(path: Iterable[Step], enough: float) -> float:
     raise AssertionError("steps() never ends by itself")
 
 
+def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
+    """Whether the orbit that touches the norm peaks lower the next time: paths cannot cross, so
+    that none inside of it ever reaches the norm.
+    """
+    misfit = cycle_misfit(scene, accuracy.solver, meter)
+    return misfit is not None and misfit < -100.0 * accuracy.solver
+
+
 def _grows_to_the_norm(
     scene: Scene, steady: _Steady, at: State, accuracy: Accuracy, meter: Meter
 ) -> bool:
@@ -152,6 +187,8 @@ def _grows_to_the_norm(
 
     An orbit counts as grown to the norm only if its first peak was below it.
     """
+    if not mass_acts(scene, accuracy) and _shrinks_at_the_norm(scene, accuracy, meter):
+        return False
     leap = _LEAP
     while True:
         beyond = (
@@ -174,11 +211,17 @@ def _orbit(
     follow.
     """
     norm, slack = scene.log_norm_rate, 100.0 * accuracy.solver
+    heavy = mass_acts(scene, accuracy)
     peaks: list[float] = []
-    farthest = 0.0
-    for step in motion(scene, accuracy, meter, start=start):
-        if step.before.growth > 0.0 >= step.after.growth:
-            peaks.append(_highest(step))
+    farthest, at_start = 0.0, -math.inf
+    for step, top in _tops(motion(scene, accuracy, meter, start=start), from_start=start is None):
+        if top is not None and step.before.growth <= 0.0 and not peaks and farthest == 0.0:
+            # no peak of an orbit to compare others with
+            at_start = top
+            if top >= norm:
+                return _Orbit((), reached=True, top_at_start=top)
+        elif top is not None:
+            peaks.append(top)
             if peaks[-1] >= norm:
                 return _Orbit(tuple(peaks), reached=True)
             if len(peaks) > 1:
@@ -190,29 +233,23 @@ def _orbit(
                 slow = growth < 0.2 * (norm - peaks[-1])
                 if slow and not steady.stable and step.equations.regime != "inertial":
                     return _Orbit(tuple(peaks), False, (step.after.spring, step.after.psi))
-        elif step.after.log_rate >= norm and not scene.inertia:
+        elif step.after.log_rate >= norm and not heavy:
             return _Orbit((*peaks, step.after.log_rate), reached=True)
         away = max(abs(step.after.log_rate - steady.log_rate), abs(step.after.imbalance) / scene.b)
         farthest = max(farthest, away)
         if steady.stable and away < 1e-3 * farthest:
-            return _Orbit(tuple(peaks), reached=False)
+            return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
     raise AssertionError("a motion never ends by itself")
 
 
-def _highest(step: Step) -> float:
-    """Highest ln V within a step."""
-    if step.before.growth > 0.0 >= step.after.growth:
-        return step.point_at(step.locate(lambda point: point.growth)).log_rate
-    return max(step.before.log_rate, step.after.log_rate)
-
-
-def _excess(peaks: tuple[float, ...], norm: float, *, with_mass: bool) -> float:
-    """What changes sign at the boundary, as far as these peaks show it."""
-    if with_mass:
-        return max(peaks, default=-math.inf) - norm if peaks else -norm
-    if len(peaks) > 1:
-        return peaks[1] - peaks[0]
-    return peaks[0] - norm if peaks else -1.0
+def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
+    """What changes sign at the boundary, as far as this orbit shows it."""
+    if heavy:
+        highest = max((orbit.top_at_start, *orbit.peaks))
+        return highest - norm if highest > -math.inf else -norm
+    if len(orbit.peaks) > 1:
+        return orbit.peaks[1] - orbit.peaks[0]
+    return orbit.peaks[0] - norm if orbit.peaks else -1.0
 
 
 def _steady(scene: Scene) -> _Steady:
@@ -231,6 +268,12 @@ def _steady(scene: Scene) -> _Steady:
     critical = radiation_damping.critical_stiffness(
         critical, scene.radiation_damping * math.exp(load), mu_ss, scene.alpha or 0.0, cot_phi
     )
+    if scene.inertia:
+        sigma_ss = steady_state.steady_normal_stress(mu_ss, scene.mu_star, cot_phi)
+        norm = scene.inertial_time * math.exp(load)
+        critical *= 1.0 + steady_state.rise_by_mass(
+            critical, norm, mu_ss, sigma_ss, scene.a, cot_phi
+        )
     return _Steady(
         load,
         friction + radiated(scene, load),

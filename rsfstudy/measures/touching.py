@@ -1,9 +1,12 @@
-"""The critical path without mass, followed back from where it touches the instability norm.
+"""The critical path, followed back from where it touches the instability norm.
 
 At the touching point ln V is at the norm and stationary, which leaves one scalar equation for the
 stress. From there the path is integrated against time. Its neighbours converge on it in that
 direction, so a few short integrations of moderate tolerance give many digits, where following
 motions forward would amplify every error.
+
+Two unknowns suffice as long as the norm is a slip rate at which mass hardly acts; it does not act
+at all where ln V is stationary.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.equations import Point, log_rate_at, radiated, strength_of, without_mass
+from rsfstudy.equations import Point, between_ruptures, log_rate_at, radiated, strength_of
 from rsfstudy.laws import evolution_of
 from rsfstudy.scene import Scene
 
@@ -60,7 +63,6 @@ def start_of_path(
     Parameters
     ----------
     scene : Scene
-        Without mass.
     tolerance : float
         Local error per step.
     meter : Meter
@@ -78,10 +80,11 @@ def start_of_path(
     start = touching_point(scene)
     if start is None:
         return None
-    # work of an eighth-order method
-    path = Meter(round(_PATH_BUDGET * (1e-5 / tolerance) ** 0.125), meter.methods)
+    path = _path_meter(tolerance, meter)
     try:
-        backward = steps(without_mass(scene, clock=False), start, tolerance, path, backward=True)
+        backward = steps(
+            between_ruptures(scene, clock=False), start, tolerance, path, backward=True
+        )
         for number, step in enumerate(backward):
             if number == 0 and step.after.log_rate > step.before.log_rate:
                 return None
@@ -98,6 +101,12 @@ def start_of_path(
     raise AssertionError("steps() never ends by itself")
 
 
+def _path_meter(tolerance: float, meter: Meter) -> Meter:
+    """A meter for one path by a method of order eight, which gets no more than what is left."""
+    enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
+    return Meter(min(enough, meter.budget - meter.spent), meter.methods)
+
+
 def _crossing(step: Step, crosses: Callable[[Point], float]) -> Point | None:
     if crosses(step.before) * crosses(step.after) > 0.0:
         return None
@@ -112,7 +121,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
     """
     spring = scene.spring_stress_step
     begin = log_rate_at(scene, spring, 0.0)
-    rates = without_mass(scene, clock=False)
+    rates = between_ruptures(scene, clock=False)
     growth = rates.point((spring, 0.0), rates.rate(0.0, (spring, 0.0))).growth
     if growth == 0.0:
         return None
@@ -120,10 +129,35 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
         scene,
         tolerance,
         meter,
-        lambda point: point.log_rate - begin,
+        lambda point: log_rate_at(scene, point.spring, point.psi) - begin,
         lambda point: point.growth * growth > 0.0,
     )
     return None if found is None else found.psi / scene.a
+
+
+def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
+    """How much higher in ln V than the norm the motion peaks one orbit after it has touched the
+    norm; zero where a limit cycle touches it.
+
+    None where the motion does not come back.
+    """
+    start = touching_point(scene)
+    if start is None:
+        return None
+    path = _path_meter(tolerance, meter)
+    fallen = False
+    try:
+        for step in steps(between_ruptures(scene, clock=False), start, tolerance, path):
+            if fallen and step.before.growth > 0.0 >= step.after.growth:
+                top = step.point_at(step.locate(lambda point: point.growth))
+                return top.log_rate - scene.log_norm_rate
+            fallen = fallen or step.after.log_rate < scene.log_load_rate
+    except Halt:
+        return None
+    finally:
+        for regime, spent in path.by_regime.items():
+            meter.charge(regime, spent)
+    raise AssertionError("steps() never ends by itself")
 
 
 def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int) -> float | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.core.accuracy import LOOSEST_RTOL, Accuracy
+from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import Meter
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.swing import swing
@@ -18,8 +18,8 @@ from rsfstudy.status import Status
 class Triggered(Measure):
     """1 where the motion after the step reaches the instability norm, 0 where it never does.
 
-    `unverified` where a ten times looser tolerance gives the other answer, or where stiffness is
-    critical to within that tolerance.
+    `unverified` where ten times smaller tolerances give the other answer, or where stiffness is
+    critical to within ten times the accuracy.
     """
 
     name: ClassVar[str] = "triggered"
@@ -45,11 +45,11 @@ class Triggered(Measure):
             )
         if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
-        coarse = replace(accuracy, rtol=min(10.0 * accuracy.rtol, LOOSEST_RTOL))
-        answer, again = (swing(scene, tight, meter).reached for tight in (accuracy, coarse))
+        accuracies = accuracy, accuracy.refined()
+        answer, again = (swing(scene, asked, meter).reached for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
         neutral = scene.normal_stress == "constant" and (
-            0.0 < abs(scene.stiffness_ratio - 1.0) < coarse.rtol
+            0.0 < abs(scene.stiffness_ratio - 1.0) < 10.0 * accuracy.rtol
         )
         if answer != again or neutral:
             return Outcome(
