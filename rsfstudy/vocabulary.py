@@ -344,6 +344,18 @@ _QUANTITIES = (
     Quantity("unknowns", "", "1", "unknowns of the equations between ruptures"),
     Quantity("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
     Quantity("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
+    Quantity(
+        "evaluation_cost",
+        "",
+        "1",
+        "time of a right-hand side between ruptures over one in the plainest scene",
+    ),
+    Quantity(
+        "evaluation_cost_in_rupture",
+        "",
+        "1",
+        "time of a right-hand side where mass acts over one in the plainest scene",
+    ),
     Quantity("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
     Quantity(
         "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
@@ -406,6 +418,8 @@ MEASURED_TIMES = (
     "run_time",
     "relative_time",
     "cheapest_default_time",
+    "evaluation_cost",
+    "evaluation_cost_in_rupture",
     "time_per_evaluation",
     "time_per_evaluation_in_rupture",
 )
