@@ -79,8 +79,8 @@ def run(
     command : str
         What to note in the history.
     **overrides
-        Other axis values (``b_over_a=[2, 3]``), other fixed values (``stiffness_ratio=1.1``), or,
-        for a fixed value, a list that makes it an axis.
+        Other axis values (``b_over_a=[2, 3]``), other fixed values of the scene or of the measure
+        (``stiffness_ratio=1.1``), or, for a fixed value, a list that makes it an axis.
 
     Returns
     -------
@@ -354,5 +354,5 @@ def cell(
     now = provenance.fingerprint(declared)
     for name, (then, ours) in differences(fingerprint_of(results), now).items():
         warnings.warn(f"{name}: {then} then, {ours} now", stacklevel=2)
-    scene = declared.scene(number)
-    return scene, declared.measure(scene, declared.accuracy)
+    scene, changes = declared.cell(number)
+    return scene, declared.measure.with_(**changes)(scene, declared.accuracy)

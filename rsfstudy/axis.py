@@ -13,7 +13,6 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import is_name
-from rsfstudy.scene import FIELDS, unknown_field
 
 Row = Mapping[str, Any]
 
@@ -25,7 +24,8 @@ class Axis:
     Parameters
     ----------
     dimension : str
-        Name of the dimension; for a plain axis the field of the scene it varies.
+        Name of the dimension; for a plain axis the field it varies, of the scene or of the measure
+        (of the scene where both have one of that name).
     values : sequence, or mapping of str to mapping
         The values of that field; or, for a zipped axis, a label for each point and the fields set
         there, as in ``{"constant": {"normal_stress": "constant"}, ...}``.
@@ -33,7 +33,7 @@ class Axis:
     Raises
     ------
     InvalidValue
-        For an axis that is empty, repeats a value, holds a non-finite one or names no field.
+        For an axis that is empty, repeats a value or holds a non-finite one.
     """
 
     dimension: str
@@ -50,8 +50,6 @@ class Axis:
         if isinstance(values, Mapping):
             labels, rows = tuple(values), _rows(dimension, values)
         else:
-            if dimension not in FIELDS:
-                raise unknown_field(dimension)
             listed = [values] if isinstance(values, str) else values
             if not is_list(listed):
                 raise InvalidValue(dimension, values, "must be a list of values")
@@ -68,10 +66,10 @@ class Axis:
             raise InvalidValue("axis", self.dimension, "has no values")
         for row in self.rows:
             for name, value in row.items():
-                if name not in FIELDS:
-                    raise unknown_field(name)
                 if not isinstance(value, float | str | bool | None):
                     raise InvalidValue(name, value, "must be a number, a flag or a text")
+                if isinstance(value, str):
+                    check_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
                     raise InvalidValue(self.dimension, value, "must be finite")
         seen: set[frozenset[tuple[str, Any]]] = set()
@@ -84,7 +82,7 @@ class Axis:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Fields of the scene that vary along the axis."""
+        """Fields of the scene or of the measure that vary along the axis."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row))
 
     def __len__(self) -> int:
@@ -103,8 +101,6 @@ class Axis:
 
 def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
-    if dimension in FIELDS:
-        raise InvalidValue("axis", dimension, "is a field: a zipped axis needs a name of its own")
     for label, row in points.items():
         check_text(dimension, label)
         if not label:

@@ -23,8 +23,8 @@ from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.journal import Finished
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
 from rsfstudy.status import Status
+from rsfstudy.study import Cell
 
 #: Time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0
@@ -38,7 +38,7 @@ _LOOK = 0.5
 _ARM, _GRACE = 1.0, 3.0
 
 #: Cells by their names.
-Batch = Sequence[tuple[bytes, Scene]]
+Batch = Sequence[tuple[bytes, Cell]]
 Found = list[tuple[bytes, Finished]]
 
 
@@ -49,6 +49,7 @@ class Task:
     Parameters
     ----------
     measure : Measure
+        Each cell says what it changes of its fields.
     accuracy : Accuracy
     time_limit : float
         Time in s a cell may take on a worker. Nothing bounds it in the user's own process.
@@ -78,8 +79,8 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
     """
     found: Found = []
     began = told = time.monotonic()
-    for key, scene in itertools.chain.from_iterable(batches):
-        found.append((key, computed(task, scene, let_through=(KeyboardInterrupt,))))
+    for key, cell in itertools.chain.from_iterable(batches):
+        found.append((key, computed(task, cell, let_through=(KeyboardInterrupt,))))
         now = time.monotonic()
         if now - told > min(_TELL, 0.5 * (told - began)):
             yield found
@@ -157,10 +158,10 @@ def on_worker(sent: bytes, batch: bytes) -> Found:
     found: Found = []
     began = time.monotonic()
     try:
-        for key, scene in pickle.loads(zlib.decompress(batch)):
+        for key, cell in pickle.loads(zlib.decompress(batch)):
             if task.home != _HERE:  # a worker may be a thread of the user's own process
                 _deadlines.set(task.time_limit)
-            found.append((key, computed(task, scene)))
+            found.append((key, computed(task, cell)))
             if time.monotonic() - began > _TELL_DRIVER:
                 break
     finally:
@@ -168,13 +169,11 @@ def on_worker(sent: bytes, batch: bytes) -> Found:
     return found
 
 
-def computed(
-    task: Task, scene: Scene, let_through: tuple[type[BaseException], ...] = ()
-) -> Finished:
+def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()) -> Finished:
     """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
     begin = time.perf_counter()
     try:
-        found = task.measure(scene, task.accuracy)
+        found = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
     except let_through:
         raise
     except BaseException as error:  # a cell may raise SystemExit or CancelledError too

@@ -140,9 +140,9 @@ def verdicts(
 ) -> pd.DataFrame:
     """A table of claims, one row each.
 
-    Claims hold for a study as declared. Where a fixed value of the scene was changed (`overrides`
-    that are no dimension or coordinate along one), they are not applicable; nor are claims on what
-    was reduced along an axis that was changed.
+    Claims hold for a study as declared. Where a fixed value of the scene or of the measure was
+    changed (`overrides` that are no dimension or coordinate along one), they are not applicable;
+    nor are claims on what was reduced along an axis that was changed.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [name for name in overrides if name not in along]

@@ -1,8 +1,8 @@
 """The journal of a study: every finished cell, on disk as soon as it is finished.
 
 An SQLite file beside the results, for one run at a time. A cell is found again by the exact values
-of its scene; everything else that decides its numbers is the journal's fingerprint, and a journal
-with another fingerprint is refused.
+of its scene and of its measure's fields; everything else that decides its numbers is the journal's
+fingerprint, and a journal with another fingerprint is refused.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Journal:
     path : Path or None
         The SQLite file; None keeps them in memory.
     fingerprint : mapping
-        All that decides the numbers of a cell but its scene, as plain data.
+        All that decides the numbers of a cell but what names it, as plain data.
     layout : Layout
         The numbers of a cell.
     fresh : bool

@@ -94,15 +94,19 @@ def coordinates(study: Study) -> dict[Any, Any]:
         if axis.labels is not None:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
+        # an axis bears its own values, even where a first cell has no use for them
+        points = [
+            {**study.measure.plain_fields, **scene.as_dict(), **row}
+            for row, scene in zip(axis.rows, along, strict=True)
+        ]
         for name in axis.fields:
-            # an axis bears its own values, even where a first cell has no use for them
-            pairs = zip(axis.rows, along, strict=True)
-            varied = _array([row.get(name, getattr(scene, name)) for row, scene in pairs])
-            coords[name] = (axis.dimension, varied, _about(name))
+            varied = [point[name] for point in points]
+            coords[name] = (axis.dimension, _array(varied), _about(name, varied[0]))
     for name in FIELDS:
         present = {getattr(scene, name) for scene in sample} - {None}
         if name not in coords and len(present) == 1:
-            coords[name] = ((), _array([present.pop()])[0], _about(name))
+            fixed = present.pop()
+            coords[name] = ((), _array([fixed])[0], _about(name, fixed))
     for name, (source, formula) in DERIVED.items():
         if source in coords:
             dims, values, _attrs = coords[source]
@@ -124,14 +128,15 @@ def _array(values: list[Any]) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _about(name: str) -> dict[str, Any]:
+def _about(name: str, value: Any = None) -> dict[str, Any]:
+    """Attributes of a quantity; of a coordinate whose values are like this one."""
     about = quantity(name)
     attrs: dict[str, Any] = {"long_name": about.long_name}
-    if about.units:
+    if about.units and not isinstance(value, str | bool):
         attrs["units"] = about.units
     if about.scale:
         attrs["scale"] = about.scale
-    if name == "inertia":
+    if isinstance(value, bool):
         attrs |= {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "false true"}
     return attrs
 

@@ -11,17 +11,19 @@ from operator import attrgetter
 
 import numpy as np
 
+from rsfstudy.measures import Measure
 from rsfstudy.scene import FIELDS, Scene
-from rsfstudy.study import Study
+from rsfstudy.study import Cell, Study
 
 _values = attrgetter(*FIELDS)
 _KEY = np.dtype("V16")
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
-def cell_key(scene: Scene) -> bytes:
-    """Name of a cell: a digest of the exact values of its scene."""
-    return hashlib.sha256(repr(_values(scene)).encode()).digest()[: _KEY.itemsize]
+def cell_key(scene: Scene, measure: Measure) -> bytes:
+    """Name of a cell: a digest of the exact values of its scene and of its measure's fields."""
+    values = f"{_values(scene)!r} {measure.plain_fields!r}"
+    return hashlib.sha256(values.encode()).digest()[: _KEY.itemsize]
 
 
 class Plan:
@@ -34,9 +36,9 @@ class Plan:
     Attributes
     ----------
     keys : ndarray of bytes, shape (cells,)
-        Name of each cell; equal scenes share one.
+        Name of each cell; equal ones share one.
     different : ndarray of int
-        The first cell of each different scene.
+        The first of equal cells.
 
     Raises
     ------
@@ -47,16 +49,16 @@ class Plan:
     def __init__(self, study: Study) -> None:
         self.study = study
         names = bytearray()
-        for scene in study.scenes():
-            names += cell_key(scene)
+        for scene, changes in study.cells():
+            names += cell_key(scene, study.measure.with_(**changes))
         self.keys = np.frombuffer(names, dtype=_KEY)
         self.different = np.sort(np.unique(self.keys, return_index=True)[1])
 
-    def batches(self, cells: np.ndarray, size: int) -> Iterator[list[tuple[bytes, Scene]]]:
-        """Cells with their scenes, as many at a time; each batch is made when it is asked for."""
+    def batches(self, cells: np.ndarray, size: int) -> Iterator[list[tuple[bytes, Cell]]]:
+        """Cells by their names, as many at a time; each batch is made when it is asked for."""
         for start in range(0, len(cells), size):
             batch = cells[start : start + size]
-            yield [(self.keys[cell].tobytes(), self.study.scene(int(cell))) for cell in batch]
+            yield [(self.keys[cell].tobytes(), self.study.cell(int(cell))) for cell in batch]
 
 
 def scattered(cells: np.ndarray) -> np.ndarray:

@@ -58,10 +58,11 @@ def code() -> dict[str, str]:
 
 
 def fingerprint(study: Study) -> dict[str, Any]:
-    """All that decides the number of a cell but its scene."""
+    """All that decides the number of a cell but its scene and the plain fields of its measure."""
+    plain = study.measure.plain_fields
     return {
         "study": f"{study.name} version {study.version}",
-        "measure": study.measure.describe(),
+        "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
         "own_code": own_code.digest(type(study.measure)),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,

@@ -29,7 +29,8 @@ def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> St
     ----------
     declaration : mapping
     of_its_own : Study, optional
-        Where to take the measure and the reductions from, if they are not part of rsfstudy.
+        Where to take the measure and the reductions from, if they are not part of rsfstudy; the
+        measure with the plain fields that the declaration states.
 
     Raises
     ------
@@ -44,7 +45,9 @@ def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> St
         if of_its_own is None:
             found, reductions = measure(described[0]), [_reduction(kind) for kind in described[1]]
         else:
-            found, reductions = of_its_own.measure, list(of_its_own.reductions)
+            own = of_its_own.measure
+            stated = {name: described[0][name] for name in own.plain_fields if name in described[0]}
+            found, reductions = own.with_(**stated), list(of_its_own.reductions)
         return Study(
             base=Scene(**parts.pop("base")),
             axes=[Axis(axis["dimension"], axis["values"]) for axis in parts.pop("axes")],

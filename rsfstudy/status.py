@@ -31,6 +31,8 @@ class Status(IntEnum):
     NO_STEP = 13, "the scene has no step to respond to"
     SLIP_STOPPED = 14, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
     STABLE_AT_ANY_STIFFNESS = 12, "radiation damps every perturbation however soft the spring"
+    NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
+    ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"
 
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"

@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,13 @@ from rsfstudy.scene import FIELDS, Scene
 _OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
+
+
+class Cell(NamedTuple):
+    """A scene, and what the axes change of the fields of the study's measure there."""
+
+    scene: Scene
+    changes: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +66,8 @@ class Study:
     Raises
     ------
     InvalidValue
-        For axes that repeat a dimension or vary the same field, and for any cell that makes no
-        meaningful scene.
+        For axes that repeat a dimension, vary the same field, one that nothing has, or one that
+        decides which numbers are measured; and for any cell that makes no meaningful scene.
     """
 
     name: str
@@ -92,6 +99,7 @@ class Study:
         except (TypeError, ValueError) as error:
             raise InvalidValue("overrides", self.overrides, "must be plain data") from error
         self._check_parts()
+        self._check_fields()
         taken: dict[str, str] = {}
         for axis in self.axes:
             for name in {axis.dimension, *axis.fields}:
@@ -130,8 +138,36 @@ class Study:
         taken = {*known, *self.measure.inner_coordinates, *(TAKEN - set(FIELDS))}
         for axis in self.axes:
             self._check_sought(axis.fields)
-            if axis.dimension in taken:
-                raise InvalidValue("axis", axis.dimension, "is the name of something measured")
+            for name in (axis.dimension, *axis.fields):
+                if name in taken:
+                    raise InvalidValue("axis", name, "is the name of something measured")
+
+    def _check_fields(self) -> None:
+        """Refuse axes over fields that nothing has, and over those of the measure that decide
+        which numbers it gives: all cells of a lattice have the same.
+        """
+        known = dict.fromkeys((*FIELDS, *self.measure.plain_fields))
+        for axis in self.axes:
+            if axis.labels is not None and axis.dimension in (*FIELDS, *axis.fields):
+                rule = "is a field: a zipped axis needs a name of its own"
+                raise InvalidValue("axis", axis.dimension, rule)
+            for name in axis.fields:
+                if name not in known:
+                    rule = (
+                        "is not a field of a scene, nor a number, flag or text of the measure "
+                        f"{self.measure.name}"
+                    )
+                    raise InvalidValue("field", name, rule, choices=known)
+        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= set(FIELDS)]
+        given = _given(self.measure)
+        for rows in itertools.product(*varied):
+            measure = self.measure.with_(**self._split(rows)[1])
+            if _given(measure) != given:
+                present = self.measure.plain_fields.items()
+                guilty = [n for n, v in measure.plain_fields.items() if (n, v) not in present]
+                rule = "decides which numbers are measured, which all cells must share"
+                remedy = "Make a study of each value."
+                raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
 
     def _check_sought(self, fields: Sequence[str]) -> None:
         for name in fields:
@@ -155,8 +191,8 @@ class Study:
         """Number of cells."""
         return math.prod(self.shape)
 
-    def scenes(self) -> Iterator[Scene]:
-        """The scene of each cell, in row-major order.
+    def cells(self) -> Iterator[Cell]:
+        """Each cell, in row-major order.
 
         Raises
         ------
@@ -165,23 +201,38 @@ class Study:
         """
         used: set[str] = set()
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
-            scene = self._scene(rows)
-            used |= {name for name in FIELDS if getattr(scene, name) is not None}
-            yield scene
+            cell = self._cell(rows)
+            used |= {name for name in FIELDS if getattr(cell.scene, name) is not None}
+            yield cell
         for axis in self.axes:
             for name in axis.fields:
-                if name not in used:
+                if name in FIELDS and name not in used:
                     raise InvalidValue(axis.dimension, name, "has no effect in any cell")
 
-    def scene(self, cell: int) -> Scene:
-        """The scene of one cell, by its number in row-major order."""
-        places = np.unravel_index(cell, self.shape)
-        return self._scene([axis.rows[i] for axis, i in zip(self.axes, places, strict=True)])
+    def cell(self, number: int) -> Cell:
+        """One cell, by its number in row-major order."""
+        places = np.unravel_index(number, self.shape)
+        return self._cell([axis.rows[i] for axis, i in zip(self.axes, places, strict=True)])
 
-    def _scene(self, rows: Sequence[Row]) -> Scene:
-        fields = self.base.as_dict()
+    def scenes(self) -> Iterator[Scene]:
+        """The scene of each cell, in row-major order; raises as `cells` does."""
+        return (cell.scene for cell in self.cells())
+
+    def scene(self, number: int) -> Scene:
+        """The scene of one cell, by its number in row-major order."""
+        return self.cell(number).scene
+
+    def _split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What rows set of the scene, and of the measure."""
+        split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
-            fields.update(row)
+            for name, value in row.items():
+                split[name not in FIELDS][name] = value
+        return split
+
+    def _cell(self, rows: Sequence[Row]) -> Cell:
+        of_scene, changes = self._split(rows)
+        fields = {**self.base.as_dict(), **of_scene}
         if fields["normal_stress"] == "constant":
             # one row that states both is contradictory, and Scene says so
             stated = next((row for row in rows if "normal_stress" in row), {})
@@ -189,7 +240,7 @@ class Study:
                 if stated.get(name) is None:
                     fields[name] = None
         try:
-            return Scene(**fields)
+            return Cell(Scene(**fields), changes)
         except InvalidValue as error:
             place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
             raise error.at(f"cell {place}") from error
@@ -206,7 +257,8 @@ class Study:
         Raises
         ------
         InvalidValue
-            For a name that is neither an axis nor a field, and for values that make no axis.
+            For a name that is neither an axis nor a field of the scene or of the measure, and for
+            values that make no axis.
         """
         study = self
         for name, value in overrides.items():
@@ -223,17 +275,16 @@ class Study:
             else:
                 continue
             return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-        if name not in FIELDS:
-            raise InvalidValue(
-                "override",
-                name,
-                "is neither an axis nor a field of the scene",
-                choices=dict.fromkeys((*self.dimensions, *FIELDS)),
-            )
+        known = dict.fromkeys((*self.dimensions, *FIELDS, *self.measure.plain_fields))
+        if name not in known:
+            rule = "is neither an axis nor a field of the scene or of the measure"
+            raise InvalidValue("override", name, rule, choices=known)
         self._check_sought([name])
         if is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
-        return replace(self, base=self.base.with_(**{name: plain(value)}))
+        if name in FIELDS:
+            return replace(self, base=self.base.with_(**{name: plain(value)}))
+        return replace(self, measure=self.measure.with_(**{name: plain(value)}))
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""
@@ -252,6 +303,12 @@ class Study:
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }
+
+
+def _given(measure: Measure) -> str:
+    """Which numbers a measure gives, and what it looks for; as text, where NaN equals NaN."""
+    inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
+    return repr((measure.headline, dict(measure.variables), inner, measure.sought))
 
 
 def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:

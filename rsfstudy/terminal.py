@@ -60,7 +60,8 @@ def declaration(study: Study) -> None:
     varied = {field for axis in study.axes for field in axis.fields}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
     table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items()))
-    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in study.measure.describe().items()))
+    about = {n: v for n, v in study.measure.describe().items() if n not in varied}
+    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in about.items()))
     table.add_row("gives", ", ".join(study.measure.variables))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")

@@ -49,7 +49,9 @@ study = Study(
         "Without mass or damping the slip rate runs away, but for the slowness law at variable "
         "normal stress, whose cycles reach 10^13 to 10^19 V_*. Radiation damping costs half of "
         "what mass does, and loses the overshoot: a quarter to a half of the static stress drop. "
-        "An effect that is not in the scene adds no unknown and no time."
+        "An effect that is not in the scene adds no unknown and no time. Times of a right-hand "
+        "side are over those of the plainest scene, quasi-static at constant normal stress, which "
+        "takes turns with it."
     ),
     base=Scene(b_over_a=2.0, stiffness_ratio=0.8, load_velocity_ratio=2.0),
     axes=[

@@ -2,6 +2,7 @@
 before a run.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 import xarray as xr
 from extended_precision import critical_velocity, slider
 
+import rsfstudy
 from rsfstudy import Scene, catalogue
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.stepping import METHODS, Meter, steps
 from rsfstudy.equations import quasi_static
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Outcome, work_precision
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.problem import Problem
 from rsfstudy.measures.step_response import StepResponse
@@ -64,25 +67,107 @@ def test_every_integrator_solves_a_cycle(method):
     assert outcome.values["recurrence_interval"] == pytest.approx(27.39031822963789, rel=1e-3)
 
 
-def test_work_precision_measures_errors_and_marks_failures():
-    measure = WorkPrecision(
-        problems=(PROBLEM,), integrators=("DOP853", "RK23"), digits=(4, 8), repeats=1, budget=9_000
+def solved(integrator: str, digits: float, **fields) -> Outcome:
+    measure = WorkPrecision((PROBLEM,), integrator, digits, **{"budget": 9_000, **fields})
+    return measure(SCENE, Accuracy())
+
+
+def test_work_precision_measures_errors():
+    loose, tight = solved("DOP853", 4.0), solved("DOP853", 8.0)
+    assert loose.status is tight.status is Status.OK
+    assert tight.values["measured_error"] < 1e-7 < loose.values["measured_error"] < 1e-3
+    assert loose.values["run_evaluations"] == loose.rhs_evaluations < tight.rhs_evaluations
+    assert solved("RK23", 4.0).rhs_evaluations > loose.rhs_evaluations
+
+
+def test_an_accuracy_out_of_reach_is_an_answer():
+    """With what was spent on it, and no time: it belongs to no accuracy."""
+    found = solved("RK23", 8.0)
+    assert found.status is Status.ACCURACY_OUT_OF_REACH
+    assert found.status.is_answer
+    assert found.message.startswith("work_budget_spent: more than 9000")
+    assert found.values["run_evaluations"] == found.rhs_evaluations > 9_000
+    assert not {"run_time", "relative_time", "measured_error"} & set(found.values)
+
+
+@pytest.mark.parametrize("integrator", ["DOP853 + Radau", "DOP853 + LSODA", "Radau (mass always)"])
+def test_what_is_for_mass_does_not_apply_without_it(integrator):
+    found = solved(integrator, 4.0)
+    assert found.status is Status.NOT_APPLICABLE
+    assert found.status.is_answer
+    assert found.rhs_evaluations == 0
+
+
+def test_times_are_relative_to_those_of_the_moment(monkeypatch):
+    """On a machine that slows down all the time, a right-hand side costs the same in all runs."""
+    original, moment, work = work_precision._timed, itertools.count(1.0), []
+
+    def slower_and_slower(problem, scene, asked):
+        _seconds, outcome, spent = original(problem, scene, asked)
+        work.append(spent.spent)
+        return 1e-9 * next(moment) * spent.spent, outcome, spent
+
+    monkeypatch.setattr(work_precision, "_timed", slower_and_slower)
+    found = solved("RK23", 4.0, repeats=3).values
+    yardstick, run = work[:2]
+    assert work == [yardstick, run, yardstick, run, yardstick, run, yardstick]
+    assert found["relative_time"] == pytest.approx(run / yardstick, rel=1e-12)
+    assert found["run_time"] == pytest.approx(4e-9 * run, rel=1e-12)  # the second of three
+
+
+def test_a_long_run_is_timed_once(monkeypatch):
+    calls = []
+    original = work_precision._timed
+
+    def long(problem, scene, asked):
+        calls.append(asked)
+        return (1.0, *original(problem, scene, asked)[1:])
+
+    monkeypatch.setattr(work_precision, "_timed", long)
+    assert solved("DOP853", 4.0).values["relative_time"] == 1.0
+    assert len(calls) == 3
+
+
+def test_integrator_and_accuracy_are_axes():
+    """A cell each: those without meaning and those out of reach fail nobody, and no reduction draws
+    on them.
+    """
+    found = rsfstudy.run(
+        "accuracy_cost",
+        problem=["rigid response", "critical step"],
+        integrator=["DOP853", "RK23", "DOP853 + Radau"],
+        requested_digits=[4, 6],
+        budget=4_000,
+        repeats=1,
+        workers=0,
+        output=None,
+        progress=False,
     )
-    found = measure(SCENE, Accuracy()).values
-    errors = found["measured_error"]
-    assert errors[0, 1] < 1e-7
-    assert errors[0, 0] < 1e-3
-    assert found["run_failed"].tolist() == [[0.0, 0.0], [0.0, 1.0]]
-    assert np.isnan(errors[1, 1])
-    assert np.isnan(found["run_time"][1, 1])
-    assert found["run_evaluations"][1, 1] > 9_000
+    assert found.status.dims == ("problem", "integrator", "requested_digits")
+    apart = found.status.sel(integrator="DOP853 + Radau")
+    assert (apart == int(Status.NOT_APPLICABLE)).all()
+    lost = found.status.sel(problem="critical step", integrator="RK23").values.tolist()
+    assert lost == [Status.OK, Status.ACCURACY_OUT_OF_REACH]
+    assert (found.status < int(Status.WORK_BUDGET_SPENT)).all()
+    assert found.proportionality_points.sel(problem="critical step").values.tolist() == [2, 1, 0]
+    assert not any("refused" in found[name].attrs for name in found.data_vars)
+    assert found.cheapest_integrator.sel(digits=6).values.tolist() == ["DOP853", "DOP853"]
+    ok = found.status == int(Status.OK)
+    assert bool((found.relative_time > 0.0).where(ok, True).all())
 
 
-def test_scenes_without_a_reference_are_refused():
+def test_what_cannot_be_asked_is_refused():
     with pytest.raises(InvalidValue, match="has no known answer"):
         WorkPrecision(problems=(PROBLEM,))(SCENE.with_(load_velocity_ratio=3.0), Accuracy())
     with pytest.raises(InvalidValue, match="DOP85"):
-        WorkPrecision(integrators=("DOP85",))
+        WorkPrecision(integrator="DOP85")
+    for digits in (1.0, 12.0, -400.0):
+        with pytest.raises(InvalidValue, match="requested_digits = .* must lie between 2 and 11"):
+            catalogue.load("accuracy_cost").with_(requested_digits=[4.0, digits])
+    with pytest.raises(InvalidValue, match="budget = 0"):
+        catalogue.load("accuracy_cost").with_(budget=0)
+    with pytest.raises(InvalidValue, match="repeats = 0"):
+        WorkPrecision(repeats=0)
 
 
 def runs(achieved, work) -> xr.Dataset:

@@ -1,5 +1,6 @@
 """Effects on normal stress: derivatives, limits, and what an absent effect costs."""
 
+import itertools
 import math
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.effects import inclined_driving, inertia, linker_dieterich
 from rsfstudy.equations import (
     inertial,
@@ -16,6 +18,7 @@ from rsfstudy.equations import (
     slow_manifold,
     strength_of,
 )
+from rsfstudy.measures import effect_cost
 
 shear = st.floats(-0.5, 0.5)
 
@@ -135,3 +138,30 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
                     assert all(map(math.isfinite, system.rate(0.0, [wild, psi, 0.0])))
             for x in (-1e4, 0.0, 1e4):
                 assert all(map(math.isfinite, inertial(scene).rate(0.0, [wild, x, wild])))
+
+
+def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(monkeypatch):
+    """On a machine that is slower every turn, and ten times slower in some."""
+    slowness = {"quasi_static": 1.0, "slow_manifold": 4.0, "inertial": 3.0}
+    turns = itertools.count()
+
+    def seconds(equations, _state):
+        turn = next(turns) // 3
+        return (1.0 + turn) * (10.0 if turn % 4 == 0 else 1.0) * slowness[equations.regime]
+
+    monkeypatch.setattr(effect_cost, "_seconds", seconds)
+    found = effect_cost.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values
+    assert found["evaluation_cost"] == pytest.approx(4.0, rel=1e-12)
+    assert found["evaluation_cost_in_rupture"] == pytest.approx(3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "fields", [{"normal_stress": "constant"}, {"inertia": True}, {"radiation_damping": 1e-10}]
+)
+def test_every_form_of_the_equations_is_timed(fields):
+    found = effect_cost.EffectCost()(Scene(**fields), Accuracy(1e-3)).values
+    forms = ["", "_in_rupture"] if "inertia" in fields else [""]
+    for form in forms:
+        assert found[f"evaluation_cost{form}"] > 0.0
+        assert found[f"time_per_evaluation{form}"] > 0.0
+    assert ("evaluation_cost_in_rupture" in found) == ("inertia" in fields)

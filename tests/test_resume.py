@@ -46,9 +46,9 @@ def goes_on(output, already):
     asked = []
     original = cells.computed
 
-    def counted(task, scene, **options):
-        asked.append(scene)
-        return original(task, scene, **options)
+    def counted(task, cell, **options):
+        asked.append(cell)
+        return original(task, cell, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cells, "computed", counted)
@@ -260,9 +260,9 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch)
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.nc"]
     asked, original = [], cells.computed
 
-    def counted(task, scene, **options):
-        asked.append(scene.b_over_a)
-        return original(task, scene, **options)
+    def counted(task, cell, **options):
+        asked.append(cell.scene.b_over_a)
+        return original(task, cell, **options)
 
     monkeypatch.setattr(cells, "computed", counted)
     longer = SMALL.with_(b_over_a=[2.0, 2.25, 2.5, 3.0, 3.5])
@@ -323,9 +323,9 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
     asked = []
     original = cells.computed
 
-    def counted(task, scene, **options):
-        asked.append(scene.b_over_a)
-        return original(task, scene, **options)
+    def counted(task, cell, **options):
+        asked.append(cell.scene.b_over_a)
+        return original(task, cell, **options)
 
     monkeypatch.setattr(cells, "computed", counted)
     run(failing, output=tmp_path)

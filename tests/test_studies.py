@@ -15,7 +15,7 @@ import xarray as xr
 from running import named_results
 
 import rsfstudy
-from rsfstudy import catalogue, plots, vocabulary
+from rsfstudy import Axis, catalogue, plots, vocabulary
 from rsfstudy.status import Status
 from rsfstudy.study import Study
 
@@ -26,13 +26,12 @@ def declared(name: str) -> Study:
     """The study; that of costs with the integrators its verdicts turn on, each timed once."""
     study = catalogue.load(name)
     if name == "accuracy_cost":
-        few = replace(
-            study.measure,
-            integrators=("DOP853", "RK45", "Radau, mass always"),
-            digits=(4, 6, 8, 10),
-            repeats=1,
-        )
-        study = replace(study, measure=few)
+        few = [
+            study.axes[0],
+            Axis("integrator", ["DOP853", "RK45", "Radau (mass always)"]),
+            Axis("requested_digits", [4, 6, 8, 10]),
+        ]
+        study = replace(study, axes=few, measure=replace(study.measure, repeats=1))
     return study
 
 

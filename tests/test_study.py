@@ -43,11 +43,17 @@ def study(*axes: Axis, **fields) -> Study:
         ("case", [2.0], "is not a field"),
         ("law", {"x": {"law": "slip"}}, "needs a name of its own"),
         ("case", {"x": {"alfa": 0.1}}, "Did you mean 'alpha'"),
+        ("direction", {"x": {"direction": "up"}}, "needs a name of its own"),
+        ("directoin", ["up"], "Did you mean 'direction'"),
+        ("direction", ["up", "left"], "direction = 'left': is unknown"),
+        ("direction", ["up", 2.0], "direction = 2.0: must be a text, as 'up' is"),
+        ("direction", ["up", "\0"], "must be a text"),
+        ("of", ["load_velocity_ratio", "displacement_step"], "'of': decides which numbers"),
     ],
 )
 def test_meaningless_axes_are_refused(dimension, values, message):
     with pytest.raises(InvalidValue, match=message):
-        Axis(dimension, values)
+        study(Axis(dimension, values))
 
 
 def test_axes_must_not_vary_the_same_field():

@@ -2,15 +2,18 @@
 each, found by name.
 
 A measure is a frozen dataclass derived from `Measure` that fills in the physics. It is picklable,
-so Dask can send it, and describes itself as plain data, so a NetCDF file can hold it.
+so Dask can send it, and describes itself as plain data, so a NetCDF file can hold it. Its fields
+that hold a number, a flag or a text may vary along an axis, as those of the scene do, but for those
+that decide which numbers it gives.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,6 +26,8 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
 
 Value = float | np.ndarray
+#: What an axis can hold.
+Plain = int | float | str | bool
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,37 @@ class Measure:
     def expected_work(self, accuracy: Accuracy) -> float:
         """Right-hand sides one cell usually takes at an accuracy."""
         return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
+
+    @property
+    def plain_fields(self) -> dict[str, Plain]:
+        """Its fields that hold a number, a flag or a text: those an axis may vary."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        return {name: value for name, value in values.items() if isinstance(value, Plain)}
+
+    def with_(self, **changes: Any) -> Measure:
+        """A copy with other plain fields, checked anew.
+
+        Raises
+        ------
+        InvalidValue
+            For a name that is none, a value of another kind, and one the measure refuses.
+        """
+        if not changes:
+            return self
+        present, annotated = self.plain_fields, {f.name: f.type for f in fields(self)}
+        for name, value in changes.items():
+            if name not in present:
+                rule = f"is no number, flag or text of the measure {self.name}"
+                raise InvalidValue("field", name, rule, choices=present)
+            whole = type(present[name]) is int and annotated[name] not in (float, "float")
+            changes[name] = _alike(name, value, present[name], whole)
+        try:
+            return replace(self, **changes)
+        except InvalidValue:
+            raise
+        except Exception as error:
+            rule = f"are refused by the measure {self.name} ({type(error).__name__}: {error})"
+            raise InvalidValue("fields", changes, rule) from error
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The physics: measure one scene, charging `meter`."""
@@ -178,3 +214,22 @@ class Measure:
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""
         return {"name": self.name, **asdict(self)}
+
+
+def _alike(name: str, value: Any, present: Plain, whole: bool) -> Any:
+    """A value of the kind that a field holds at present; axes hold whole numbers as float."""
+    if _kind(value) != _kind(present):
+        raise InvalidValue(name, value, f"must be {_kind(present)}, as {present!r} is")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidValue(name, value, "must be finite")
+    if whole and value != int(value):
+        raise InvalidValue(name, value, "must be a whole number")
+    return int(value) if whole else value
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, bool):
+        return "a flag"
+    if isinstance(value, str):
+        return "a text"
+    return "a number" if isinstance(value, int | float) else "something else"

@@ -1,5 +1,5 @@
-"""What the effects of a scene cost in a limit cycle: unknowns, right-hand sides, and the time of
-one.
+"""What the effects of a scene cost in a limit cycle: unknowns, right-hand sides, and how much
+longer one takes than in the plainest scene.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.scene import Scene
 
-#: Evaluations timed together, and how often.
-_EVALUATIONS, _REPEATS = 400, 5
+#: Evaluations timed together, and how often: the forms of the equations take short turns, so that
+#: a busy moment of the machine falls on all of them.
+_EVALUATIONS, _TURNS = 100, 25
+#: Unknowns at which they are evaluated.
+_BETWEEN_RUPTURES, _IN_RUPTURE = (0.01, 0.0), (0.01, 10.0, 0.01)
 
 _CYCLE = LimitCycle(phases=2)
 _KEPT = (
@@ -37,7 +40,8 @@ _KEPT = (
 class EffectCost(Measure):
     """A limit cycle, with what its effects cost: the numbers of the cycle, the unknowns of each
     form of the equations, the share of the work that the full equations took, and the time of one
-    right-hand side of each form.
+    right-hand side of each form, also relative to that of the plainest scene of the same law:
+    constant normal stress, quasi-static.
     """
 
     name: ClassVar[str] = "effect_cost"
@@ -50,25 +54,16 @@ class EffectCost(Measure):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         costs = ("unknowns", "unknowns_in_rupture", "share_in_rupture")
         times = ("time_per_evaluation", "time_per_evaluation_in_rupture")
-        return dict.fromkeys((*_KEPT, *costs, *times), ())
+        relative = ("evaluation_cost", "evaluation_cost_in_rupture")
+        return dict.fromkeys((*_KEPT, *costs, *relative, *times), ())
 
     @property
     def typical_work(self) -> int:
         return 20_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The cycle under this meter; then the forms of the equations on their own."""
-        slow = (slow_manifold if scene.inertia else without_mass)(scene, clock=False)
-        costs = {
-            "unknowns": float(len(slow.unknowns)),
-            "time_per_evaluation": _seconds(slow, (0.01, 0.0)),
-        }
-        if scene.inertia:
-            fast = inertial(scene)
-            costs |= {
-                "unknowns_in_rupture": float(len(fast.unknowns)),
-                "time_per_evaluation_in_rupture": _seconds(fast, (0.01, 10.0, 0.01)),
-            }
+        """The cycle under this meter; the forms of the equations on their own."""
+        costs = _costs(scene)
         try:
             found = _CYCLE.find(scene, accuracy, meter)
         except Halt as halt:
@@ -79,12 +74,27 @@ class EffectCost(Measure):
         return Outcome(found.status, {**kept, **costs}, found.message)
 
 
+def _costs(scene: Scene) -> dict[str, float]:
+    """Unknowns of the forms of the equations of a scene, and the time of a right-hand side."""
+    slow = (slow_manifold if scene.inertia else without_mass)(scene, clock=False)
+    forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _BETWEEN_RUPTURES)}
+    if scene.inertia:
+        forms["_in_rupture"] = inertial(scene), _IN_RUPTURE
+    plainest = scene.with_(normal_stress="constant", inertia=False, radiation_damping=0.0)
+    timed = {"plainest": (without_mass(plainest, clock=False), _BETWEEN_RUPTURES), **forms}
+    turns = [{where: _seconds(*form) for where, form in timed.items()} for _turn in range(_TURNS)]
+    costs = {}
+    for where, (form, _state) in forms.items():
+        ratios = [seconds[where] / seconds["plainest"] for seconds in turns]
+        costs[f"unknowns{where}"] = float(len(form.unknowns))
+        costs[f"evaluation_cost{where}"] = statistics.median(ratios)
+        costs[f"time_per_evaluation{where}"] = statistics.median(s[where] for s in turns)
+    return costs
+
+
 def _seconds(equations: Equations, state: tuple[float, ...]) -> float:
-    """Time of one right-hand side, median of several timings."""
-    timings = []
-    for _ in range(_REPEATS):
-        began = time.perf_counter()
-        for _ in range(_EVALUATIONS):
-            equations.rate(0.0, state)
-        timings.append((time.perf_counter() - began) / _EVALUATIONS)
-    return statistics.median(timings)
+    """Time of one right-hand side."""
+    began = time.perf_counter()
+    for _ in range(_EVALUATIONS):
+        equations.rate(0.0, state)
+    return (time.perf_counter() - began) / _EVALUATIONS

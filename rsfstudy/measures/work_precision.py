@@ -1,4 +1,6 @@
-"""Work and precision: what each of SciPy's integrators pays for the accuracy asked for."""
+"""Work and precision: what an integrator pays for the accuracy asked for, on a problem whose answer
+is known.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.core.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
 from rsfstudy.core.stepping import METHODS, Meter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
@@ -19,8 +19,11 @@ from rsfstudy.measures.problem import Problem, posed_by
 from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 
-#: Seconds after which one timing of a run is enough.
-_LONG = 0.15
+#: Seconds of timing that are enough.
+_ENOUGH = 0.15
+
+#: What run times are relative to: the same problem, solved by default as loosely as in the study.
+_YARDSTICK = Accuracy(1e-3)
 
 #: Regimes that take most of a motion's time, and the one in which mass acts.
 _SLOW = ("quasi_static", "quasi_dynamic", "slow_manifold", "rigid")
@@ -43,57 +46,63 @@ _ALONE: Mapping[str, tuple[type[Accuracy], Methods]] = {
 }
 #: For motions with mass: another integrator where mass acts, and mass throughout.
 _WITH_MASS: Mapping[str, tuple[type[Accuracy], Methods]] = {
-    "DOP853, Radau": (Accuracy, (("inertial", "Radau"),)),
-    "DOP853, LSODA": (Accuracy, (("inertial", "LSODA"),)),
-    "Radau, mass always": (_MassAlways, (("inertial", "Radau"),)),
+    "DOP853 + Radau": (Accuracy, (("inertial", "Radau"),)),
+    "DOP853 + LSODA": (Accuracy, (("inertial", "LSODA"),)),
+    "Radau (mass always)": (_MassAlways, (("inertial", "Radau"),)),
 }
 _CHOICES = {**_ALONE, **_WITH_MASS}
 
-_NUMBERS = (
-    "measured_error",
-    "error_estimate",
-    "achieved_digits",
-    "run_evaluations",
-    "run_steps",
-    "run_jacobians",
-    "run_time",
-    "run_failed",
-)
+#: Names of the integrators, and of the ways to combine them.
+INTEGRATORS = tuple(_CHOICES)
 
 
 @dataclass(frozen=True)
 class WorkPrecision(Measure):
-    """Solves a problem with known answer by each integrator at each accuracy.
+    """Solves a problem with known answer by one integrator at one accuracy.
 
-    Wall times are medians over repeats that are interleaved: every integrator runs once before any
-    runs again, so that a busy moment of the machine falls on all of them.
+    Its time is also given relative to that of the default integrator for 3 digits, which solves the
+    same problem just before and just after: a busy moment of the machine falls on both.
 
     Parameters
     ----------
     problems : tuple of Problem
         One for each scene of the lattice.
-    integrators : tuple of str
-        SciPy's names; a pair of them, between ruptures and where mass acts; or "Radau, mass
-        always", which leaves the slow manifold out. Those are for scenes with mass.
-    digits : tuple of int
-        Accuracies asked for, rtol = 10**-digits.
+    integrator : str
+        One of SciPy's names; two of them, between ruptures and where mass acts; or "Radau (mass
+        always)", which leaves the slow manifold out. Those are for scenes with mass.
+    requested_digits : float
+        The accuracy asked for, rtol = 10**-requested_digits.
     repeats : int
-        Timings of each run.
+        Most timings of a run; long ones need fewer.
     budget : int
         Right-hand sides a run may evaluate.
     """
 
     problems: tuple[Problem, ...] = ()
-    integrators: tuple[str, ...] = tuple(_CHOICES)
-    digits: tuple[int, ...] = (3, 4, 5, 6, 7, 8, 9, 10)
-    repeats: int = 3
+    integrator: str = "DOP853"
+    requested_digits: float = 6.0
+    repeats: int = 9
     budget: int = 85_000
     name: ClassVar[str] = "work_precision"
 
     def __post_init__(self) -> None:
-        for name in self.integrators:
-            if name not in _CHOICES:
-                raise InvalidValue("integrator", name, "is unknown", choices=_CHOICES)
+        if self.integrator not in _CHOICES:
+            raise InvalidValue("integrator", self.integrator, "is unknown", choices=_CHOICES)
+        if self.repeats < 1:
+            raise InvalidValue("repeats", self.repeats, "must be at least 1")
+        Accuracy(budget=self.budget)
+        try:
+            Accuracy(10.0**-self.requested_digits)
+        except (InvalidValue, OverflowError) as error:
+            least, most = -math.log10(LOOSEST_RTOL), -math.log10(TIGHTEST_RTOL)
+            rule = f"must lie between {least:g} and {most:g}"
+            raise InvalidValue("requested_digits", self.requested_digits, rule) from error
+
+    @property
+    def _asked(self) -> Accuracy:
+        """The accuracy and the integrators that the run is made with."""
+        kind, methods = _CHOICES[self.integrator]
+        return kind(10.0**-self.requested_digits, self.budget, methods)
 
     @property
     def headline(self) -> str:
@@ -101,77 +110,73 @@ class WorkPrecision(Measure):
 
     @property
     def variables(self) -> Mapping[str, tuple[str, ...]]:
-        inner = ("integrator", "requested_digits")
-        return dict.fromkeys(_NUMBERS, inner) | {"measured_error_error": ()}
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {
-            "integrator": np.array(self.integrators, dtype=object),
-            "requested_digits": np.array(self.digits, dtype=float),
-        }
+        errors = ("measured_error", "measured_error_error", "error_estimate", "achieved_digits")
+        work = ("run_evaluations", "run_steps", "run_jacobians", "run_time", "relative_time")
+        return dict.fromkeys((*errors, *work), ())
 
     @property
     def typical_work(self) -> int:
-        return 6_000_000
+        return 25_000
+
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        """The same whatever the study asks for: a run has an accuracy of its own."""
+        return {3.0: 1.0, 10.0: 1.0}
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""
-        return {
-            "name": self.name,
-            "problems": [problem.describe() for problem in self.problems],
-            "integrators": list(self.integrators),
-            "digits": list(self.digits),
-            "repeats": self.repeats,
-            "budget": self.budget,
-        }
+        problems = [problem.describe() for problem in self.problems]
+        return {"name": self.name, "problems": problems, **self.plain_fields}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Every run once, for its numbers; short ones that succeed again, for their times."""
+        """Run once for the numbers, and as often as it takes for the times."""
         problem = posed_by(scene, self.problems)
-        runs = {
-            (i, j): _CHOICES[name][0](10.0**-digits, self.budget, _CHOICES[name][1])
-            for i, name in enumerate(self.integrators)
-            for j, digits in enumerate(self.digits)
-            if scene.inertia or name in _ALONE
+        if self.integrator in _WITH_MASS and not scene.inertia:
+            return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} needs mass")
+        before = _timed(problem, scene, _YARDSTICK)[0]
+        seconds, outcome, spent = _timed(problem, scene, self._asked)
+        meter.by_regime, meter.spent = spent.by_regime, spent.spent
+        work = {
+            "run_evaluations": float(spent.spent),
+            "run_steps": float(spent.steps),
+            "run_jacobians": float(spent.jacobians),
         }
-        shape = (len(self.integrators), len(self.digits))
-        numbers = {name: np.full(shape, np.nan) for name in _NUMBERS}
-        times: dict[tuple[int, int], list[float]] = {}
-        for repeat in range(self.repeats):
-            for place, asked in runs.items():
-                if repeat > 0 and times.get(place, [math.inf])[0] > _LONG:
-                    continue
-                began = time.perf_counter()
-                outcome, spent = problem.measure.metered(scene, asked)
-                took = time.perf_counter() - began
-                if repeat == 0:
-                    meter.by_regime["runs"] = meter.by_regime.get("runs", 0) + spent.spent
-                    meter.spent += spent.spent
-                    for name, value in _numbers(problem, outcome, spent).items():
-                        numbers[name][place] = value
-                if outcome.status is problem.status:
-                    times.setdefault(place, []).append(took)
-        for place, taken in times.items():
-            numbers["run_time"][place] = statistics.median(taken)
-        return Outcome(Status.OK, {**numbers, "measured_error_error": problem.uncertainty})
+        if outcome.status is not problem.status:
+            why = f"{outcome.status.label}: {outcome.message}"
+            return Outcome(Status.ACCURACY_OUT_OF_REACH, work, why)
+        # what the reference cannot tell from zero is no error
+        error = max(problem.error_of(outcome), problem.uncertainty, 1e-16)
+        return Outcome(
+            Status.OK,
+            {
+                "measured_error": error,
+                "measured_error_error": problem.uncertainty,
+                "achieved_digits": -math.log10(error),
+                "error_estimate": problem.estimate_of(outcome),
+                **work,
+                **self._times(problem, scene, before, seconds),
+            },
+        )
+
+    def _times(
+        self, problem: Problem, scene: Scene, before: float, first: float
+    ) -> dict[str, float]:
+        """Of a run timed for the first time, and of the yardstick before it: more of both, in
+        turns.
+        """
+        times, ratios = [first], []
+        while True:
+            after = _timed(problem, scene, _YARDSTICK)[0]
+            ratios.append(2.0 * times[-1] / (before + after))
+            if len(times) == self.repeats or sum(times) > _ENOUGH:
+                break
+            before = after
+            times.append(_timed(problem, scene, self._asked)[0])
+        return {"run_time": statistics.median(times), "relative_time": statistics.median(ratios)}
 
 
-def _numbers(problem: Problem, outcome: Outcome, spent: Meter) -> dict[str, float]:
-    failed = outcome.status is not problem.status
-    work = {
-        "run_evaluations": float(spent.spent),
-        "run_steps": float(spent.steps),
-        "run_jacobians": float(spent.jacobians),
-        "run_failed": float(failed),
-    }
-    if failed:
-        return work
-    # what the reference cannot tell from zero is no error
-    error = max(problem.error_of(outcome), problem.uncertainty, 1e-16)
-    return {
-        **work,
-        "measured_error": error,
-        "achieved_digits": -math.log10(error),
-        "error_estimate": problem.estimate_of(outcome),
-    }
+def _timed(problem: Problem, scene: Scene, asked: Accuracy) -> tuple[float, Outcome, Meter]:
+    """One run: the seconds it took, how it ended and what it spent."""
+    began = time.perf_counter()
+    outcome, spent = problem.measure.metered(scene, asked)
+    return time.perf_counter() - began, outcome, spent

@@ -28,8 +28,9 @@ Panel = Callable[[xr.Dataset, Axes], Axes]
 
 NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
-#: Size of one panel in inches; a module may state its own as ``PANEL``.
-_PANEL = (6.4, 4.8)
+#: Size of one panel in inches, and most panels in a row; a module may state its own as ``PANEL``
+#: and ``COLUMNS``.
+_PANEL, _COLUMNS = (6.4, 4.8), 2
 
 
 def figure(dataset: xr.Dataset) -> Figure:
@@ -42,7 +43,7 @@ def figure(dataset: xr.Dataset) -> Figure:
     """
     module = _module(dataset)
     panels, size = getattr(module, "PANELS", (None,)), getattr(module, "PANEL", _PANEL)
-    columns = min(2, len(panels))
+    columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
     rows = -(-len(panels) // columns)
     found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):

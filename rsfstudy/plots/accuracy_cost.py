@@ -1,17 +1,25 @@
-"""Work-precision diagrams, one row a problem: error against right-hand sides, and against time."""
+"""Work-precision diagrams, two a problem: error against right-hand sides, and against time."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from rsfstudy.plots import Panel
+from rsfstudy.status import Status
 
 #: Dimensions the figure has room for.
-DIMENSIONS = ("problem",)
+DIMENSIONS = ("problem", "integrator", "requested_digits")
+#: Small panels on one page.
+PANEL, COLUMNS = (3.8, 2.9), 4
 
 _MARKERS = "os^vD<>P*"
+_LABELS = {
+    "run_evaluations": "Right-hand sides (x: out of reach)",
+    "relative_time": "Time over that of DOP853 for 3 digits",
+}
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
@@ -36,24 +44,26 @@ def _diagram(dataset: xr.Dataset, axes: Axes, problem: int, work: str) -> Axes:
             markersize=4,
         )
         if work == "run_evaluations":
-            failed = runs["run_evaluations"].where(runs["run_failed"] == 1.0)
+            lost = runs["status"] == Status.ACCURACY_OUT_OF_REACH
             asked = 10.0 ** -runs["requested_digits"]
-            axes.plot(failed, asked.where(failed.notnull()), "x", color=f"C{number}", markersize=4)
-    floor = float(cell["measured_error_error"])
+            axes.plot(runs[work].where(lost), asked, "x", color=f"C{number}", markersize=4)
+    floor = float(cell["measured_error_error"].max())
     axes.axhline(max(floor, 1e-16), color="0.7", linewidth=0.8, linestyle=":")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    words = {"run_evaluations": "Right-hand sides (x: failed)", "run_time": "Wall time (s)"}
-    axes.set_xlabel(words[work])
-    axes.set_ylabel("Measured error")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(_LABELS[work], fontsize="small")
+    axes.set_ylabel("Measured error", fontsize="small")
     axes.set_title(str(cell["problem"].item()), fontsize="medium")
-    axes.legend(fontsize="xx-small")
+    axes.tick_params(labelsize="small")
+    if problem == 0 and work == "run_evaluations":  # the same integrators in every panel
+        axes.legend(fontsize="xx-small")
     axes.grid(alpha=0.3)
     return axes
 
 
 def draw_digits(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """For 3, 6 and 9 digits you pay this much: right-hand sides and time of the default."""
+    """For 3, 6 and 9 digits you pay this much: right-hand sides of the default."""
     if "cheapest_default_work" not in dataset:
         axes.set_axis_off()
         return axes
@@ -65,20 +75,19 @@ def draw_digits(dataset: xr.Dataset, axes: Axes) -> Axes:
         width = 0.8 / len(wanted)
         at = position + (number - 0.5 * (len(wanted) - 1)) * width
         axes.barh(at, work, height=width, color=f"C{number}", label=f"{digits:g} digits")
-        for place, evaluations, seconds in zip(
-            at, work, cell["cheapest_default_time"].values, strict=True
-        ):
+        for place, evaluations in zip(at, work, strict=True):
             if np.isfinite(evaluations):
-                text = f" {evaluations:,.0f} right-hand sides, {1e3 * seconds:.0f} ms"
+                text = f" {evaluations:,.0f}"
                 axes.text(evaluations, place, text, va="center", fontsize="xx-small")
     axes.set_yticks(position, [str(p) for p in dataset["problem"].values], fontsize="x-small")
+    axes.tick_params(axis="x", labelsize="small")
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.set_xlim(right=20.0 * np.nanmax(dataset["cheapest_default_work"].values))
-    axes.set_xlabel("Right-hand sides of DOP853")
-    axes.set_ylabel("Problem")
+    axes.set_xlabel("Right-hand sides of DOP853", fontsize="small")
+    axes.set_ylabel("Problem", fontsize="small")
     axes.set_title("What correct digits cost", fontsize="medium")
-    axes.legend(fontsize="x-small")
+    axes.legend(fontsize="xx-small")
     return axes
 
 
@@ -91,14 +100,19 @@ def _other(problem: int, work: str) -> Panel:
 
 def draw_proportionality(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Digits reached against digits asked for, by the default integrator."""
+    if "DOP853" not in dataset["integrator"].values:
+        axes.set_axis_off()
+        return axes
     default = dataset.sel(integrator="DOP853")
     for problem in dataset["problem"].values:
         row = default.sel(problem=problem)
-        axes.plot(row["requested_digits"], row["achieved_digits"], "o-", label=str(problem))
+        reached = row["achieved_digits"]
+        axes.plot(row["requested_digits"], reached, "o-", label=str(problem), markersize=4)
     reach = dataset["requested_digits"].values
     axes.plot(reach, reach, "--", color="0.5", label="as asked")
-    axes.set_xlabel("Digits asked for, -log10 rtol")
-    axes.set_ylabel("Digits reached")
+    axes.set_xlabel("Digits asked for, -log10 rtol", fontsize="small")
+    axes.set_ylabel("Digits reached", fontsize="small")
+    axes.tick_params(labelsize="small")
     axes.set_title("Tolerance proportionality of DOP853", fontsize="medium")
     axes.legend(fontsize="xx-small")
     axes.grid(alpha=0.3)
@@ -107,8 +121,8 @@ def draw_proportionality(dataset: xr.Dataset, axes: Axes) -> Axes:
 
 PANELS = (
     draw,
-    _other(0, "run_time"),
-    *(_other(p, work) for p in range(1, 6) for work in ("run_evaluations", "run_time")),
+    _other(0, "relative_time"),
+    *(_other(p, work) for p in range(1, 6) for work in _LABELS),
     draw_digits,
     draw_proportionality,
 )

@@ -1,0 +1,272 @@
+"""An axis over a field of the measure is as one over a field of the scene: its cells are computed,
+kept, found again, selected, claimed, written and reproduced in the same way.
+"""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import command, ended, run, same_numbers
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, cells, restore
+from rsfstudy.claims import Claim
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.lattice import coordinates
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.plan import Plan
+from rsfstudy.status import Status
+
+BOTH = Study(
+    name="both",
+    title="Steps up and down",
+    base=Scene(normal_stress="constant"),
+    axes=[Axis("direction", ["up", "down"]), Axis("b_over_a", [2.0, 3.0])],
+    measure=CriticalStep(of="displacement_step"),
+)
+
+
+@dataclass(frozen=True)
+class Scaled(Measure):
+    """b/a times a factor, so often, and with a sign and a unit in words."""
+
+    factor: float = 1
+    times: int = 1
+    negative: bool = False
+    unit: str = "one"
+    table: tuple[float, ...] = (1.0,)
+    name: ClassVar[str] = "scaled"
+    headline: ClassVar[str] = "total"
+    variables: ClassVar = {"total": ()}
+    typical_work: ClassVar[int] = 1
+
+    def __post_init__(self):
+        if self.factor == 13.0:
+            raise RuntimeError("no luck")
+
+    def find(self, scene, accuracy, meter):
+        total = sum(self.factor * scene.b_over_a for _ in range(self.times))
+        return Outcome(Status.OK, {"total": -total if self.negative else total})
+
+
+def scaled(*axes: Axis, **fields) -> Study:
+    axes = (*axes, Axis("b_over_a", [2.0, 3.0]))
+    return Study(**{"name": "scaled", "title": "Scaled", "base": Scene(), "axes": axes,
+                    "measure": Scaled(), **fields})  # fmt: skip
+
+
+def test_each_cell_is_measured_as_the_axis_says():
+    """Upward steps trigger instability here, downward ones never do."""
+    found = run(BOTH).isel(b_over_a=0)
+    for direction in ("up", "down"):
+        step = rsfstudy.critical_step(BOTH.scene(0), of="displacement_step", direction=direction)
+        ours = found.sel(direction=direction)
+        assert Status(int(ours.status)).label == step.attrs["status"]
+        for name in step.data_vars:
+            np.testing.assert_array_equal(ours[name], step[name])
+    statuses = [Status.OK, Status.STABLE_FOR_ALL_STEPS]
+    assert found.status.values.tolist() == statuses
+
+
+def test_numbers_flags_and_texts_of_a_measure_of_ones_own():
+    """Whole numbers arrive as such, whole numbers that stand for any number do not bind."""
+    axes = [Axis("factor", [0.5, 2]), Axis("times", [1, 3]), Axis("negative", [False, True])]
+    found = run(scaled(*axes, Axis("unit", ["one", "two"])))
+    assert found.total.dims == ("factor", "times", "negative", "unit", "b_over_a")
+    place = {"factor": 0.5, "times": 3, "negative": 1, "unit": "two", "b_over_a": 3.0}
+    assert float(found.total.sel(place)) == -0.5 * 3 * 3.0
+    assert found.negative.attrs["flag_meanings"] == "false true"
+    assert "units" not in found.unit.attrs
+    assert found.times.attrs["units"] == "1"
+
+
+def test_a_point_of_a_zipped_axis_sets_both():
+    case = Axis("case", {"plain": {"a": 0.01}, "twice": {"a": 0.02, "factor": 2.0}})
+    found = run(scaled(case))
+    assert found.total.values.tolist() == [[2.0, 3.0], [4.0, 6.0]]
+    assert found["factor"].values.tolist() == [1.0, 2.0]
+    assert found["a"].values.tolist() == [0.01, 0.02]
+    assert run(scaled(case).with_(factor=[2.0, 4.0])).total.sel(case="factor = 4.0")[0] == 8.0
+
+
+def test_the_same_on_workers_and_in_pieces(tmp_path):
+    same_numbers(run(BOTH, workers=2), run(BOTH))
+    run(BOTH, output=tmp_path, format="zarr")
+    same_numbers(rsfstudy.open(tmp_path / "both.zarr"), run(BOTH))
+
+
+def test_overrides_change_the_measure():
+    fixed = scaled().with_(factor=3.0)
+    assert fixed.measure == Scaled(factor=3.0)
+    assert run(fixed).total.values.tolist() == [6.0, 9.0]
+    assert scaled().with_(times=2.0).measure.times == 2
+    axis = scaled().with_(factor=[1.0, 3.0])
+    assert axis.dimensions == ("factor", "b_over_a")
+    assert axis.with_(factor=5.0).shape == (1, 2)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        ({"times": 1.5}, "times = 1.5: must be a whole number"),
+        ({"times": [1.0, 1.5]}, "times = 1.5: must be a whole number"),
+        ({"times": np.inf}, "times = inf: must be finite"),
+        ({"times": True}, "times = True: must be a number, as 1 is"),
+        ({"negative": 1.0}, "must be a flag"),
+        ({"unit": 1.0}, "must be a text"),
+        ({"factor": 13.0}, r"refused by the measure scaled \(RuntimeError: no luck\)"),
+        ({"factor": [1.0, 13.0]}, r"refused by the measure scaled \(RuntimeError: no luck\)"),
+        ({"table": [1.0, 2.0]}, "'table': is neither an axis nor a field"),
+        ({"fator": 1.0}, "Did you mean 'factor'"),
+    ],
+)
+def test_what_a_measure_cannot_be_set_to_is_refused(overrides, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        scaled().with_(**overrides)
+
+
+def test_a_field_that_decides_the_shape_is_refused():
+    kind = type("Long", (Scaled,), {
+        "variables": {"total": (), "row": ("place",)},
+        "inner_coordinates": property(lambda self: {"place": np.arange(float(self.times))}),
+    })  # fmt: skip
+    assert scaled(Axis("factor", [1.0, 2.0]), measure=kind()).shape == (2, 2)
+    with pytest.raises(InvalidValue, match="'times': decides which numbers.*Make a study of each"):
+        scaled(Axis("times", [1.0, 2.0]), measure=kind())
+
+
+def test_a_field_that_is_named_as_a_number_is_no_axis():
+    named = type("Named", (Scaled,), {"headline": "factor", "variables": {"factor": ()}})
+    with pytest.raises(InvalidValue, match="'factor': is the name of something measured"):
+        scaled(Axis("case", {"one": {"factor": 2.0}}), measure=named())
+
+
+def test_a_name_that_both_have_is_the_scenes():
+    @dataclass(frozen=True)
+    class Both(Scaled):
+        phi: float = 1.0
+
+    declared = scaled(Axis("phi", [50.0, 60.0]), measure=Both())
+    assert [scene.phi for scene in declared.scenes()] == [50.0, 50.0, 60.0, 60.0]
+    assert all(cell.changes == {} for cell in declared.cells())
+
+
+def computed_by(study: Study, output) -> int:
+    """How many cells a run of it computes."""
+    asked = []
+    original = cells.computed
+
+    def counted(task, cell, **options):
+        asked.append(cell)
+        return original(task, cell, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells, "computed", counted)
+        run(study, output=output)
+    return len(asked)
+
+
+def test_cells_are_found_again_by_the_fields_of_their_measure(tmp_path):
+    assert computed_by(scaled(Axis("factor", [1.0, 2.0])), tmp_path) == 4
+    assert computed_by(scaled(Axis("factor", [2.0, 1.0, 4.0])), tmp_path) == 2
+    assert computed_by(scaled(measure=Scaled(factor=4.0)), tmp_path) == 0
+    assert computed_by(scaled(measure=Scaled(factor=8.0)), tmp_path) == 2
+    assert run(scaled(measure=Scaled(factor=4.0)), output=tmp_path).total[0] == 8.0
+    with pytest.raises(DataError, match="holds cells computed differently: measure: .*table"):
+        run(scaled(measure=Scaled(table=(2.0,))), output=tmp_path)
+
+
+def test_cells_differ_even_where_a_measure_does_not_say_so():
+    silent = type("Silent", (Scaled,), {"describe": lambda self: {"name": "silent"}})
+    assert len(Plan(scaled(Axis("factor", [1.0, 2.0]), measure=silent())).different) == 4
+
+
+def test_claims_and_selection_reach_a_place_on_the_axis():
+    claim = Claim(
+        id="X1", statement="down", source="here", variable="critical_displacement_stable",
+        where={"direction": "down", "b_over_a": 2.0},
+        published=0.0, relation="below", tolerance=0.0, reason="against the drive",
+    )  # fmt: skip
+    declared = replace(BOTH, claims=[claim])
+    assert rsfstudy.check(run(declared)).verdict.tolist() == ["reproduced"]
+    assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [
+        "not applicable"
+    ]
+    with pytest.raises(InvalidValue, match="is no place of the lattice, in claim X1"):
+        run(replace(declared, claims=[replace(claim, where={"direction": "left"})]))
+
+
+def test_the_file_alone_reproduces_its_cells(tmp_path):
+    found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
+    file = tmp_path / "both.nc"
+    restored = restore.study(BOTH.describe())
+    assert restored.describe() == BOTH.describe()
+    xr.testing.assert_identical(
+        xr.Dataset(coords=coordinates(restored)), xr.Dataset(coords=coordinates(BOTH))
+    )
+    table = rsfstudy.rerun(file, workers=0, progress=False)
+    assert (table["values"] == table["identical"]).all()
+    _scene, outcome = rsfstudy.cell(file, {"direction": "down", "b_over_a": 3.0})
+    assert outcome.values["critical_displacement_stable"] == found.critical_displacement_stable
+
+
+OWN = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Power(Measure):
+    power: int = 1
+    offset: float = 0.0
+    name: ClassVar[str] = "power"
+    headline = "total"
+    variables = {"total": ()}
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        if self.power == 4:
+            raise ZeroDivisionError
+        return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
+
+
+study = Study(
+    name="own", title="Powers", base=Scene(),
+    axes=[Axis("power", [1, 2]), Axis("b_over_a", [2, 3])], measure=Power(),
+)
+"""
+
+
+def test_a_study_file_with_a_measure_of_its_own(tmp_path):
+    """On workers, which cannot import it; and a failed cell is told with its place."""
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    words = ["--output", tmp_path, "--quiet"]
+    status, said, _errors = ended(command("run", file, "--set", "power=2,3,4", *words))
+    assert status == 1
+    assert "--cell power=4.0 --cell b_over_a=2.0" in said
+    found = rsfstudy.open(tmp_path / "own.nc")
+    assert found.total.sel(power=[2.0, 3.0]).values.tolist() == [[4.0, 9.0], [8.0, 27.0]]
+    place = ["--cell", "power=3", "--cell", "b_over_a=3"]
+    status, said, _errors = ended(command("rerun", tmp_path / "own.nc", "--study", file, *place))
+    assert status == 0
+    assert "total = 27.0" in said
+
+
+def test_a_measure_of_its_own_is_computed_anew_as_it_was_set(tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    rsfstudy.run(file, workers=0, output=tmp_path, progress=False, offset=0.5)
+    assert rsfstudy.open(tmp_path / "own.nc").total.values.tolist() == [[2.5, 3.5], [4.5, 9.5]]
+    table = rsfstudy.rerun(tmp_path / "own.nc", study=file, workers=0, progress=False)
+    assert (table["values"] == table["identical"]).all()
+    place = {"power": 2, "b_over_a": 3}
+    _scene, outcome = rsfstudy.cell(tmp_path / "own.nc", place, study=file)
+    assert outcome.values["total"] == 9.5
