@@ -25,8 +25,8 @@ from rsfstudy.study import Study
 from rsfstudy.workers import on_client, on_local_cluster, threads
 
 OUTPUT = Path("outputs")
-#: No cell takes thirty years, and no clock of ours goes much further.
-_LONGEST = 1e9
+#: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
+_LONGEST = 1e8
 
 
 def studies() -> dict[str, Study]:
@@ -69,7 +69,8 @@ def run(
     rtol : float, optional
         Accuracy of the cells.
     time_limit : float
-        Time in s after which a worker gives a cell up; it does not bind in this process.
+        CPU time in s after which a worker gives a cell up, or ten times as long on the clock where
+        the cell sleeps or waits; it does not bind in this process.
     keep_going : bool
         Go on where the first cells all fail, instead of stopping early.
     despite_failures : bool

@@ -68,7 +68,7 @@ _time_limit = click.option(
     type=float,
     default=DEFAULT_TIME_LIMIT,
     show_default=True,
-    help="Seconds after which a worker gives a cell up.",
+    help="Seconds of CPU time after which a worker gives a cell up.",
 )
 _quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 

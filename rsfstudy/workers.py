@@ -22,7 +22,7 @@ from concurrent.futures import CancelledError
 from multiprocessing import resource_tracker
 from typing import Any
 
-from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed, sendable
+from rsfstudy.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
 from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -157,6 +157,7 @@ def _result(future: Any) -> Found | None:
 def _alone(client: Any, task: Task, batch: Batch) -> Found:
     """A suspect by itself; the culprit where its worker dies again."""
     for _ in range(_TRIES):
+        _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
         began = time.monotonic()
         future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
         try:
@@ -168,7 +169,10 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
             return found
         seconds = time.monotonic() - began
         if seconds > task.time_limit:
-            text = f"no answer within {task.time_limit:g} s; the worker's log shows where it was"
+            text = (
+                f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
+                "on the clock; the worker's log shows where it was"
+            )
             return [(batch[0][0], (Outcome(Status.TIME_LIMIT_SPENT, message=text), seconds))]
     text = (
         f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
