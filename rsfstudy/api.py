@@ -142,11 +142,13 @@ class _Workers:
         at_a_time = self.processes if self.client is None else threads(self.client)
         return max(1, at_a_time)
 
-    def mapper(self) -> Mapper:
-        """What computes batches of cells there."""
+    def mapper(self, log: Path | None = None) -> Mapper:
+        """What computes batches of cells there; `log` is for what processes of ours say when they
+        end.
+        """
         if self.client is not None:
             return on_client(self.client)
-        return on_local_cluster(self.processes) if self.processes > 0 else serial
+        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
 
 
 def _directory(output: str | Path | None) -> Path | None:
@@ -164,7 +166,7 @@ def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
         sendable(task)  # told before any work, if it is not
     ready = runner.Run(study, keeping, task, workers.threads())
     with _bar(study.name, workers.progress) as told:
-        return ready(workers.mapper(), told)
+        return ready(workers.mapper(ready.worker_log), told)
 
 
 @contextlib.contextmanager

@@ -81,7 +81,10 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
-    warnings.showwarning = lambda message, *_place: _stderr.print(f"warning: {message}")
+    # not to the console of errors, which would not know of a progress bar
+    warnings.showwarning = lambda message, *_place: print(
+        terminal.spelt(f"warning: {message}"), file=sys.stderr
+    )
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:

@@ -178,6 +178,14 @@ class Study:
         places = np.unravel_index(cell, self.shape)
         return self._scene([axis.rows[i] for axis, i in zip(self.axes, places, strict=True)])
 
+    def place(self, cell: int) -> str:
+        """Where a cell is on the axes, in words."""
+        words = []
+        for axis, i in zip(self.axes, np.unravel_index(cell, self.shape), strict=True):
+            value = axis.labels[i] if axis.labels else short(axis.rows[i][axis.dimension])
+            words.append(f"{axis.dimension} = {value}")
+        return ", ".join(words)
+
     def _scene(self, rows: Sequence[Row]) -> Scene:
         fields = self.base.as_dict()
         for row in rows:

@@ -38,9 +38,13 @@ class Plain(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out."""
-        spelt = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-        shown = "".join(c if isinstance(c, str) else c.decode() for c in spelt)
-        return super().render_str(shown, **options)
+        return super().render_str(spelt(text), **options)
+
+
+def spelt(text: str) -> str:
+    """Text with what would steer the terminal spelt out."""
+    found = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+    return "".join(c if isinstance(c, str) else c.decode() for c in found)
 
 
 console = Plain(markup=False, emoji=False)
