@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -104,7 +104,7 @@ def run(
         despite_failures=despite_failures,
         command=command,
     )
-    return _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
+    return prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
 
 
 def declaration(
@@ -118,7 +118,7 @@ def declaration(
 
 
 @dataclass(frozen=True)
-class _Workers:
+class Workers:
     """Where cells are computed, and whether a bar shows how far it is."""
 
     processes: int = 2
@@ -159,14 +159,25 @@ def _directory(output: str | Path | None) -> Path | None:
     return Path(output)
 
 
-def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
+def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], xr.Dataset]:
+    """A run that only has to be called.
+
+    Raises
+    ------
+    InvalidValue
+        For whatever is wrong with it.
+    """
     digest = own_code.digest(type(study.measure))
     task = Task(study.measure, study.accuracy, workers.time_limit, own_code=digest)
     if workers.mapper() is not serial:
         sendable(task)  # told before any work, if it is not
     ready = runner.Run(study, keeping, task, workers.threads())
-    with _bar(study.name, workers.progress) as told:
-        return ready(workers.mapper(ready.worker_log), told)
+
+    def run() -> xr.Dataset:
+        with _bar(study.name, workers.progress) as told:
+            return ready(workers.mapper(ready.worker_log), told)
+
+    return run
 
 
 @contextlib.contextmanager
@@ -301,7 +312,7 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    ours = _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
+    ours = prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
     return compared(theirs, ours)
 
 

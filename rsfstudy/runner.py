@@ -16,7 +16,7 @@ import xarray as xr
 
 from rsfstudy import pieces, provenance, store
 from rsfstudy.cells import Found, Mapper, Task
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, RunError
+from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.journal import Columns, Journal, Layout
 from rsfstudy.lattice import assemble
 from rsfstudy.plan import Plan, scattered
@@ -140,7 +140,8 @@ class Run:
         DataError
             If results cannot be kept, or the journal holds cells computed differently.
         RunError
-            When interrupted; what is finished is kept in ``NAME.partial.nc`` and in the journal.
+            When it cannot go on, or is interrupted (`Interrupted`); what is finished is kept in
+            ``NAME.partial.nc`` and in the journal.
         """
         keeping = self.keeping
         if keeping.format == "zarr":
@@ -254,7 +255,8 @@ class Run:
                 store.write(lattice, self.path(".partial.nc"))
             except DataError as unwritten:
                 why += f"{unwritten} "
-        return RunError(why + self._resumable(journal))
+        kind = Interrupted if isinstance(error, KeyboardInterrupt) else RunError
+        return kind(why + self._resumable(journal))
 
     def _resumable(self, journal: Journal) -> str:
         """How much is finished, where it is, and how to go on."""
