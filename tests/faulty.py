@@ -11,7 +11,6 @@ import collections
 import ctypes
 import itertools
 import os
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -46,11 +45,6 @@ def _hang():
         time.sleep(0.01)
 
 
-def _spin():
-    while True:
-        pass
-
-
 def _take(seconds: float):
     end = time.thread_time() + seconds
     while time.thread_time() < end:
@@ -68,13 +62,6 @@ def _wait_at(gate: Path):
         return
     while not (gate / "open").exists():
         time.sleep(0.01)
-
-
-def _thread_raises():
-    thread = threading.Thread(target=lambda: _raise(ZeroDivisionError("in a thread")))
-    thread.start()
-    thread.join()
-    return Outcome(Status.OK, {"total": 1.0})
 
 
 FAULTS: dict[str, Callable] = {
@@ -108,10 +95,8 @@ FAULTS: dict[str, Callable] = {
     "sleeps": lambda _meter: (time.sleep(3.0), Outcome(Status.OK, {"total": 1.0}))[1],
     "hangs": lambda _meter: _hang(),
     "hangs in C": lambda _meter: ctypes.PyDLL(None).sleep(10**6),
-    "spins": lambda _meter: _spin(),
-    # holding the interpreter's lock
+    # holding the interpreter's lock, as the one before
     "spins in C": lambda _meter: collections.deque(itertools.repeat(1), maxlen=0),
-    "thread raises": lambda _meter: _thread_raises(),
 }
 
 

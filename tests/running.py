@@ -38,14 +38,14 @@ def run(study=SMALL, **options) -> xr.Dataset:
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
 
 
-def named_results(study: str | Study, tmp_path_factory) -> tuple[xr.Dataset, Path]:
+def named_results(study: str | Study, tmp_path_factory, client) -> tuple[xr.Dataset, Path]:
     """Results of a named study, and their file, computed once for all processes of the tests."""
     place = tmp_path_factory.getbasetemp()
     output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
     end = time.monotonic() + HANGS
     while True:
         try:
-            dataset = rsfstudy.run(study, output=output, progress=False)
+            dataset = rsfstudy.run(study, output=output, client=client, progress=False)
             return dataset, output / f"{dataset.attrs['id']}.nc"
         except DataError as error:
             if "another run uses" not in str(error) or time.monotonic() > end:

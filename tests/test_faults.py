@@ -2,8 +2,10 @@
 is drawn from it unless one says so.
 """
 
+import logging
 import os
 import shlex
+import signal
 import subprocess
 import sys
 
@@ -11,10 +13,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, command, ended, run
+from running import FAULTY, HANGS, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli, runner, terminal, workers
+from rsfstudy import Axis, Scene, Study, cli, runner, terminal, worker_log, workers
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
@@ -112,23 +114,46 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     assert dataset.status.values.tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("fault", ["spins", "spins in C"])
-def test_a_cell_that_computes_for_ever(fault, sturdy):
+def test_a_cell_that_computes_for_ever(sturdy):
     """Past the time limit its worker ends, even where it cannot run any Python; the cell is tried
     alone before it is blamed.
     """
     client, log = sturdy
-    dataset = lost(declared(fault, at=(2.5,)), client=client, time_limit=0.5)
+    dataset = lost(declared("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
     assert "faulty.py" in log.read_text()  # where it was
 
 
-@pytest.mark.parametrize("fault", ["hangs", "hangs in C"])
-def test_a_cell_that_waits_for_ever(fault, sturdy):
+def test_a_cell_that_waits_for_ever(sturdy):
     """It takes no CPU time, and has ten times as long."""
-    dataset = lost(declared(fault, cells=1), client=sturdy[0], time_limit=0.1)
+    dataset = lost(declared("hangs in C", cells=1), client=sturdy[0], time_limit=0.1)
     assert dataset.status.values.tolist() == [Status.TIME_LIMIT_SPENT]
+
+
+FOR_EVER = {
+    "python": "while True: pass",
+    "C": "collections.deque(itertools.repeat(1), maxlen=0)",
+}
+
+
+@pytest.mark.parametrize("where", FOR_EVER)
+def test_a_time_limit_is_one_of_cpu_time(where):
+    """Whatever the clock says, before and after."""
+    script = f"""
+import collections, itertools, time
+from rsfstudy import cells
+cells.WAITING = 1e6
+with cells._limits.within(0.1):
+    time.sleep(1.5)
+print("slept")
+with cells._limits.within(0.1):
+    {FOR_EVER[where]}
+"""
+    words = [sys.executable, "-u", "-c", script]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    assert (ran.returncode, ran.stdout) == (-signal.SIGPROF, "slept\n")
+    assert 'File "<string>"' in ran.stderr  # where it was
 
 
 def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
@@ -331,6 +356,21 @@ def test_the_run_passes_it_on(tmp_path):
         told = run(study, output=tmp_path, despite_failures=True)
     assert np.isfinite(told.slope)
     assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_what_is_said_at_the_end_has_a_file(named, tmp_path, capsys):
+    """Which does not stay where nothing is said; a temporary one where results are not kept."""
+    log = tmp_path / "faulty.workers.log" if named else None
+    with worker_log.kept(log) as file:
+        assert file.exists()
+    assert not file.exists()
+    with worker_log.kept(log) as file:
+        logging.getLogger("distributed.scheduler").error("a worker died")
+        logging.getLogger("distributed.scheduler").info("and so on")
+    assert file.read_text().endswith("a worker died\n")
+    assert "died" not in capsys.readouterr().err
+    file.unlink()
 
 
 def test_workers_that_never_come(monkeypatch):
