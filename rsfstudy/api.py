@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,8 @@ from rsfstudy.study import Study
 from rsfstudy.workers import on_client, on_local_cluster, threads
 
 OUTPUT = Path("outputs")
-#: No cell takes thirty years, and no clock of ours goes much further.
-_LONGEST = 1e9
+#: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
+_LONGEST = 1e8
 
 
 def studies() -> dict[str, Study]:
@@ -69,7 +69,8 @@ def run(
     rtol : float, optional
         Accuracy of the cells.
     time_limit : float
-        Time in s after which a worker gives a cell up; it does not bind in this process.
+        CPU time in s after which a worker gives a cell up, or ten times as long on the clock where
+        the cell sleeps or waits; it does not bind in this process.
     keep_going : bool
         Go on where the first cells all fail, instead of stopping early.
     despite_failures : bool
@@ -103,7 +104,7 @@ def run(
         despite_failures=despite_failures,
         command=command,
     )
-    return _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
+    return prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
 
 
 def declaration(
@@ -117,7 +118,7 @@ def declaration(
 
 
 @dataclass(frozen=True)
-class _Workers:
+class Workers:
     """Where cells are computed, and whether a bar shows how far it is."""
 
     processes: int = 2
@@ -141,11 +142,13 @@ class _Workers:
         at_a_time = self.processes if self.client is None else threads(self.client)
         return max(1, at_a_time)
 
-    def mapper(self) -> Mapper:
-        """What computes batches of cells there."""
+    def mapper(self, log: Path | None = None) -> Mapper:
+        """What computes batches of cells there; `log` is for what processes of ours say when they
+        end.
+        """
         if self.client is not None:
             return on_client(self.client)
-        return on_local_cluster(self.processes) if self.processes > 0 else serial
+        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
 
 
 def _directory(output: str | Path | None) -> Path | None:
@@ -156,14 +159,25 @@ def _directory(output: str | Path | None) -> Path | None:
     return Path(output)
 
 
-def _computed(study: Study, keeping: Keeping, workers: _Workers) -> xr.Dataset:
+def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], xr.Dataset]:
+    """A run that only has to be called.
+
+    Raises
+    ------
+    InvalidValue
+        For whatever is wrong with it.
+    """
     digest = own_code.digest(type(study.measure))
     task = Task(study.measure, study.accuracy, workers.time_limit, own_code=digest)
     if workers.mapper() is not serial:
         sendable(task)  # told before any work, if it is not
     ready = runner.Run(study, keeping, task, workers.threads())
-    with _bar(study.name, workers.progress) as told:
-        return ready(workers.mapper(), told)
+
+    def run() -> xr.Dataset:
+        with _bar(study.name, workers.progress) as told:
+            return ready(workers.mapper(ready.worker_log), told)
+
+    return run
 
 
 @contextlib.contextmanager
@@ -298,7 +312,7 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    ours = _computed(declared, keeping, _Workers(workers, client, time_limit, progress))
+    ours = prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
     return compared(theirs, ours)
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import functools
 import itertools
-import math
-import os
 import pickle
+import signal
 import threading
 import time
 import traceback
 import uuid
 import zlib
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import cloudpickle
@@ -26,16 +26,16 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.study import Cell
 
-#: Time in s a cell may take on a worker, far beyond what the usual work budget allows.
+#: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0
+#: A cell that sleeps or waits has no more than this many times its limit, on the clock.
+WAITING = 10.0
 #: How often finished cells are handed over, in s: in one process, and by a worker.
 _TELL, _TELL_DRIVER = 0.2, 0.5
 #: Tells this process from others.
 _HERE = uuid.uuid4().hex
-#: How often a worker looks for a cell that is over its limit, in s.
-_LOOK = 0.5
-#: How often Python's own watchdog is set anew, and how much later it acts, in s.
-_ARM, _GRACE = 1.0, 3.0
+#: What Dask may compute beside the cells of a worker, as a share of their CPU time.
+_BESIDE = 0.25
 
 #: Cells by their names.
 Batch = Sequence[tuple[bytes, Cell]]
@@ -52,7 +52,7 @@ class Task:
         Each cell says what it changes of its fields.
     accuracy : Accuracy
     time_limit : float
-        Time in s a cell may take on a worker. Nothing bounds it in the user's own process.
+        CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
     code : mapping
         Versions of all that decides a number, which every worker must have.
     own_code : str
@@ -142,7 +142,7 @@ def packed(batch: Batch) -> bytes:
 
 
 def on_worker(sent: bytes, batch: bytes) -> Found:
-    """A packed batch in a worker process, which ends itself at a cell that is over its time limit.
+    """A packed batch in a worker process, which ends at a cell that is over its time limit.
 
     Returns
     -------
@@ -157,15 +157,12 @@ def on_worker(sent: bytes, batch: bytes) -> Found:
     task = _received(sent)
     found: Found = []
     began = time.monotonic()
-    try:
+    ours = task.home == _HERE  # a worker may be a thread of the user's own process
+    with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
         for key, cell in pickle.loads(zlib.decompress(batch)):
-            if task.home != _HERE:  # a worker may be a thread of the user's own process
-                _deadlines.set(task.time_limit)
             found.append((key, computed(task, cell)))
             if time.monotonic() - began > _TELL_DRIVER:
                 break
-    finally:
-        _deadlines.clear()
     return found
 
 
@@ -184,43 +181,42 @@ def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...
     return replace(found, message=message.replace("\0", "\\0")), time.perf_counter() - begin
 
 
-class _Deadlines:
-    """Ends this process once a thread has not finished its cell in time.
+class _Limits:
+    """Has the system end this process where a thread takes too long over a cell.
 
-    A thread of its own looks after all others. Where a cell holds the interpreter's lock it cannot:
-    then Python's own watchdog, which is not precise about which thread is late, ends the process a
-    little later.
+    CPU time is what counts: on a slow or busy machine a cell takes longer and computes no more. It
+    is that of the whole process, so as many threads as compute have as many times the limit. The
+    system acts even where a cell holds the interpreter's lock. The limit is set once a batch: all
+    of its cells but the last take no longer than `_TELL_DRIVER`.
     """
 
     def __init__(self) -> None:
-        self._until: dict[int, float] = {}
-        self._watch: threading.Thread | None = None
-        self._armed = -math.inf
+        self._computing = 0
+        self._lock = threading.Lock()
 
-    def set(self, seconds: float) -> None:
-        """This thread starts a cell."""
-        now = time.monotonic()
-        self._until[threading.get_ident()] = now + seconds
-        if self._watch is None:
-            self._watch = threading.Thread(target=self._look, daemon=True)
-            self._watch.start()
-        if now - self._armed > _ARM:
-            faulthandler.dump_traceback_later(seconds + _GRACE, exit=True)
-            self._armed = now
+    @contextlib.contextmanager
+    def within(self, seconds: float) -> Iterator[None]:
+        """Allow this thread so many seconds of CPU time for a cell of a batch."""
+        self._add(1, seconds)
+        try:
+            yield
+        finally:
+            self._add(-1, seconds)
 
-    def clear(self) -> None:
-        """This thread has no cell."""
-        self._until.pop(threading.get_ident(), None)
-        if not self._until:
-            faulthandler.cancel_dump_traceback_later()
-            self._armed = -math.inf
+    def _add(self, threads: int, seconds: float) -> None:
+        with self._lock:
+            self._computing += threads
+            self._set(self._computing * seconds)
 
-    def _look(self) -> None:
-        while True:
-            time.sleep(_LOOK)
-            if any(time.monotonic() > end for end in list(self._until.values())):
-                faulthandler.dump_traceback()  # the worker's log says where it hangs
-                os._exit(1)
+    @staticmethod
+    def _set(seconds: float) -> None:
+        """The worker's log says where each thread was; 0 s sets no limit."""
+        faulthandler.cancel_dump_traceback_later()
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        if seconds:
+            faulthandler.dump_traceback_later(WAITING * seconds + _TELL_DRIVER, exit=True)
+            faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
+            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _TELL_DRIVER)
 
 
-_deadlines = _Deadlines()
+_limits = _Limits()

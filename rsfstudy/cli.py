@@ -6,8 +6,9 @@ import contextlib
 import math
 import shlex
 import sys
+import time
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,10 @@ from rich.table import Table
 
 from rsfstudy import api, catalogue, terminal
 from rsfstudy.cells import DEFAULT_TIME_LIMIT
-from rsfstudy.errors import InvalidValue, RsfStudyError
-from rsfstudy.runner import FORMATS
+from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError
+from rsfstudy.runner import FORMATS, Keeping
 from rsfstudy.study import Study
-from rsfstudy.terminal import FAILED, OK
+from rsfstudy.terminal import FAILED, OK, Ended
 from rsfstudy.workers import existing_cluster
 
 WRONG_USAGE = 2
@@ -68,7 +69,7 @@ _time_limit = click.option(
     type=float,
     default=DEFAULT_TIME_LIMIT,
     show_default=True,
-    help="Seconds after which a worker gives a cell up.",
+    help="Seconds of CPU time after which a worker gives a cell up.",
 )
 _quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 
@@ -81,7 +82,10 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
-    warnings.showwarning = lambda message, *_place: _stderr.print(f"warning: {message}")
+    # not to the console of errors, which would not know of a progress bar
+    warnings.showwarning = lambda message, *_place: print(
+        terminal.spelt(f"warning: {message}"), file=sys.stderr
+    )
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
@@ -153,30 +157,51 @@ def run(
     serial: bool,
     scheduler: str | None,
     rtol: float | None,
+    time_limit: float,
     quiet: bool,
     **choices: Any,
 ) -> int:
     """Run a study: OUTPUT/NAME.nc, OUTPUT/NAME.png, its reductions and its claims."""
-    status = OK
+    studies = [_declared(catalogue.load(n), settings, rtol) for n in _results(name, every)]
+    command = shlex.join(["rsfstudy", *sys.argv[1:]])
+    keeping = Keeping(output=output, command=command, **choices)
     with _client(scheduler, serial) as client:
-        for named in _results(name, every):
-            study = _declared(catalogue.load(named), settings, rtol)
-            if rtol is not None:
-                terminal.announce(study)
-            dataset = api.run(
-                study,
-                workers=0 if serial else workers,
-                client=client,
-                output=output,
-                progress=not quiet,
-                command=shlex.join(["rsfstudy", *sys.argv[1:]]),
-                **choices,
-            )
-            files = [output / f"{study.name}.{_ENDINGS[choices['format']]}"]
-            drawn = _drawn(dataset, output / f"{study.name}.png")
-            status = max(status, terminal.report(dataset, study.name, files + drawn))
-            status = status if drawn else FAILED
-    return status
+        where = api.Workers(0 if serial else workers, client, time_limit, not quiet)
+        ready = [(study, api.prepared(study, keeping, where)) for study in studies]
+        for study in studies if rtol is not None else ():
+            terminal.announce(study)
+        if every:
+            return _run_all(ready, keeping)
+        return OK if _run(*ready[0], keeping).is_fine else FAILED
+
+
+def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping) -> Ended:
+    """Compute a study, draw it and print what came out."""
+    assert keeping.output is not None
+    began = time.monotonic()
+    dataset = compute()
+    file = keeping.output / f"{study.name}.{_ENDINGS[keeping.format]}"
+    drawn = _drawn(dataset, keeping.output / f"{study.name}.png")
+    terminal.report(dataset, study.name, [file, *drawn])
+    return terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
+
+
+def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: Keeping) -> int:
+    """One study after the other, whatever becomes of each; only Ctrl-C ends them all."""
+    ends: list[Ended] = []
+    try:
+        for study, compute in ready:
+            began = time.monotonic()
+            try:
+                ends.append(_run(study, compute, keeping))
+            except Interrupted:
+                raise
+            except RsfStudyError as error:
+                _stderr.print(f"error: {error}")
+                ends.append(Ended(study.name, time.monotonic() - began, "not finished"))
+    finally:
+        terminal.summary(ends)
+    return OK if all(end.is_fine for end in ends) else FAILED
 
 
 @cli.command()

@@ -63,3 +63,7 @@ class DataError(RsfStudyError):
 
 class RunError(RsfStudyError):
     """A run that could not start or could not finish."""
+
+
+class Interrupted(RunError):
+    """A run that the user ended."""

@@ -36,7 +36,7 @@ CREATE TABLE IF NOT EXISTS cells (
 """
 _AT_A_TIME = 500
 #: How long to wait for another run to end, in s.
-_WAIT = 0.5
+_WAIT = 5.0
 _REMEDY = "Choose another --output, or start over with --fresh."
 
 

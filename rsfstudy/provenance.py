@@ -117,7 +117,7 @@ def _git() -> str:
             capture_output=True,
             text=True,
             check=True,
-            timeout=10,
+            timeout=300,
         ).stdout.strip()
 
     try:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import pieces, provenance, store
-from rsfstudy.cells import Mapper, Task
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, RunError
+from rsfstudy.cells import Found, Mapper, Task
+from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.journal import Columns, Journal, Layout
 from rsfstudy.lattice import assemble
 from rsfstudy.plan import Plan, scattered
@@ -26,6 +27,8 @@ from rsfstudy.study import Study
 #: Typical time of one right-hand side in s, the time a task should last, and the most cells it may
 #: hold: as many are lost with the machine.
 _SECONDS_PER_RHS, _SECONDS_PER_TASK, _LARGEST_BATCH = 6e-6, 0.3, 2000
+#: How a cell ends that ends its worker.
+_LOST = (Status.WORKER_LOST, Status.TIME_LIMIT_SPENT)
 #: A run ends early where so many cells have failed before any is answered.
 _HOPELESS = 10
 
@@ -117,6 +120,11 @@ class Run:
         assert self.keeping.output is not None
         return self.keeping.output / f"{self.study.name}{ending}"
 
+    @property
+    def worker_log(self) -> Path | None:
+        """What worker processes say when they end, if anything is kept."""
+        return None if self.keeping.output is None else self.path(".workers.log")
+
     def __call__(self, mapper: Mapper, progress: Progress) -> xr.Dataset:
         """Compute the cells that are not known yet, and assemble, reduce and write the dataset.
 
@@ -132,7 +140,8 @@ class Run:
         DataError
             If results cannot be kept, or the journal holds cells computed differently.
         RunError
-            When interrupted; what is finished is kept in ``NAME.partial.nc`` and in the journal.
+            When it cannot go on, or is interrupted (`Interrupted`); what is finished is kept in
+            ``NAME.partial.nc`` and in the journal.
         """
         keeping = self.keeping
         if keeping.format == "zarr":
@@ -155,12 +164,15 @@ class Run:
         missing = scattered(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress(done, total)
+        if self.worker_log is not None:
+            self.worker_log.unlink(missing_ok=True)  # of an earlier run
         if not len(missing):
             return
         batches = self.plan.batches(missing, self._batch_size(len(missing)))
         with contextlib.closing(mapper(self.task, batches)) as arriving:
             for found in arriving:
                 journal.add(found)
+                self._tell_lost(found)
                 lost = [outcome for _key, (outcome, _s) in found if not outcome.status.is_answer]
                 failed, done = failed + len(lost), done + len(found)
                 progress(done, total)
@@ -171,6 +183,17 @@ class Run:
                         f"{': ' * bool(first.message)}{first.message}. "
                         "Mend that, or go on all the same with --keep-going (keep_going=True)"
                     )
+
+    def _tell_lost(self, found: Found) -> None:
+        """Name the cells that ended their worker, as soon as they have."""
+        for key, (outcome, _seconds) in found:
+            if outcome.status in _LOST:
+                cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
+                warnings.warn(
+                    f"cell {self.study.place(cell)} failed, {outcome.status.label}: "
+                    f"{outcome.message}. The run goes on",
+                    stacklevel=2,
+                )
 
     def _batch_size(self, cells: int) -> int:
         """Cells per task: long enough to be worth sending, short enough to balance the workers."""
@@ -232,7 +255,8 @@ class Run:
                 store.write(lattice, self.path(".partial.nc"))
             except DataError as unwritten:
                 why += f"{unwritten} "
-        return RunError(why + self._resumable(journal))
+        kind = Interrupted if isinstance(error, KeyboardInterrupt) else RunError
+        return kind(why + self._resumable(journal))
 
     def _resumable(self, journal: Journal) -> str:
         """How much is finished, where it is, and how to go on."""

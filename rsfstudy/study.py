@@ -222,6 +222,14 @@ class Study:
         """The scene of one cell, by its number in row-major order."""
         return self.cell(number).scene
 
+    def place(self, cell: int) -> str:
+        """Where a cell is on the axes, in words."""
+        words = []
+        for axis, i in zip(self.axes, np.unravel_index(cell, self.shape), strict=True):
+            value = axis.labels[i] if axis.labels else short(axis.rows[i][axis.dimension])
+            words.append(f"{axis.dimension} = {value}")
+        return ", ".join(words)
+
     def _split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
         """What rows set of the scene, and of the measure."""
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}

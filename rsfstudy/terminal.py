@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +39,13 @@ class Plain(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out."""
-        spelt = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-        shown = "".join(c if isinstance(c, str) else c.decode() for c in spelt)
-        return super().render_str(shown, **options)
+        return super().render_str(spelt(text), **options)
+
+
+def spelt(text: str) -> str:
+    """Text with what would steer the terminal spelt out."""
+    found = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+    return "".join(c if isinstance(c, str) else c.decode() for c in found)
 
 
 console = Plain(markup=False, emoji=False)
@@ -85,15 +90,62 @@ def announce(study: Study) -> None:
     )
 
 
-def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> int:
+@dataclass(frozen=True)
+class Ended:
+    """What became of the run of a study.
+
+    Parameters
+    ----------
+    study : str
+    seconds : float
+        Time it took.
+    wrong : str
+        What is not as it should be; empty where all is.
+    verdicts : str
+        How many claims had which verdict.
+    """
+
+    study: str
+    seconds: float
+    wrong: str = ""
+    verdicts: str = ""
+
+    @property
+    def is_fine(self) -> bool:
+        """True where nothing is wrong."""
+        return not self.wrong
+
+
+def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
     """What a run ends with: slopes, claims, failures and where the files are."""
     _reductions(dataset)
     _costs(dataset)
-    moved = claims(dataset)
-    failed = failures(dataset, str(files[0]))
+    claims(dataset)
+    failures(dataset, str(files[0]))
     console.print(f"{name}: {_tally(dataset)}")
     console.print(f"wrote {' and '.join(map(str, files))}")
-    return max(moved, failed)
+
+
+def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
+    """How a run ended, in few words."""
+    counts, claimed = runner.counts(dataset), api.check(dataset)
+    answers = {status.label for status in Status if status.is_answer}
+    wrong = [f"{count} {label}" for label, count in counts.items() if label not in answers]
+    verdicts = ""
+    if len(claimed):
+        wrong += [f"{claim} moved" for claim in dict.fromkeys(claimed["id"][claimed["moved"]])]
+        verdicts = ", ".join(f"{n} {v}" for v, n in claimed["verdict"].value_counts().items())
+    wrong += [] if drawn else ["no figure"]
+    return Ended(name, seconds, ", ".join(wrong), verdicts)
+
+
+def summary(ends: Sequence[Ended]) -> None:
+    """Print how several runs ended."""
+    table = Table("study", "status", Column("time", justify="right"), "verdicts")
+    for end in ends:
+        status = Text(end.wrong or "ok", style="green" if end.is_fine else "red")
+        table.add_row(end.study, status, f"{end.seconds:.0f} s", end.verdicts or "-")
+    console.print(table)
 
 
 def _tally(dataset: xr.Dataset) -> str:

@@ -19,24 +19,32 @@ import time
 import warnings
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
-from multiprocessing import resource_tracker
+from pathlib import Path
 from typing import Any
 
-from rsfstudy.cells import Batch, Found, Mapper, Task, on_worker, packed, sendable
+from rsfstudy.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
 from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-_START_TIMEOUT = 60
-#: Time in s without any worker after which a run ends.
-PATIENCE = 60.0
+#: Time in s after which a process of this machine that does not answer never will.
+_HANGS = 600
+#: Time in s without any worker after which a run says so, and after which it ends.
+TELL, PATIENCE = 30.0, 600.0
 _LOOK = 2.0
 #: How often a cell may kill its worker before it is recorded as the culprit.
 _TRIES = 2
 
 
-def on_client(client: Any) -> Mapper:
-    """On the workers of a Dask client; they need no shared file system."""
+def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
+    """On the workers of a Dask client; they need no shared file system.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    log : str
+        Where a worker that ends says why, for messages.
+    """
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
         sent, waiting = sendable(task), _Waiting(batches)
@@ -56,6 +64,11 @@ def on_client(client: Any) -> Mapper:
                             waiting.back(batch[len(found) :])
                             yield found
                 elif suspects:
+                    warnings.warn(
+                        f"a worker ended: the cells it held ({len(suspects)}) are computed again, "
+                        f"one at a time (see {log})",
+                        stacklevel=2,
+                    )
                     for cell in suspects:
                         yield _alone(client, task, [cell])
                     suspects = []
@@ -91,6 +104,8 @@ def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]
 
 def threads(client: Any) -> int:
     """How many cells the workers of a client compute at a time."""
+    if client.status == "connecting":  # again
+        raise RunError("the Dask scheduler is lost")
     if client.status != "running":
         raise RunError(f"the Dask client is {client.status}: connect one to a cluster")
     try:
@@ -109,7 +124,7 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
     """
     from distributed import wait
 
-    seen = time.monotonic()
+    seen, told = time.monotonic(), False
     while True:
         try:
             done: Iterable[Any] = wait(
@@ -117,14 +132,15 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
             ).done
             return done
         except TimeoutError:
-            waiting = time.monotonic() - seen
+            waited = time.monotonic() - seen
             if threads(client):
-                seen = time.monotonic()
-            elif waiting < 2 * _LOOK:
+                seen, told = time.monotonic(), False
+            elif waited > TELL and not told:
+                told = True
                 warnings.warn(
-                    f"the Dask cluster has no worker: waiting {PATIENCE:g} s", stacklevel=2
+                    f"the Dask cluster has no worker: waiting {PATIENCE:g} s for one", stacklevel=2
                 )
-            elif time.monotonic() - seen > PATIENCE:
+            elif waited > PATIENCE:
                 raise RunError(
                     f"the Dask cluster has had no worker for {PATIENCE:g} s: start some"
                 ) from None
@@ -157,6 +173,7 @@ def _result(future: Any) -> Found | None:
 def _alone(client: Any, task: Task, batch: Batch) -> Found:
     """A suspect by itself; the culprit where its worker dies again."""
     for _ in range(_TRIES):
+        _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
         began = time.monotonic()
         future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
         try:
@@ -168,7 +185,10 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
             return found
         seconds = time.monotonic() - began
         if seconds > task.time_limit:
-            text = f"no answer within {task.time_limit:g} s; the worker's log shows where it was"
+            text = (
+                f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
+                "on the clock; the worker's log shows where it was"
+            )
             return [(batch[0][0], (Outcome(Status.TIME_LIMIT_SPENT, message=text), seconds))]
     text = (
         f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
@@ -177,12 +197,14 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
     return [(batch[0][0], (Outcome(Status.WORKER_LOST, message=text), math.nan))]
 
 
-def on_local_cluster(processes: int) -> Mapper:
+def on_local_cluster(processes: int, log: Path | None) -> Mapper:
     """On worker processes of this machine, started when there is something to compute."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-        with local_cluster(processes) as client:
-            yield from on_client(client)(task, batches)
+        from rsfstudy import worker_log
+
+        with worker_log.kept(log) as file, local_cluster(processes, file) as client:
+            yield from on_client(client, str(file))(task, batches)
 
     return mapper
 
@@ -222,7 +244,6 @@ def _interrupts_held() -> Iterator[None]:
         yield
         return
     handler = signal.signal(signal.SIGINT, hold)
-    resource_tracker.ensure_running()  # which would lift what is blocked
     # threads that are started now, and their processes, keep what is blocked now
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -235,38 +256,62 @@ def _interrupts_held() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def local_cluster(workers: int) -> Iterator[Any]:
-    """A Dask client of worker processes on this machine, with one thread each."""
+def local_cluster(workers: int, log: Path) -> Iterator[Any]:
+    """A Dask client of worker processes on this machine, with one thread each.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+    log : Path
+        Where they write errors.
+
+    Raises
+    ------
+    RunError
+        If they cannot be started.
+    """
     import dask
     from distributed import Client, LocalCluster
 
+    from rsfstudy import worker_log
+
     quiet = {
         "distributed.scheduler.allowed-failures": 0,
+        # nothing but a time limit ends a worker that is slow, or held up by its cell
+        "distributed.scheduler.worker-ttl": None,
         # Dask closes for good a worker that died and happens to be starting again this long after
         "distributed.deploy.lost-worker-timeout": "1000 days",
         # what each process does beside its cells: 50 ticks and 100 looks at the stack a second
         "distributed.admin.tick.interval": "1s",
         "distributed.worker.profile.enabled": False,
-        "distributed.comm.timeouts.connect": f"{_START_TIMEOUT}s",
+        "distributed.comm.timeouts.connect": f"{_HANGS}s",
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
         ),
     }
     with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
+        worker_log.start_tracker(log)  # later, it would lift what `_interrupts_held` blocks
         started = stack.enter_context(contextlib.ExitStack())
         started.enter_context(_interrupts_held())
-        cluster = stack.enter_context(
-            LocalCluster(
+        try:
+            cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address=":0",
                 scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.CRITICAL,
+                silence_logs=logging.ERROR,
+                plugins=(worker_log.WritesTo(log.resolve()),),
             )
-        )
+        except Exception as error:
+            why = str(error).rstrip(".")
+            raise RunError(f"a worker process could not be started ({why})") from error
+        stack.enter_context(cluster)
         started.close()
-        yield stack.enter_context(Client(cluster))
+        client = stack.enter_context(Client(cluster))
+        stack.callback(worker_log.start_tracker, log)  # if it was killed
+        yield client
 
 
 async def _greeting(address: str) -> None:
@@ -278,7 +323,7 @@ async def _greeting(address: str) -> None:
 
 
 @contextlib.contextmanager
-def existing_cluster(address: str, *, timeout: float = 10.0) -> Iterator[Any]:
+def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     """A client of a Dask scheduler that is already running.
 
     Raises

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from rsfstudy import Scene
+from rsfstudy import Scene, workers
 from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.core.motion import motion
 from rsfstudy.core.stepping import Meter, Step
@@ -31,6 +32,13 @@ def follow(
     raise AssertionError("a motion never ends by itself")
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """However long workers take to start, no test gives them up."""
+    monkeypatch.setattr(workers, "TELL", math.inf)
+    monkeypatch.setattr(workers, "PATIENCE", math.inf)
+
+
 @pytest.fixture
 def constant() -> Scene:
     """Slip law at constant normal stress."""
@@ -44,9 +52,8 @@ def variable() -> Scene:
 
 
 @pytest.fixture(scope="session")
-def cluster():
+def cluster(tmp_path_factory):
     """A Dask client of two worker processes."""
-    from rsfstudy import workers
-
-    with workers.local_cluster(2) as client:
+    log = tmp_path_factory.mktemp("cluster") / "workers.log"
+    with workers.local_cluster(2, log) as client:
         yield client

@@ -1,16 +1,20 @@
 """A study whose cells go wrong on demand, as a module of the tests and as a study file of its own.
 
-Its measure gives b/a. The environment says how long a cell takes, and what it does at which b/a.
+Its measure gives b/a. The environment says how much CPU time a cell takes, what it does at which
+b/a, and whether cells wait until they are let through.
 """
 
 from __future__ import annotations
 
 import asyncio
+import collections
 import ctypes
+import itertools
 import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -30,14 +34,33 @@ def _raise(error: BaseException):
 
 
 def _eat_memory():
-    eaten = []
-    while True:
-        eaten.append(np.ones(2_000_000))
-        time.sleep(0.01)
+    """More than a worker may have, and no more than the machine has."""
+    eaten = [np.ones(2_000_000) for _ in range(60)]
+    _hang()
+    return eaten
 
 
 def _hang():
     while True:
+        time.sleep(0.01)
+
+
+def _take(seconds: float):
+    end = time.thread_time() + seconds
+    while time.thread_time() < end:
+        pass
+
+
+def _wait_at(gate: Path):
+    """The first cell of each process passes, and takes long enough to be handed over by itself; all
+    others wait until the gate is open.
+    """
+    mine = gate / str(os.getpid())
+    if not mine.exists():
+        mine.touch()
+        time.sleep(0.6)
+        return
+    while not (gate / "open").exists():
         time.sleep(0.01)
 
 
@@ -69,8 +92,11 @@ FAULTS: dict[str, Callable] = {
     "dies": lambda _meter: os._exit(1),
     "segfaults": lambda _meter: ctypes.string_at(0),
     "eats memory": lambda _meter: _eat_memory(),
+    "sleeps": lambda _meter: (time.sleep(3.0), Outcome(Status.OK, {"total": 1.0}))[1],
     "hangs": lambda _meter: _hang(),
     "hangs in C": lambda _meter: ctypes.PyDLL(None).sleep(10**6),
+    # holding the interpreter's lock, as the one before
+    "spins in C": lambda _meter: collections.deque(itertools.repeat(1), maxlen=0),
 }
 
 
@@ -86,7 +112,9 @@ class Faulty(Measure):
     typical_work: ClassVar[int] = 1
 
     def find(self, scene, accuracy, meter):
-        time.sleep(float(os.environ.get("FAULT_TAKES", "0")))
+        _take(float(os.environ.get("FAULT_TAKES", "0")))
+        if "FAULT_GATE" in os.environ:
+            _wait_at(Path(os.environ["FAULT_GATE"]))
         if scene.b_over_a in self.at or (self.fault and not self.at):
             return FAULTS[self.fault](meter)
         meter.charge("any", 7)

@@ -29,6 +29,8 @@ SMALL = Study(
     measure=CriticalStep(),
 )
 FAULTY = Path(__file__).with_name("faulty.py")
+#: Time in s after which what has not come on any machine never will.
+HANGS = 1200.0
 
 
 def run(study=SMALL, **options) -> xr.Dataset:
@@ -36,20 +38,18 @@ def run(study=SMALL, **options) -> xr.Dataset:
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
 
 
-def named_results(study: str | Study, tmp_path_factory) -> tuple[xr.Dataset, Path]:
+def named_results(study: str | Study, tmp_path_factory, client) -> tuple[xr.Dataset, Path]:
     """Results of a named study, and their file, computed once for all processes of the tests."""
     place = tmp_path_factory.getbasetemp()
     output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
-    for _ in range(600):
+    end = time.monotonic() + HANGS
+    while True:
         try:
-            dataset = rsfstudy.run(study, output=output, progress=False)
+            dataset = rsfstudy.run(study, output=output, client=client, progress=False)
+            return dataset, output / f"{dataset.attrs['id']}.nc"
         except DataError as error:
-            if "another run uses" not in str(error):
+            if "another run uses" not in str(error) or time.monotonic() > end:
                 raise
-            time.sleep(0.5)
-            continue
-        return dataset, output / f"{dataset.attrs['id']}.nc"
-    raise AssertionError("another process never finished it")
 
 
 def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
@@ -80,34 +80,40 @@ def command(*words, **environment) -> subprocess.Popen:
     )
 
 
-def ended(process: subprocess.Popen, seconds: float = 120) -> tuple[int, str, str]:
+def ended(process: subprocess.Popen) -> tuple[int, str, str]:
     """Exit status, output and errors, once it has ended."""
-    out, said = process.communicate(timeout=seconds)
+    out, said = process.communicate(timeout=HANGS)
     assert "Traceback" not in said, said
     return process.returncode, out, said
 
 
 def cells_in(journal: Path) -> int:
-    """Number of cells another process has kept so far, which lets nobody else read while it runs:
-    then what is on disk is looked at without asking. Where nobody runs, what a killed one left
-    unfinished is rolled back, as by the next run.
+    """Number of cells that a run that has ended has kept; what it left unfinished is rolled back,
+    as by the next run.
     """
-    for way in ("mode=rw", "immutable=1"):
-        try:
-            with contextlib.closing(
-                sqlite3.connect(f"file:{journal}?{way}", uri=True, timeout=0)
-            ) as db:
-                return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
-        except sqlite3.Error as error:
-            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
-                return 0
-    return 0
+    with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=rw", uri=True)) as db:
+        return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
 
 
-def until(true: Callable[[], bool], process: subprocess.Popen | None = None) -> None:
-    """Wait until something is so, or a process has ended."""
-    for _ in range(1200):
-        if true() or (process is not None and process.poll() is not None):
-            return
+def until_kept(journal: Path, process: subprocess.Popen) -> None:
+    """Wait until a run has kept cells. It lets nobody else read its journal: what is on disk is
+    looked at without asking.
+    """
+
+    def kept() -> bool:
+        with contextlib.suppress(sqlite3.Error):  # not there yet, or in the middle of a write
+            uri = f"file:{journal}?immutable=1"
+            with contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
+                return bool(db.execute("SELECT count(*) FROM cells").fetchone()[0])
+        return False
+
+    until(kept, process)
+
+
+def until(true: Callable[[], bool], process: subprocess.Popen) -> None:
+    """Wait until something is so, while a process goes on."""
+    end = time.monotonic() + HANGS
+    while not true():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end, "it never came to be"
         time.sleep(0.05)
-    raise AssertionError("it never came to be")

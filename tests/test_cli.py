@@ -1,29 +1,47 @@
 """The command line: what it prints, what it writes, and its exit statuses."""
 
+import io
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from faulty import declared
+from running import SMALL as LATTICE
 
 import rsfstudy
-from rsfstudy import cli, store
+from rsfstudy import catalogue, cli, store
+from rsfstudy.claims import Claim
 from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
 
 
-def call(*words: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "rsfstudy.cli", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def call(*words) -> SimpleNamespace:
+    """The command, in this process."""
+    out, said = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["rsfstudy", *map(str, words)])
+        patch.setattr(cli.warnings, "showwarning", None)  # which it sets
+        patch.setattr(sys, "stdout", out)
+        patch.setattr(sys, "stderr", said)
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    code = ended.value.code
+    return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=said.getvalue())
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
+    """From a process of its own, as a user calls it."""
     output = tmp_path_factory.mktemp("outputs")
-    ran = call("run", NAME, *SMALL, "--output", output)
+    command = [sys.executable, "-m", "rsfstudy.cli", "run", NAME, *SMALL, "--output", output]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     return output, ran.stdout
 
@@ -107,11 +125,11 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     assert settings[1].split("=")[0] in ran.stdout
 
 
-def test_plot_draws_beside_a_file(results):
+def test_plot_draws_beside_a_file(results, tmp_path):
     output, _said = results
-    (output / f"{NAME}.png").unlink()
-    assert call("plot", output / f"{NAME}.nc").returncode == 0
-    assert (output / f"{NAME}.png").exists()
+    shutil.copy(output / f"{NAME}.nc", tmp_path)
+    assert call("plot", tmp_path / f"{NAME}.nc").returncode == 0
+    assert (tmp_path / f"{NAME}.png").exists()
 
 
 def test_list_and_show():
@@ -185,3 +203,87 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
     ran = call("run", "hard_cases", "--set", f"hard_case={label}", "--output", tmp_path, "--serial")
     assert ran.returncode == 0, ran.stderr
     assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
+
+
+# ---- several studies, one after the other -------------------------------------------------------
+
+
+@pytest.fixture
+def catalogued(monkeypatch):
+    """Puts studies in the place of the named ones."""
+
+    def named(*studies):
+        by_name = {study.name: study for study in studies}
+        monkeypatch.setattr(catalogue, "names", lambda: tuple(by_name))
+        monkeypatch.setattr(catalogue, "load", by_name.__getitem__)
+
+    return named
+
+
+def rows(said: str) -> dict[str, list[str]]:
+    """The last table, by the first column."""
+    lines = [line.strip("│ ").split("│") for line in said.splitlines() if line.startswith("│")]
+    return {first.strip(): [cell.strip() for cell in others] for first, *others in lines}
+
+
+def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monkeypatch):
+    """A cell that fails, a verdict that moved, a figure that fits nothing, a run that cannot start:
+    the others are run, and a table says what became of each.
+    """
+    monkeypatch.setenv("COLUMNS", "150")
+    claim = Claim(
+        id="C1",
+        statement="the total is 3",
+        source="nowhere",
+        variable="total",
+        where={"b_over_a": 2.0},
+        published=3.0,
+        tolerance=0.1,
+        reason="a test",
+    )
+    catalogued(
+        replace(declared("raises", at=(2.5,)), name="failing"),
+        replace(declared(), name="moving", claims=[claim]),
+        replace(declared(), name="undrawn", plot="no_such_figure"),
+        replace(declared(), name="taken"),
+        replace(declared(), name="fine"),
+    )
+    (tmp_path / "taken.cells.sqlite").write_text("something else")
+    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    assert ran.returncode == 1
+    assert "taken.cells.sqlite" in ran.stderr
+    ended = rows(ran.stdout)
+    assert {name: row[0] for name, row in ended.items() if name in catalogue.names()} == {
+        "failing": "1 cell_raised",
+        "moving": "C1 moved",
+        "undrawn": "no figure",
+        "taken": "not finished",
+        "fine": "ok",
+    }
+    assert ended["moving"][2] == "1 differs"
+    assert (tmp_path / "fine.nc").exists()
+
+
+def test_run_all_is_fine_where_every_study_is(catalogued, tmp_path):
+    catalogued(replace(declared(), name="one"), replace(declared(), name="two"))
+    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    assert ran.returncode == 0
+    assert [row[0] for row in rows(ran.stdout).values()] == ["ok", "ok"]
+
+
+def test_ctrl_c_ends_all_studies(catalogued, tmp_path):
+    interrupted = replace(declared("interrupts", at=(2.5,)), name="interrupted")
+    catalogued(replace(declared(), name="before"), interrupted, replace(declared(), name="after"))
+    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    assert ran.returncode == 1
+    assert "cells are finished and kept" in ran.stderr
+    assert list(rows(ran.stdout)) == ["before"]
+    assert not (tmp_path / "after.cells.sqlite").exists()
+
+
+def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_path):
+    catalogued(LATTICE, declared())
+    ran = call("run", "--all", "--serial", "--set", "case=constant", "--output", tmp_path / "o")
+    assert ran.returncode == 2
+    assert "case" in ran.stderr
+    assert not (tmp_path / "o").exists()

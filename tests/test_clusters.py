@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 import yaml
 from faulty import declared
-from running import FAULTY, SMALL, cells_in, command, ended, run, same_numbers, until
+from running import FAULTY, HANGS, SMALL, command, ended, run, same_numbers, until, until_kept
 
 import rsfstudy
 from rsfstudy import provenance, workers
@@ -53,7 +53,7 @@ class Cluster:
     def _end(process):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait(30)
+        process.wait(HANGS)
 
     def worker(self, **environment):
         place = self.tmp_path / f"worker{len(self.workers)}"
@@ -72,7 +72,8 @@ def test_the_same_bits_as_in_this_process(separate, tmp_path):
     """The workers write nothing, neither where they are nor where the results go."""
     separate.worker()
     separate.worker()
-    with workers.existing_cluster(separate.address) as client:
+    with workers.existing_cluster(separate.address, timeout=HANGS) as client:
+        client.wait_for_workers(2)
         same_numbers(run(SMALL, client=client, output=tmp_path / "results"), run())
     assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
     for place in ("worker0", "worker1"):
@@ -80,37 +81,46 @@ def test_the_same_bits_as_in_this_process(separate, tmp_path):
         assert not list((tmp_path / place).rglob("*.sqlite"))
 
 
-def test_a_worker_lost_in_mid_run(separate, tmp_path):
+@pytest.fixture
+def held(separate, tmp_path):
+    """A run on two workers that has kept some of its cells, while the others wait until the gate is
+    open; its directory, and that gate.
+    """
+    output, gate = tmp_path / "results", tmp_path / "gate"
+    gate.mkdir()
+    separate.worker(FAULT_GATE=str(gate))
+    separate.worker(FAULT_GATE=str(gate))
+    words = ("run", FAULTY, "--scheduler", separate.address, "--output", output)
+    process = command(*words, FAULT_CELLS="30")
+    until_kept(output / "faulty.cells.sqlite", process)
+    until(lambda: len(list(gate.iterdir())) == 2, process)  # both have cells
+    yield process, output, gate / "open"
+    process.kill()
+    process.communicate()
+
+
+def test_a_worker_lost_in_mid_run(separate, held):
     """kill -9 of one of two, from the command line; no cell is blamed."""
-    slow = {"FAULT_TAKES": "0.05"}
-    separate.worker(**slow)
-    separate.worker(**slow)
-    words = ("run", FAULTY, "--scheduler", separate.address, "--output", tmp_path / "results")
-    process = command(*words, FAULT_CELLS="60")
-    until(lambda: cells_in(tmp_path / "results" / "faulty.cells.sqlite") > 0, process)
+    process, output, gate = held
     separate.workers[0].kill()
+    gate.touch()
     code, out, said = ended(process)
     assert code == 0, out + said
-    same_numbers(rsfstudy.open("faulty", tmp_path / "results"), run(declared(cells=60)))
+    same_numbers(rsfstudy.open("faulty", output), run(declared(cells=30)))
 
 
-def test_a_scheduler_lost_in_mid_run(separate, tmp_path):
+def test_a_scheduler_lost_in_mid_run(separate, held):
     """The run ends with what it has, and goes on without the cluster."""
-    separate.worker(FAULT_TAKES="0.05")
-    output = tmp_path / "results"
-    quick = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s", "FAULT_CELLS": "60"}
-    words = ("run", FAULTY, "--output", output)
-    process = command(*words, "--scheduler", separate.address, **quick)
-    until(lambda: cells_in(output / "faulty.cells.sqlite") > 0, process)
+    process, output, _gate = held
     separate.scheduler.kill()
     code, _out, said = ended(process)
     assert code == 1
     assert "the Dask scheduler is lost" in said
     assert "distributed." not in said  # told once, not by Dask too
-    assert "of 60 cells are finished and kept" in said
+    assert "of 30 cells are finished and kept" in said
     assert (output / "faulty.partial.nc").exists()
-    resumed = run(declared(cells=60), output=output)
-    same_numbers(resumed, run(declared(cells=60)))
+    resumed = run(declared(cells=30), output=output)
+    same_numbers(resumed, run(declared(cells=30)))
 
 
 def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
@@ -126,7 +136,7 @@ def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
 def test_a_scheduler_that_does_not_answer_is_named(address):
     with (
         pytest.raises(RunError, match=re.escape(f"no Dask scheduler answers at {address!r}")),
-        workers.existing_cluster(address, timeout=1),
+        workers.existing_cluster(address, timeout=0.3),
     ):
         pass
 
@@ -136,7 +146,7 @@ def test_a_port_that_listens_and_says_nothing(tmp_path):
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
             pytest.raises(RunError, match="no Dask scheduler answers"),
-            workers.existing_cluster(address, timeout=1),
+            workers.existing_cluster(address, timeout=0.3),
         ):
             pass
 
@@ -175,7 +185,7 @@ def cluster(walltime, queue, **words):
 
 runpy.run_path(sys.argv[1])["main"](
     "rate_step_boundary", cluster, jobs=1, cores=1, processes=1, memory="2GB",
-    python=sys.executable, scheduler_options={"dashboard_address": ":0"},
+    python=sys.executable, death_timeout=1200, scheduler_options={"dashboard_address": ":0"},
 )
 """
 
@@ -221,9 +231,9 @@ def test_the_kubernetes_file_starts_a_cluster(tmp_path):
                     start_new_session=True,
                 )
             )
-        with workers.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=30) as client:
+        with workers.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=HANGS) as client:
             same_numbers(run(client=client), run())
     finally:
         for process in started:
             os.killpg(process.pid, signal.SIGKILL)
-            process.wait(30)
+            process.wait(HANGS)

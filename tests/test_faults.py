@@ -2,8 +2,10 @@
 is drawn from it unless one says so.
 """
 
+import logging
 import os
 import shlex
+import signal
 import subprocess
 import sys
 
@@ -11,10 +13,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, command, ended, run
+from running import FAULTY, HANGS, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli, runner, terminal, workers
+from rsfstudy import Axis, Scene, Study, cli, runner, terminal, worker_log, workers
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
@@ -69,11 +71,28 @@ def test_a_cell_that_goes_wrong(fault, status, message, cluster, tmp_path, capsy
         assert status in capsys.readouterr().out
 
 
+@pytest.fixture(scope="module")
+def sturdy(tmp_path_factory):
+    """Workers that are started again when a cell kills them."""
+    log = tmp_path_factory.mktemp("sturdy") / "workers.log"
+    with workers.local_cluster(2, log) as client:
+        yield client, log
+
+
+def lost(*words, **options):
+    """A run that says that a worker ended, and which cell is to blame."""
+    with (
+        pytest.warns(UserWarning, match="a worker ended: the cells it held"),
+        pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run goes on"),
+    ):
+        return run(*words, **options)
+
+
 @pytest.mark.parametrize("fault", ["dies", "segfaults"])
-def test_a_cell_that_kills_its_worker(fault, monkeypatch):
+def test_a_cell_that_kills_its_worker(fault, sturdy, monkeypatch):
     """One batch holds the killer and its neighbours: only the killer is recorded."""
     monkeypatch.setattr(Run, "_batch_size", lambda *_args: 4)
-    dataset = run(declared(fault, at=(2.5,)), workers=2)
+    dataset = lost(declared(fault, at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]
 
@@ -89,20 +108,58 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     """A worker may be a thread of it."""
     from distributed import Client
 
-    monkeypatch.setenv("FAULT_TAKES", "1.2")
+    monkeypatch.setenv("FAULT_TAKES", "1")
     with Client(processes=False, n_workers=1, dashboard_address=None) as client:
         dataset = run(declared(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("fault", ["hangs", "hangs in C"])
-def test_a_cell_that_hangs(fault):
-    """Past the time limit its worker ends itself, even where it cannot run any Python; the cell is
-    tried alone before it is blamed.
+def test_a_cell_that_computes_for_ever(sturdy):
+    """Past the time limit its worker ends, even where it cannot run any Python; the cell is tried
+    alone before it is blamed.
     """
-    dataset = run(declared(fault, at=(2.5,)), workers=2, time_limit=1.0)
+    client, log = sturdy
+    dataset = lost(declared("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
-    assert "no answer within 1 s" in dataset.message.values[1]
+    assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
+    assert "faulty.py" in log.read_text()  # where it was
+
+
+def test_a_cell_that_waits_for_ever(sturdy):
+    """It takes no CPU time, and has ten times as long."""
+    dataset = lost(declared("hangs in C", cells=1), client=sturdy[0], time_limit=0.1)
+    assert dataset.status.values.tolist() == [Status.TIME_LIMIT_SPENT]
+
+
+FOR_EVER = {
+    "python": "while True: pass",
+    "C": "collections.deque(itertools.repeat(1), maxlen=0)",
+}
+
+
+@pytest.mark.parametrize("where", FOR_EVER)
+def test_a_time_limit_is_one_of_cpu_time(where):
+    """Whatever the clock says, before and after."""
+    script = f"""
+import collections, itertools, time
+from rsfstudy import cells
+cells.WAITING = 1e6
+with cells._limits.within(0.1):
+    time.sleep(1.5)
+print("slept")
+with cells._limits.within(0.1):
+    {FOR_EVER[where]}
+"""
+    words = [sys.executable, "-u", "-c", script]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    assert (ran.returncode, ran.stdout) == (-signal.SIGPROF, "slept\n")
+    assert 'File "<string>"' in ran.stderr  # where it was
+
+
+def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
+    """As on a machine that is busy with something else."""
+    dataset = run(declared("sleeps", at=(2.5,)), client=sturdy[0], time_limit=2.0)
+    assert dataset.status.values.tolist() == [0, 0, 0, 0]
 
 
 def test_a_cell_that_exhausts_memory(tmp_path):
@@ -120,21 +177,29 @@ def test_a_cell_that_exhausts_memory(tmp_path):
         ) as cluster,
         Client(cluster) as client,
     ):
-        dataset = run(declared("eats memory", at=(2.5,)), client=client)
+        dataset = lost(declared("eats memory", at=(2.5,)), client=client)
     only_one_failed(dataset, "worker_lost")
 
 
-@pytest.mark.parametrize("fault", ["raises", "nan", "dies"])
-def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path, monkeypatch):
-    where = {"workers": 2 if fault == "dies" else 0}
-    many = 3 if fault == "dies" else 10  # a death takes seconds
-    monkeypatch.setattr(runner, "_HOPELESS", many)
+def stops_at_the_start(fault, many, output, **where):
     with pytest.raises(RunError, match=r"the first \d+ cells all failed, .*keep_going=True"):
-        run(declared(fault, cells=1000), output=tmp_path, **where)
-    partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
+        run(declared(fault, cells=1000), output=output, **where)
+    partial = rsfstudy.open(output / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)
     assert many <= int(tried.sum()) < 1000
-    assert not (tmp_path / "faulty.nc").exists()
+    assert not (output / "faulty.nc").exists()
+
+
+@pytest.mark.parametrize("fault", ["raises", "nan"])
+def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path):
+    stops_at_the_start(fault, runner._HOPELESS, tmp_path)
+
+
+def test_also_where_every_cell_kills_its_worker(sturdy, tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "_TRIES", 1)  # a worker takes seconds to start
+    monkeypatch.setattr(runner, "_HOPELESS", 2)
+    with pytest.warns(UserWarning, match="a worker ended|worker_lost"):
+        stops_at_the_start("dies", 2, tmp_path, client=sturdy[0])
 
 
 def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
@@ -206,8 +271,7 @@ def test_a_cell_of_a_named_study_alone(tmp_path):
 AWKWARD = ["1:2:3", "p,q", "true", "3", "1e3", " lead", "a='b\"", "[red]", "Größe", "x = 1, y = 2"]
 
 
-@pytest.mark.parametrize("number", range(len(AWKWARD)))
-def test_cells_with_awkward_labels_alone(number, tmp_path):
+def test_cells_with_awkward_labels_alone(tmp_path):
     """The command that is printed finds the cell, whatever its label."""
     rows = {label: {"b_over_a": 2.0 + i} for i, label in enumerate(AWKWARD)}
     study = Study(
@@ -218,13 +282,13 @@ def test_cells_with_awkward_labels_alone(number, tmp_path):
         measure=CriticalStep(of="displacement_step"),
     )
     dataset = run(study, output=tmp_path)
-    index = (number, 1)
-    dataset["status"][index] = int(Status.UNVERIFIED)
-    place = {"study": AWKWARD[number], "inertia": dataset.inertia.values[1]}
-    words = shlex.split(terminal._reproducing(dataset, str(tmp_path / "awkward.nc"), place))
-    cells = dict(cli._place(text) for text in words if "=" in text)
-    scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
-    assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
+    dataset["status"][:, 1] = int(Status.UNVERIFIED)
+    for number, label in enumerate(AWKWARD):
+        place = {"study": label, "inertia": dataset.inertia.values[1]}
+        words = shlex.split(terminal._reproducing(dataset, str(tmp_path / "awkward.nc"), place))
+        cells = dict(cli._place(text) for text in words if "=" in text)
+        scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
+        assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
 
 
 def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
@@ -294,17 +358,33 @@ def test_the_run_passes_it_on(tmp_path):
     assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_what_is_said_at_the_end_has_a_file(named, tmp_path, capsys):
+    """Which does not stay where nothing is said; a temporary one where results are not kept."""
+    log = tmp_path / "faulty.workers.log" if named else None
+    with worker_log.kept(log) as file:
+        assert file.exists()
+    assert not file.exists()
+    with worker_log.kept(log) as file:
+        logging.getLogger("distributed.scheduler").error("a worker died")
+        logging.getLogger("distributed.scheduler").info("and so on")
+    assert file.read_text().endswith("a worker died\n")
+    assert "died" not in capsys.readouterr().err
+    file.unlink()
+
+
 def test_workers_that_never_come(monkeypatch):
-    """A scheduler without workers: the run ends with the reason."""
+    """A scheduler without workers: the run says so, and ends with the reason."""
     from distributed import Client, LocalCluster
 
-    monkeypatch.setattr(workers, "PATIENCE", 1.0)
+    for name, seconds in {"_LOOK": 0.1, "TELL": 0.2, "PATIENCE": 0.4}.items():
+        monkeypatch.setattr(workers, name, seconds)
     with (
         LocalCluster(
             n_workers=0, dashboard_address=":0", scheduler_kwargs={"dashboard": False}
         ) as cluster,
         Client(cluster) as client,
-        pytest.warns(UserWarning, match="has no worker: waiting 1 s"),
-        pytest.raises(RunError, match="no worker for 1 s: start some"),
+        pytest.warns(UserWarning, match=r"has no worker: waiting 0\.4 s for one"),
+        pytest.raises(RunError, match=r"no worker for 0\.4 s: start some"),
     ):
         run(declared(), client=client)

@@ -36,6 +36,7 @@ FLOORS = {
     "own_code": 5,
     "provenance": 5,
     "cells": 6,
+    "worker_log": 6,
     "workers": 6,
     "runner": 6,
     "catalogue": 6,
@@ -49,7 +50,7 @@ FLOORS = {
 #: Only these may import a library that would weigh on all others.
 HOMES = {
     "dask": {"workers", "store"},
-    "distributed": {"workers"},
+    "distributed": {"workers", "worker_log"},
     "matplotlib": {"plots"},
     "click": {"cli"},
     "rich": {"api", "cli", "terminal"},

@@ -6,7 +6,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
-from running import named_results
+from running import HANGS, named_results
 
 NOTEBOOK = Path(__file__).parent.parent / "studies" / "analysis.ipynb"
 STUDIES = (
@@ -22,16 +22,16 @@ STUDIES = (
 
 
 @pytest.fixture(scope="module")
-def executed(tmp_path_factory):
+def executed(tmp_path_factory, cluster):
     outputs = tmp_path_factory.mktemp("outputs")
     for name in STUDIES:
-        _dataset, file = named_results(name, tmp_path_factory)
+        _dataset, file = named_results(name, tmp_path_factory, cluster)
         shutil.copy(file, outputs)
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("MPLBACKEND", raising=False)  # the kernel chooses its own
         patch.setenv("RSFSTUDY_OUTPUTS", str(outputs))
-        client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": outputs}})
+        client = NotebookClient(notebook, timeout=HANGS, resources={"metadata": {"path": outputs}})
         return client.execute()
 
 

@@ -9,36 +9,76 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 
 import psutil
 import pytest
 from faulty import declared
-from running import FAULTY, SMALL, cells_in, command, ended, run, same_numbers, until
+from running import (
+    FAULTY,
+    HANGS,
+    SMALL,
+    cells_in,
+    command,
+    ended,
+    run,
+    same_numbers,
+    until,
+    until_kept,
+)
 
 import rsfstudy
-from rsfstudy import cells, workers
+from rsfstudy import cells, journal, workers
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.status import Status
 
-CELLS = 60
-SLOW = {"FAULT_CELLS": str(CELLS), "FAULT_TAKES": "0.05"}
+CELLS = 30
 
 
 def uninterrupted():
     return run(declared(cells=CELLS))
 
 
+class Held:
+    """A run that has kept some of its cells, while the others wait until they are let through."""
+
+    def __init__(self, output, gate, *options):
+        self.output, self.gate, self.journal = output, gate, output / "faulty.cells.sqlite"
+        gate.mkdir()
+        words = ("run", FAULTY, "--output", output, *options)
+        self.process = command(*words, FAULT_CELLS=str(CELLS), FAULT_GATE=str(gate))
+        until_kept(self.journal, self.process)
+
+    def let_through(self):
+        (self.gate / "open").touch()
+
+    def workers(self):
+        return [c for words, c in children(self.process).items() if "spawn_main" in words]
+
+
+def children(process):
+    """Processes that one has started, by their command lines."""
+    found = {}
+    for child in psutil.Process(process.pid).children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            found[" ".join(child.cmdline())] = child
+    return found
+
+
 @pytest.fixture
-def slow(tmp_path):
-    """A run of three seconds that has kept some of its cells, and its directory."""
-    process = command("run", FAULTY, "--output", tmp_path, **SLOW)
-    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
-    yield process, tmp_path
-    if process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
-    if not process.stdout.closed:
-        process.communicate()
+def held(tmp_path):
+    """Makes such runs, and ends them whatever becomes of the test."""
+    started = []
+
+    def start(*options):
+        started.append(Held(tmp_path / "outputs", tmp_path / "gate", *options))
+        return started[-1]
+
+    yield start
+    for process in [each.process for each in started]:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        if not process.stdout.closed:
+            process.communicate()
 
 
 def goes_on(output, already):
@@ -59,93 +99,118 @@ def goes_on(output, already):
     assert {"faulty.cells.sqlite", "faulty.nc"} == set(os.listdir(output)) - {"faulty.png"}
 
 
-def test_the_driver_is_killed(slow):
-    """kill -9: what was kept is kept, and the workers it leaves behind end by themselves."""
-    process, output = slow
-    workers = psutil.Process(process.pid).children(recursive=True)
-    process.kill()
-    process.wait()
-    already = cells_in(output / "faulty.cells.sqlite")
+def test_the_driver_is_killed(held):
+    """kill -9: what was kept is kept, and the processes it leaves behind end by themselves; what
+    they say then is not said on the terminal, nor kept longer than until the next run.
+    """
+    run = held()
+    left = list(children(run.process).values())
+    run.process.kill()
+    _code, _out, said = ended(run.process)
+    assert said == ""
+    already = cells_in(run.journal)
     assert 0 < already < CELLS
-    assert not (output / "faulty.nc").exists()
-    _gone, alive = psutil.wait_procs(workers, timeout=30)
+    assert not (run.output / "faulty.nc").exists()
+    _gone, alive = psutil.wait_procs(left, timeout=HANGS)
     assert not alive
-    goes_on(output, already)
+    assert "leaked semaphore" in (run.output / "faulty.workers.log").read_text()
+    goes_on(run.output, already)
 
 
-def test_a_worker_is_killed(slow):
+def test_a_worker_is_killed(held):
     """kill -9 of a worker: the run itself goes on, and no cell is blamed."""
-    process, output = slow
-    workers = [
-        child
-        for child in psutil.Process(process.pid).children(recursive=True)
-        if "spawn_main" in " ".join(child.cmdline())
-    ]
-    workers[0].kill()
-    code, out, _said = ended(process)
+    run = held()
+    run.workers()[0].kill()
+    run.let_through()
+    code, out, said = ended(run.process)
     assert code == 0, out
-    same_numbers(rsfstudy.open("faulty", output), uninterrupted())
+    assert "warning: a worker ended: the cells it held (" in said
+    assert len(said.splitlines()) == 1, said
+    same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
+
+
+def test_the_resource_tracker_is_killed(held):
+    """What the one that takes its place has to say is not said on the terminal."""
+    run = held()
+    found = children(run.process)
+    next(c for words, c in found.items() if "resource_tracker" in words).kill()
+    run.let_through()
+    code, _out, said = ended(run.process)
+    assert (code, said) == (0, "")
 
 
 @pytest.mark.parametrize("options", [["--serial"], []])
-def test_ctrl_c(options, tmp_path):
+def test_ctrl_c(options, held):
     """A real SIGINT to the command and, as a terminal sends it, to its workers."""
-    process = command("run", FAULTY, "--output", tmp_path, *options, **SLOW)
-    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
-    os.killpg(process.pid, signal.SIGINT)
-    code, _out, said = ended(process)
+    run = held(*options)
+    os.killpg(run.process.pid, signal.SIGINT)
+    run.let_through()
+    code, _out, said = ended(run.process)
     assert code == 1
-    assert "Process Dask" not in said
     assert f"of {CELLS} cells are finished and kept in" in said
-    partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
+    assert len(said.splitlines()) == 1, said
+    partial = rsfstudy.open(run.output / "faulty.partial.nc")
     done = int((partial.status == 0).sum())
     assert partial.attrs["completeness"] == f"partial: {done} of {CELLS} cells"
     assert (partial.status == int(Status.PENDING)).sum() == CELLS - done
     assert 0 < done < CELLS
-    goes_on(tmp_path, done)
-
-
-def commands_under(process):
-    """Command lines of the processes that one has started."""
-    with contextlib.suppress(psutil.NoSuchProcess):
-        return [" ".join(c.cmdline()) for c in psutil.Process(process.pid).children()]
-    return []
+    goes_on(run.output, done)
 
 
 def test_ctrl_c_while_the_workers_start(tmp_path):
     """They never see it, and the run ends in order once they are there."""
-    process = command("run", FAULTY, "--output", tmp_path, **SLOW)
-    until(lambda: any("spawn_main" in said for said in commands_under(process)), process)
+    process = command("run", FAULTY, "--output", tmp_path, FAULT="hangs")
+    until(lambda: any("spawn_main" in words for words in children(process)), process)
     os.killpg(process.pid, signal.SIGINT)
     code, _out, said = ended(process)
     assert code == 1
-    assert f"0 of {CELLS} cells are finished and kept in" in said
-    assert len(said.strip().splitlines()) == 1, said
+    assert "0 of 4 cells are finished and kept in" in said
+    assert len(said.splitlines()) == 1, said
+
+
+def test_workers_that_cannot_start(tmp_path):
+    """The run ends with the reason."""
+    import dask
+
+    with (
+        dask.config.set({"distributed.worker.preload": ["no_such_module"]}),
+        pytest.raises(RunError, match="faulty: a worker process could not be started"),
+    ):
+        run(declared(), workers=1, output=tmp_path)
+    assert "No module named 'no_such_module'" in (tmp_path / "faulty.workers.log").read_text()
 
 
 def test_ctrl_c_waits_until_the_workers_are_there():
     """Also where another thread gets the signal; pressed twice, it does not wait."""
-    before, done = signal.signal(signal.SIGINT, signal.default_int_handler), threading.Event()
-    other = threading.Thread(target=done.wait, args=(30,))
+    done, reached = threading.Event(), []
+    other = threading.Thread(target=done.wait)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    arrived = signal.set_wakeup_fd(write)
     other.start()
-    reached = []
 
     @workers._interrupts_held()
     def pressed(times):
         for press in range(times):
             signal.pthread_kill(other.ident, signal.SIGINT)
-            time.sleep(0.05)
+            os.read(read, 1)  # until it has arrived
             reached.append(press)
 
-    for times in (1, 2):
-        reached.clear()
-        with pytest.raises(KeyboardInterrupt):
-            pressed(times)
-        assert reached == [0]
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    done.set()
-    other.join()
-    signal.signal(signal.SIGINT, before)
+    try:
+        for times in (1, 2):
+            reached.clear()
+            with pytest.raises(KeyboardInterrupt):
+                pressed(times)
+            assert reached == [0]
+            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        done.set()
+        other.join()
+        signal.set_wakeup_fd(arrived)
+        signal.signal(signal.SIGINT, before)
+        os.close(read)
+        os.close(write)
 
 
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
@@ -226,17 +291,17 @@ def limited(size, *words, **environment):
 
 def test_a_full_disk_while_cells_are_computed(tmp_path):
     """The journal takes no more: the run ends with the reason, and goes on once there is room."""
-    many = {"FAULT_CELLS": "6000"}
+    many = {"FAULT_CELLS": "2000"}
     words = ("run", FAULTY, "--serial", "--output", tmp_path)
-    code, _out, said = limited(300_000, *words, **many)
+    code, _out, said = limited(100_000, *words, **many)
     assert code == 1
     assert "cannot add to" in said
     assert "the same command goes on from there" in said
     kept = cells_in(tmp_path / "faulty.cells.sqlite")
-    assert 100 < kept < 6000
+    assert 0 < kept < 2000
     code, _out, said = ended(command(*words, **many))
     assert code == 0, said
-    same_numbers(rsfstudy.open("faulty", tmp_path), run(declared(cells=6000)))
+    same_numbers(rsfstudy.open("faulty", tmp_path), run(declared(cells=2000)))
 
 
 def test_a_full_disk_while_the_result_is_written(tmp_path):
@@ -272,28 +337,25 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch)
     same_numbers(extended, run(longer))
 
 
-def test_what_a_worker_has_finished_is_kept_before_its_batch_is_done(tmp_path):
-    """However little its cells were expected to cost: here a batch would last 15 s."""
-    process = command("run", FAULTY, "--output", tmp_path, FAULT_TAKES="0.25", FAULT_CELLS="480")
-    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
-    began = time.monotonic()
-    until(lambda: time.monotonic() - began > 3.0, process)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.communicate()
-    kept = cells_in(tmp_path / "faulty.cells.sqlite")
-    assert 8 <= kept < 60
+def test_what_a_worker_has_finished_is_kept_before_its_batch_is_done(held):
+    """The cells after the first of each batch wait, and the first is kept meanwhile."""
+    run = held()
+    run.process.kill()
+    ended(run.process)
+    assert 0 < cells_in(run.journal) <= 2
 
 
-def test_two_runs_at_a_time_are_refused(tmp_path):
+def test_two_runs_at_a_time_are_refused(held, monkeypatch):
     """The second is told, and the first is not disturbed."""
-    process = command("run", FAULTY, "--output", tmp_path, **{**SLOW, "FAULT_TAKES": "0.2"})
-    until(lambda: cells_in(tmp_path / "faulty.cells.sqlite") > 0, process)
+    first = held()
+    monkeypatch.setattr(journal, "_WAIT", 0.1)
     for fresh in (False, True):
         with pytest.raises(DataError, match=r"another run uses .*faulty\.cells\.sqlite"):
-            run(declared(cells=CELLS), output=tmp_path, fresh=fresh)
-    code, out, _said = ended(process)
+            run(declared(cells=CELLS), output=first.output, fresh=fresh)
+    first.let_through()
+    code, out, _said = ended(first.process)
     assert code == 0, out
-    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
+    same_numbers(rsfstudy.open("faulty", first.output), uninterrupted())
 
 
 def test_other_tolerances_are_not_mixed(tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import SMALL, run, same_numbers
+from running import HANGS, SMALL, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Scene, Study, runner
@@ -112,7 +112,7 @@ def test_a_script_needs_no_guard(tmp_path):
         """)
     )
     ran = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=HANGS
     )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.split("\n")[:2] == ["imported", "[2. 3.]"]

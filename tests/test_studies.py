@@ -42,9 +42,9 @@ def declared(name: str) -> Study:
         for name in catalogue.names()
     ],
 )
-def result(request, tmp_path_factory):
+def result(request, tmp_path_factory, cluster):
     """The default lattice of each study, on two workers, and where its file is."""
-    return named_results(declared(request.param), tmp_path_factory)
+    return named_results(declared(request.param), tmp_path_factory, cluster)
 
 
 def test_the_study_is_named_as_its_file(result):

@@ -1,0 +1,104 @@
+"""A file for what worker processes, and what they stand on, say when something ends them: dumps of
+threads, tracebacks of Dask, objects that multiprocessing found left behind.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any
+
+from distributed import WorkerPlugin
+
+from rsfstudy.errors import DataError
+
+_ERRORS = 2
+#: What Dask logs with in this process, and what it stands on.
+_LOGGERS = ("distributed", "tornado", "asyncio")
+
+
+@contextlib.contextmanager
+def kept(log: Path | None) -> Iterator[Path]:
+    """The file, ready to be written to; a temporary one where none is named. It does not stay where
+    nothing was said.
+
+    Raises
+    ------
+    DataError
+        If it cannot be written.
+    """
+    try:
+        if log is None:
+            number, name = tempfile.mkstemp(prefix="rsfstudy.", suffix=".workers.log")
+            os.close(number)
+            log = Path(name)
+        log.touch()
+    except OSError as error:
+        raise DataError(f"cannot write {log or 'a temporary file'}: {error}.") from error
+    try:
+        with _logged(log):
+            yield log
+    finally:
+        with contextlib.suppress(OSError):
+            if not log.stat().st_size:
+                log.unlink()
+
+
+@contextlib.contextmanager
+def _logged(log: Path) -> Iterator[None]:
+    """Errors that are logged in this process are written there, and nowhere else."""
+    handler = logging.FileHandler(log, delay=True)
+    handler.setLevel(logging.ERROR)
+    handler.setFormatter(logging.Formatter("%(asctime)s - %(name)s - %(message)s"))
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    before = [(logger.handlers, logger.propagate) for logger in loggers]
+    for logger in loggers:
+        logger.handlers, logger.propagate = [handler], False
+    try:
+        yield
+    finally:
+        for logger, (handlers, propagate) in zip(loggers, before, strict=True):
+            logger.handlers, logger.propagate = handlers, propagate
+        handler.close()
+
+
+def start_tracker(log: Path) -> None:
+    """See that multiprocessing's resource tracker runs: where this starts it, it writes there."""
+    terminal = os.dup(_ERRORS)
+    try:
+        _redirect(log)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # somebody may have killed the one before
+            resource_tracker.ensure_running()
+    finally:
+        os.dup2(terminal, _ERRORS)
+        os.close(terminal)
+
+
+@dataclass(frozen=True)
+class WritesTo(WorkerPlugin):
+    """A Dask worker whose process writes errors to a file.
+
+    Parameters
+    ----------
+    log : Path
+    """
+
+    log: Path
+
+    def setup(self, worker: Any) -> None:
+        """Called by Dask when the worker starts."""
+        _redirect(self.log)
+
+
+def _redirect(log: Path) -> None:
+    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    os.dup2(file, _ERRORS)
+    os.close(file)
