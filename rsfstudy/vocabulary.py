@@ -390,6 +390,23 @@ _QUANTITIES = (
     Quantity("cheapest_default_request", "", "1", "digits to ask for with the default integrator"),
     Quantity("cheapest_relative", "", "1", "work of an integrator over that of the default one"),
     Quantity("cheapest_ratio", "", "1", "work of the default integrator over the least"),
+    # whether error estimates cover
+    Quantity("question", "", "", "what is measured in a random scene"),
+    Quantity("sample", "", "1", "number of the random scene"),
+    Quantity("number", "", "", "name of the number"),
+    Quantity("status_kept", "", "1", "whether a tighter run ends with the same status"),
+    Quantity("error_over_estimate", "", "1", "error over its own estimate"),
+    Quantity("error_over_request", "", "1", "relative error over the accuracy asked for"),
+    *(
+        Quantity(f"{name}_{what}", "", "1", f"{text}{among}")
+        for name, among in (("covered", ""), ("covered_by_question", ", by question"))
+        for what, text in (
+            ("share", "share of errors within their estimates"),
+            ("worst", "largest error over its estimate"),
+            ("typical", "median of estimates over errors"),
+            ("numbers", "how many numbers have an error and an estimate"),
+        )
+    ),
     # every lattice
     Quantity("status", "", "", "outcome of the cell"),
     Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),

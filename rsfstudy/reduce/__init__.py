@@ -13,6 +13,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import Reduction, failed, known, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
+from rsfstudy.reduce.covered import Covered
 from rsfstudy.reduce.fits import LinearFit, ProportionalFit
 from rsfstudy.reduce.paths import Parting
 from rsfstudy.reduce.work import Cheapest
@@ -22,6 +23,7 @@ from rsfstudy.vocabulary import coverage, quantity
 __all__ = [
     "Boundary",
     "Cheapest",
+    "Covered",
     "Difference",
     "Inverse",
     "LinearFit",
