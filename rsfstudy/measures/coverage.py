@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -44,8 +45,8 @@ class Coverage(Measure):
     """Errors of a measure in a random scene, over its own estimates of them.
 
     The scene shares law, normal stress condition and dynamics with the scene of the cell; its
-    numbers are drawn from wide ranges, the same for the same sample. Its true numbers are those of
-    a run a hundred times tighter, within its error estimate.
+    numbers are drawn from wide ranges, the same whenever it is asked for. The true numbers are
+    those of a run a hundred times tighter, within its error estimate.
 
     Parameters
     ----------
@@ -131,7 +132,8 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
     """A scene of the same law, normal stress condition and dynamics as another, with numbers drawn
     from wide ranges.
     """
-    draw = np.random.default_rng([sample, list(QUESTIONS).index(question)])
+    kind = f"{question} {like.law} {' '.join(like.effects)}"
+    draw = np.random.default_rng([sample, zlib.crc32(kind.encode())])
 
     def between(low: float, high: float) -> float:
         return float(draw.uniform(low, high))

@@ -35,6 +35,7 @@ def _panel(number: int) -> Callable[[xr.Dataset, Axes], Axes]:
         axes.set_xlabel("Error over its estimate")
         axes.set_ylabel("Numbers")
         axes.set_title(str(questions[number]), fontsize="medium")
+        axes.set_ylim(top=1.3 * axes.get_ylim()[1])  # room for the legend
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize="x-small", loc="upper left")
         return axes
