@@ -12,9 +12,6 @@ from rsfstudy.errors import InvalidValue
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
-#: Part of the accuracy asked for that errors come to where they cancel by chance (the study
-#: coverage measures it).
-_BY_CHANCE = 0.03
 #: Relative error that rounding alone explains.
 ROUNDING = 1e-13
 
@@ -105,14 +102,22 @@ class Accuracy:
         return 0.3 * self.rtol * self.refinement
 
 
-def error_between(number: float, refined: float, rtol: float) -> float:
+def error_between(number: float, refined: float, chance: float) -> float:
     """Error estimate of a number, from what `Accuracy.refined` makes of it.
 
-    Twice the difference, which misses only where the second error is more than half of the first; a
-    small part of the accuracy asked for, where both are small by chance; and rounding.
+    Three times the difference, which misses only where the second error is more than two thirds of
+    the first; and where both are small by chance, what it hides.
+
+    Parameters
+    ----------
+    number, refined : float
+        Results of the first run, and of the refined one.
+    chance : float
+        Relative error that chance may hide: a small part of the accuracy asked for, measured by the
+        study coverage.
     """
     number = float(number)
-    return 2.0 * abs(number - float(refined)) + (_BY_CHANCE * rtol + ROUNDING) * abs(number)
+    return 3.0 * abs(number - float(refined)) + (chance + ROUNDING) * abs(number)
 
 
 def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:

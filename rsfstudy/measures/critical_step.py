@@ -36,6 +36,9 @@ DIRECTIONS = ("up", "down")
 #: Accuracy of a boundary that is a limit cycle, whatever is asked for.
 _CAREFUL = 1e-8
 
+#: Part of the accuracy asked for to which the errors of two paths may agree by chance.
+_BY_CHANCE = 0.005
+
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
 
@@ -293,8 +296,7 @@ def _boundary(
     sizes = sizes_by((accuracy.solver, accuracy.refined().solver), meter)
     if sizes is None or not steps.smallest <= sizes[0] <= steps.largest:
         return None
-    # a path attracts its neighbours, which halves what chance may hide
-    error = error_between(sizes[0], sizes[1], 0.5 * accuracy.rtol) / sizes[0]
+    error = error_between(sizes[0], sizes[1], _BY_CHANCE * accuracy.rtol) / sizes[0]
     if steps.scene.inertia:
         error += error_of_slow_manifold(steps.scene)
     return Boundary(sizes[0], error)

@@ -33,6 +33,8 @@ LN10 = math.log(10.0)
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
 #: it.
 _STEADY, _SHRINKING = 1e-3, 30
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_BY_CHANCE = 0.02
 #: Displacement in D_c that sets off a motion where the scene has no step.
 _NUDGE = 0.1
 #: Part of their distance to the limit that cycles keep each time: above the first they are leapt
@@ -166,7 +168,7 @@ class LimitCycle(Measure):
         both = zip(*map(approach.of_limit_cycle, (cycle, again)), strict=True)
         for name, (number, refined) in zip(_HEADLINES, both, strict=True):
             values[name] = float(number)
-            values[f"{name}_error"] = error_between(number, refined, accuracy.rtol)
+            values[f"{name}_error"] = error_between(number, refined, _BY_CHANCE * accuracy.rtol)
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values |= _properties(scene, cycle)
         values["events_until_repeat"] = float(approach.events)
