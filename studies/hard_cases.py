@@ -26,6 +26,7 @@ CONSTANT: Fields = {"normal_stress": "constant"}
 SLOWNESS: Fields = {"law": "slowness", "normal_stress": "constant"}
 CYCLE: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 EXACT = "closed form"
+ANOTHER_CODE = "a code of its own, with time as the clock, to the digits it gives"
 
 step, triggered = CriticalStep(), Triggered()
 cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
@@ -254,6 +255,48 @@ number(
     known.EXTENDED,
     {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5},
 )
+number(
+    "slip law, down to 10^-137 V_*",
+    cycle,
+    "recurrence_interval",
+    0.798761,
+    ANOTHER_CODE,
+    {
+        "law": "slip",
+        "a": 0.008794017206350683,
+        "b_over_a": 4.941051988536554,
+        "mu_star": 0.6383162760615213,
+        "period": 407.6129114047208,
+        "reference_rate": 3.2171954288536213e-10,
+        "phi": 54.42406958714466,
+        "alpha": 0.5377004681414724,
+        "stiffness_ratio": 0.3804142175724484,
+        "load_velocity_ratio": 86.431987832162,
+        "inertia": True,
+    },
+    uncertainty=1e-6,
+)
+number(
+    "slowness law, down to 10^-1745 V_*",
+    cycle,
+    "recurrence_interval",
+    49.20716,
+    ANOTHER_CODE,
+    {
+        "law": "slowness",
+        "a": 0.004822260947305701,
+        "b_over_a": 5.36849678524829,
+        "mu_star": 0.6052299536973429,
+        "period": 2.621331736312295,
+        "reference_rate": 8.347835049891749e-07,
+        "phi": 38.97235270206339,
+        "alpha": 0.44646546358794825,
+        "stiffness_ratio": 0.573530636703891,
+        "load_velocity_ratio": 1.2036896528515733,
+        "inertia": True,
+    },
+    uncertainty=2e-7,
+)
 ends(
     "mass against every stiffness",
     LinearStability(),
@@ -265,8 +308,8 @@ study = Study(
     name="hard_cases",
     title="Cases that break ordinary slider codes, and what comes out",
     summary=(
-        "Slip rates from 1e-40 to 1e87 V_*, critical stiffness to eight digits, parameters at the "
-        "ends of their ranges, masses from none to overwhelming, and loading that friction "
+        "Slip rates from 10^-1745 to 10^87 V_*, critical stiffness to eight digits, parameters at "
+        "the ends of their ranges, masses from none to overwhelming, and loading that friction "
         "cannot follow. Each case ends with the number an independent computation or a closed "
         "form gives, within its own error estimate, or with the status that names the reason."
     ),

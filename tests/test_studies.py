@@ -23,7 +23,9 @@ FLAGS = {"status", "regime", "inertia"}
 
 
 def declared(name: str) -> Study:
-    """The study; that of costs with the integrators its verdicts turn on, each timed once."""
+    """The study; that of costs with the integrators its verdicts turn on, each timed once, and that
+    of error estimates with a scene of each kind.
+    """
     study = catalogue.load(name)
     if name == "accuracy_cost":
         few = [
@@ -32,6 +34,9 @@ def declared(name: str) -> Study:
             Axis("requested_digits", [4, 6, 8, 10]),
         ]
         study = replace(study, axes=few, measure=replace(study.measure, repeats=1))
+    if name == "coverage":
+        axes = [Axis("sample", [0]) if a.dimension == "sample" else a for a in study.axes]
+        study = replace(study, axes=axes)
     return study
 
 

@@ -1,0 +1,77 @@
+"""Coverage of error estimates: random scenes, what is counted, and that a bad estimate shows."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rsfstudy import Scene
+from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import limit_cycle
+from rsfstudy.measures.coverage import QUESTIONS, Coverage, random_scene
+from rsfstudy.reduce import Covered, reduced
+from rsfstudy.status import Status
+
+LIKE = [
+    Scene(law=law, **stress, **dynamics)
+    for law in ("slip", "slowness")
+    for stress in ({"normal_stress": "constant"}, {"normal_stress": "variable"})
+    for dynamics in ({}, {"inertia": True}, {"radiation_damping": 1e-9})
+]
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.sampled_from(LIKE), st.sampled_from(list(QUESTIONS)), st.integers(0, 10**6))
+def test_any_draw_is_a_scene_of_its_kind_and_the_same_each_time(like, question, sample):
+    scene = random_scene(like, question, sample)
+    assert scene == random_scene(like, question, sample)
+    assert scene.law == like.law
+    assert scene.effects == like.effects
+    assert scene != random_scene(like, question, sample + 1)
+
+
+def test_shares_worst_and_typical_are_counted():
+    ratios = np.array([[0.1, 0.5], [1.0, 2.0], [np.nan, 0.25]])
+    dataset = xr.Dataset(
+        {
+            "error_over_estimate": (("sample", "requested_digits"), ratios),
+            "status": (("sample", "requested_digits"), np.zeros(ratios.shape, dtype=np.int8)),
+        }
+    )
+    found = reduced(
+        dataset, (Covered(name="c", of="error_over_estimate", by=("requested_digits",)),)
+    )
+    np.testing.assert_allclose(found.c_share, [1.0, 2.0 / 3.0])
+    np.testing.assert_allclose(found.c_worst, [1.0, 2.0])
+    np.testing.assert_allclose(found.c_typical, [5.5, 2.0])  # of 10 and 1; of 2, 0.5 and 4
+    assert found.c_numbers.values.tolist() == [2, 3]
+
+
+def test_an_estimate_that_is_too_small_shows(monkeypatch):
+    """The same cell, with estimates of a hundredth: errors beyond them, which were within."""
+    cell, like = Coverage(sample=3, requested_digits=5), LIKE[1]
+    ratios = cell(like, Accuracy()).values["error_over_estimate"]
+    usual = limit_cycle.error_between
+    monkeypatch.setattr(limit_cycle, "error_between", lambda *given: 0.01 * usual(*given))
+    smaller = cell(like, Accuracy()).values["error_over_estimate"]
+    known = np.isfinite(ratios)
+    assert known.sum() == 5
+    assert (ratios[known] <= 1.0).all()
+    assert (smaller[known] > 1.0).any()
+
+
+def test_a_scene_without_a_number_counts_its_status():
+    """Slip without mass runs away, at either accuracy."""
+    found = Coverage(sample=0, requested_digits=4)(LIKE[0], Accuracy())
+    assert found.status is Status.OK
+    assert found.values["status_kept"] == 1.0
+    assert found.values["ended_as"] == float(Status.SLIP_RATE_UNBOUNDED)
+    assert "error_over_estimate" not in found.values
+
+
+@pytest.mark.parametrize("wrong", [{"question": "cycle"}, {"sample": -1}, {"requested_digits": 10}])
+def test_questions_without_an_answer_are_refused(wrong):
+    with pytest.raises(InvalidValue, match=next(iter(wrong))):
+        Coverage(**wrong)
