@@ -82,6 +82,7 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
+    warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     # not to the console of errors, which would not know of a progress bar
     warnings.showwarning = lambda message, *_place: print(
         terminal.spelt(f"warning: {message}"), file=sys.stderr

@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
@@ -71,15 +72,16 @@ def _logged(log: Path) -> Iterator[None]:
 
 def start_tracker(log: Path) -> None:
     """See that multiprocessing's resource tracker runs: where this starts it, it writes there."""
-    terminal = os.dup(_ERRORS)
+    terminal = os.dup(_ERRORS) if _has_errors() else None
     try:
         _redirect(log)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # somebody may have killed the one before
             resource_tracker.ensure_running()
     finally:
-        os.dup2(terminal, _ERRORS)
-        os.close(terminal)
+        if terminal is not None:
+            os.dup2(terminal, _ERRORS)
+            os.close(terminal)
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,15 @@ class WritesTo(WorkerPlugin):
 
 
 def _redirect(log: Path) -> None:
-    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-    os.dup2(file, _ERRORS)
-    os.close(file)
+    """Write errors of this process there, if it has any and there is such a place."""
+    if not _has_errors():
+        return
+    with contextlib.suppress(OSError):
+        file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        os.dup2(file, _ERRORS)
+        os.close(file)
+
+
+def _has_errors() -> bool:
+    """False where they were closed before: their number is that of another file by now."""
+    return sys.__stderr__ is not None

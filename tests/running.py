@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sqlite3
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
+import pytest
 import xarray as xr
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene, Study, cli
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
 
@@ -59,6 +63,19 @@ def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
     )
 
 
+def call(*words) -> SimpleNamespace:
+    """The command, in this process."""
+    out, said = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        patch.setattr(sys, "argv", ["rsfstudy", *map(str, words)])
+        patch.setattr(sys, "stdout", out)
+        patch.setattr(sys, "stderr", said)
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    code = ended.value.code
+    return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=said.getvalue())
+
+
 #: Ctrl-C ends it even where the tests run in the background, where shells have it ignored.
 _COMMAND = """
 import signal
@@ -99,12 +116,15 @@ def until_kept(journal: Path, process: subprocess.Popen) -> None:
     """Wait until a run has kept cells. It lets nobody else read its journal: what is on disk is
     looked at without asking.
     """
+    unfinished = journal.with_name(f"{journal.name}-journal")
 
     def kept() -> bool:
         with contextlib.suppress(sqlite3.Error):  # not there yet, or in the middle of a write
             uri = f"file:{journal}?immutable=1"
             with contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
-                return bool(db.execute("SELECT count(*) FROM cells").fetchone()[0])
+                cells = db.execute("SELECT count(*) FROM cells").fetchone()[0]
+            # what would undo them has been made void
+            return cells > 0 and not unfinished.read_bytes()[:8].strip(b"\0")
         return False
 
     until(kept, process)

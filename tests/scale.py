@@ -43,11 +43,12 @@ def peak() -> int:
 
 def measured(cells: int, workers: int, format: str = "netcdf") -> dict[str, float]:
     """One run, in this process."""
-    small = {"workers": workers, "progress": False, "output": None}
-    rsfstudy.run(lattice(100), **small)
+    options = {"workers": workers, "progress": False, "format": format}
+    with tempfile.TemporaryDirectory() as output:
+        rsfstudy.run(lattice(100), output=output, **options)
     with tempfile.TemporaryDirectory() as output:
         before, began = peak(), time.perf_counter()
-        rsfstudy.run(lattice(cells), **{**small, "output": output}, format=format)
+        rsfstudy.run(lattice(cells), output=output, **options)
         seconds = time.perf_counter() - began
         sizes = {p.suffix: p.stat().st_size for p in Path(output).iterdir() if p.is_file()}
     return {

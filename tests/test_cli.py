@@ -1,17 +1,16 @@
 """The command line: what it prints, what it writes, and its exit statuses."""
 
-import io
 import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import xarray as xr
 from click.testing import CliRunner
 from faulty import declared
 from running import SMALL as LATTICE
+from running import call
 
 import rsfstudy
 from rsfstudy import catalogue, cli, store
@@ -20,20 +19,6 @@ from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
-
-
-def call(*words) -> SimpleNamespace:
-    """The command, in this process."""
-    out, said = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["rsfstudy", *map(str, words)])
-        patch.setattr(cli.warnings, "showwarning", None)  # which it sets
-        patch.setattr(sys, "stdout", out)
-        patch.setattr(sys, "stderr", said)
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    code = ended.value.code
-    return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=said.getvalue())
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +236,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     (tmp_path / "taken.cells.sqlite").write_text("something else")
     ran = call("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 1
-    assert "taken.cells.sqlite" in ran.stderr
+    assert "taken.cells.sqlite" in ran.stderr.replace("\n", "")
     ended = rows(ran.stdout)
     assert {name: row[0] for name, row in ended.items() if name in catalogue.names()} == {
         "failing": "1 cell_raised",

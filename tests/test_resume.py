@@ -347,7 +347,7 @@ def test_what_a_worker_has_finished_is_kept_before_its_batch_is_done(held):
 
 def test_two_runs_at_a_time_are_refused(held, monkeypatch):
     """The second is told, and the first is not disturbed."""
-    first = held()
+    first = held("--serial")
     monkeypatch.setattr(journal, "_WAIT", 0.1)
     for fresh in (False, True):
         with pytest.raises(DataError, match=r"another run uses .*faulty\.cells\.sqlite"):
