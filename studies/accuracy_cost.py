@@ -142,9 +142,9 @@ study = Study(
     summary=(
         "Problems with answers known to 12 digits or more, solved by each of SciPy's integrators "
         "at each accuracy; for cycles also with another integrator where mass acts. The error is "
-        "the measured one, the work counts every right-hand side, and times are relative to those "
-        "of DOP853 for 3 digits on the same problem at the same moment. The defaults of the core "
-        "follow from it."
+        "the measured one, the work counts every right-hand side, and processor times are relative "
+        "to those of DOP853 for 3 digits on the same problem at the same moment. The defaults of "
+        "the core follow from it."
     ),
     base=Scene(),
     axes=[
