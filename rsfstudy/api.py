@@ -13,11 +13,12 @@ import pandas as pd
 import xarray as xr
 from rich import progress as bars
 
-from rsfstudy import catalogue, own_code, provenance, restore, runner, store
+from rsfstudy import catalogue, contents, own_code, provenance, restore, runner, store
 from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
-from rsfstudy.claims import Claim, verdicts
-from rsfstudy.comparison import cell_number, compared, differences, fingerprint_of
+from rsfstudy.claims import verdicts
+from rsfstudy.comparison import cell_number, compared, differences
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.lattice import coordinates
 from rsfstudy.measures import Outcome
 from rsfstudy.runner import Keeping, Progress
 from rsfstudy.scene import Scene
@@ -240,13 +241,8 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
         where the verdict is not the expected one.
     """
     results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
-    declared = store.declaration(results)
-    try:
-        claims = [Claim(**claim) for claim in declared["claims"]]
-        overrides = dict(declared["overrides"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"the study declaration is damaged: {error}") from error
-    return verdicts(results, claims, overrides)
+    declared = contents.declaration(results)
+    return verdicts(results, list(declared.claims), declared.overrides)
 
 
 def rerun(
@@ -306,18 +302,31 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """The study that made a dataset: from its own declaration, or, where that does not suffice,
     from the file that declares it.
     """
-    declared = store.declaration(results)
+    declared = contents.declaration(results)
     if file is None:
-        if fingerprint_of(results)["own_code"] != "none":
+        if contents.provenance(results)["fingerprint"]["own_code"] != "none":
             rule = "is a user's own, and code is never taken from a results file"
             remedy = "Name the file that declares it: --study FILE (study=)."
-            raise InvalidValue("measure", declared["measure"]["name"], rule, remedy=remedy)
-        return restore.study(declared)
-    named = catalogue.load(str(file))
-    if named.name != declared["name"]:
-        rule = f"declares the study {named.name!r}, and the results are of {declared['name']!r}"
-        raise InvalidValue("study", str(file), rule)
-    return restore.study(declared, of_its_own=named)
+            raise InvalidValue("measure", declared.measure["name"], rule, remedy=remedy)
+        study = restore.study(declared)
+    else:
+        named = catalogue.load(str(file))
+        if named.name != declared.name:
+            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+            raise InvalidValue("study", str(file), rule)
+        study = restore.study(declared, of_its_own=named)
+    _check_lattice(study, results)
+    return study
+
+
+def _check_lattice(study: Study, results: xr.Dataset) -> None:
+    """Refuse results whose cells are not those of their own declaration."""
+    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
+    if dims != study.dimensions:
+        raise contents.refused("status", f"lies along {dims}, not the axes of the declaration")
+    for name in study.dimensions:
+        if ours[name].values.tolist() != results[name].values.tolist():
+            raise contents.refused(name, "is not that axis of the declaration")
 
 
 def cell(
@@ -352,7 +361,8 @@ def cell(
     number = cell_number(results, place)
     declared = study_of(results, study)
     now = provenance.fingerprint(declared)
-    for name, (then, ours) in differences(fingerprint_of(results), now).items():
-        warnings.warn(f"{name}: {then} then, {ours} now", stacklevel=2)
+    then = contents.provenance(results)["fingerprint"]
+    for name, (theirs, ours) in differences(then, now).items():
+        warnings.warn(f"{name}: {theirs} then, {ours} now", stacklevel=2)
     scene = declared.scene(number)
     return scene, declared.measure(scene, declared.accuracy)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api, runner, store
+from rsfstudy import api, contents, runner
 from rsfstudy.claims import NOT_APPLICABLE
 from rsfstudy.core.accuracy import DEFAULT_RTOL
 from rsfstudy.measures import Outcome
@@ -103,7 +102,7 @@ def _tally(dataset: xr.Dataset) -> str:
 
 def results(dataset: xr.Dataset, file: str) -> int:
     """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
-    attrs, about = dataset.attrs, json.loads(dataset.attrs["provenance"])
+    attrs, about = dataset.attrs, contents.provenance(dataset)
     console.print(f"{attrs['id']}: {attrs['title']}\n", style="bold")
     table = Table("", "", box=None, show_header=False)
     dims = dataset["status"].dims
@@ -115,7 +114,8 @@ def results(dataset: xr.Dataset, file: str) -> int:
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
     for name, values in dataset.data_vars.items():
-        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {values.long_name}")
+        words = values.attrs.get("long_name", "")  # what a notebook added may have none
+        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {words}")
     console.print(table)
     return failures(dataset, file)
 
@@ -213,7 +213,7 @@ def checked(dataset: xr.Dataset) -> int:
 def claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
     table_of = api.check(dataset)
-    overrides = store.declaration(dataset)["overrides"]
+    overrides = contents.declaration(dataset).overrides
     console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
     if overrides:
         console.print(f"not as declared: {settings(overrides)}")
@@ -313,7 +313,7 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
 def _reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
     """The command that computes one cell alone."""
     words = ["rsfstudy", "rerun", file]
-    declared_in = json.loads(dataset.attrs["provenance"]).get("declared_in")
+    declared_in = contents.provenance(dataset)["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
     for name, value in place.items():

@@ -8,13 +8,15 @@ import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import pytest
 import xarray as xr
+from click.testing import CliRunner
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene, Study, cli
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
 
@@ -85,6 +87,21 @@ def ended(process: subprocess.Popen, seconds: float = 120) -> tuple[int, str, st
     out, said = process.communicate(timeout=seconds)
     assert "Traceback" not in said, said
     return process.returncode, out, said
+
+
+def called(words: Sequence[str]) -> tuple[int, str]:
+    """Exit status and what is said by the command in this process, from its real entry point; what
+    would be a traceback is raised.
+    """
+    with pytest.MonkeyPatch.context() as patch, CliRunner().isolation() as (out, err, _both):
+        patch.setattr(sys, "argv", ["rsfstudy", *words])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as ended_with:
+            code = int(ended_with.code or 0)
+        said = out.getvalue().decode(errors="replace") + err.getvalue().decode(errors="replace")
+    return code, " ".join(said.split())
 
 
 def cells_in(journal: Path) -> int:

@@ -23,6 +23,7 @@ FLOORS = {
     "trajectory": 5,
     "one_scene": 5,
     "claims": 5,
+    "contents": 5,
     "reduce": 5,
     "axis": 5,
     "study": 5,

@@ -1,0 +1,332 @@
+"""Files from strangers: results that were altered, digests and all. Each command ends with an
+answer, or with an error that names what is wrong; never with a traceback.
+"""
+
+import contextlib
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from running import called, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, api, contents, store, terminal
+from rsfstudy.claims import Claim
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.reduce import LinearFit
+from rsfstudy.status import Status
+
+#: It has all that a file can have, and costs next to nothing.
+TINY = Study(
+    name="tiny",
+    title="A tiny lattice",
+    base=Scene(),
+    axes=[
+        Axis("case", {"constant": {"normal_stress": "constant"}, "variable": {"alpha": 0.3}}),
+        Axis("load_velocity_ratio", [1.0, 2.0, 4.0]),
+    ],
+    measure=LinearStability(),
+    reductions=[
+        LinearFit(name="slope", of="critical_stiffness", on="log_load_velocity_ratio"),
+    ],
+    claims=[
+        Claim(
+            id="C1",
+            statement="critical stiffness is b - a",
+            source="eq. 7",
+            variable="critical_stiffness",
+            where={"case": "constant", "load_velocity_ratio": 1.0},
+            published=0.0145,
+            tolerance=1e-6,
+            reason="six digits",
+        )
+    ],
+    references=["a paper"],
+)
+PLACE = {"case": "variable", "load_velocity_ratio": "2"}
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory) -> xr.Dataset:
+    output = tmp_path_factory.mktemp("tiny")
+    dataset = run(TINY.with_(load_velocity_ratio=[1.0, 2.0, 4.0]), output=output)
+    dataset["status"][0, 0] = int(Status.UNVERIFIED)  # one cell to list
+    return dataset
+
+
+# ---- altered files ------------------------------------------------------------------------------
+
+#: What may stand where something else was.
+OTHERS = [None, True, 3, 1.5, "other", "", [], {}, ["a"], {"a": None}, 10**400, float("nan")]
+KINDS = {
+    "numbers": lambda shape: np.full(shape, 1.5),
+    "missing numbers": lambda shape: np.full(shape, np.nan),
+    "whole numbers": lambda shape: np.full(shape, -77),
+    "texts": lambda shape: np.full(shape, "other", dtype=object),
+    "flags": lambda shape: np.full(shape, True),
+    "dates": lambda shape: np.full(shape, np.datetime64("2020-01-01", "ns")),
+    "spans of time": lambda shape: np.full(shape, np.timedelta64(10**9, "ns")),
+}
+_JSON = ("declaration", "provenance")
+
+
+def places(value, at=()):
+    """Where something stands in plain data."""
+    if at:
+        yield at
+    if isinstance(value, dict | list):
+        parts = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, part in parts:
+            yield from places(part, (*at, key))
+
+
+def attributes(dataset):
+    """All attributes: those of the variables by their names, those of the file by none."""
+    attrs = {str(name): dict(values.attrs) for name, values in dataset.variables.items()}
+    attrs[""] = dataset.attrs | {name: json.loads(dataset.attrs[name]) for name in _JSON}
+    return attrs
+
+
+def with_other_attributes(dataset, at, change):
+    """The dataset with one attribute, or one part of what its JSON says, changed."""
+    inside = whole = attributes(dataset)
+    for key in at[:-1]:
+        inside = inside[key]
+    change(inside, at[-1])
+    whole[""] |= {name: json.dumps(whole[""][name]) for name in _JSON if name in whole[""]}
+    other = dataset.assign_attrs()
+    other.attrs = whole[""]
+    for name in other.variables:
+        other[name].attrs = whole[name]
+    return other
+
+
+def removed(inside, key):
+    del inside[key]
+
+
+def renamed(inside, key):
+    value = inside.pop(key)
+    if isinstance(inside, dict):
+        inside[f"{key}_"] = value
+
+
+def replaced(by):
+    def change(inside, key):
+        inside[key] = by
+
+    return change
+
+
+def with_another_variable(dataset, name, how):
+    """The dataset with one variable changed."""
+    dims, shape, rest = dataset[name].dims, dataset[name].shape, dataset.drop_vars(name)
+    if how == "removed":
+        return rest
+    if how == "renamed":
+        return dataset.rename({name: f"{name}_"})
+    if how == "along nothing":
+        return rest.assign({name: 1.0})
+    if how == "elsewhere":
+        return rest.assign({name: ("elsewhere", np.arange(3.0))})
+    return rest.assign({name: (dims, KINDS[how](shape))})
+
+
+def altered(draw, dataset):
+    """The dataset with one part that is not as it was."""
+    if draw(st.integers(0, 3)):
+        at = draw(st.sampled_from([at for at in places(attributes(dataset)) if len(at) > 1]))
+        by = st.sampled_from(OTHERS).map(replaced)
+        return with_other_attributes(dataset, at, draw(st.sampled_from([removed, renamed]) | by))
+    name = draw(st.sampled_from(sorted(map(str, dataset.variables))))
+    ways = [
+        "removed",
+        "renamed",
+        "elsewhere",
+        *KINDS,
+        *["along nothing"] * (name not in dataset.dims),
+    ]
+    return with_another_variable(dataset, name, draw(st.sampled_from(ways)))
+
+
+def sealed(dataset, path: Path) -> str:
+    """Written as by someone who meant it: the digests are right."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of xarray, on what it writes
+        store.write(dataset, path)
+    return str(path)
+
+
+def used(dataset):
+    """What commands do with results, short of drawing and computing."""
+    with contextlib.suppress(RsfStudyError):
+        contents.check(dataset)
+        terminal.results(dataset, "tiny.nc")
+        terminal.checked(dataset)
+        api.study_of(dataset)
+
+
+def test_whatever_is_missing(tiny, capsys):
+    """Each attribute, each part of what their JSON says, and each variable."""
+    for at in places(attributes(tiny)):
+        if len(at) > 1:
+            used(store.sealed(with_other_attributes(tiny, at, removed)))
+    for name in tiny.variables:
+        used(store.sealed(tiny.drop_vars(name)))
+    assert "reproduced" in capsys.readouterr().out
+
+
+# it shrinks for minutes, and one alteration is as simple as another
+ALTERED = {"phases": [Phase.generate]}
+
+
+@settings(max_examples=200, **ALTERED)
+@given(data=st.data())
+def test_altered_results_are_used_or_refused(tiny, data):
+    used(store.sealed(altered(data.draw, tiny)))
+
+
+@pytest.mark.filterwarnings("ignore")  # of xarray, and of what is not as it was for the file
+@settings(max_examples=40, **ALTERED)
+@given(data=st.data())
+def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, data):
+    """Whatever part of it was altered."""
+    place = tmp_path_factory.mktemp("altered")
+    try:
+        file = sealed(altered(data.draw, tiny), place / "tiny.nc")
+    except (DataError, OverflowError, TypeError, ValueError):
+        return  # what no file can hold
+    cell = [word for name, value in PLACE.items() for word in ("--cell", f"{name}={value}")]
+    for words in (
+        ["show", file],
+        ["check", file],
+        ["plot", file],
+        ["rerun", file, *cell],
+        ["rerun", file, "--serial", "--quiet"],
+    ):
+        code, said = called(words)
+        assert (code in (0, 1, 2), said != "") == (True, True), words
+
+
+@pytest.mark.parametrize(
+    ("at", "change", "complaint"),
+    [
+        ("id", removed, "id is missing"),
+        ("id", replaced("../other"), "id is '../other', and the declared study 'tiny'"),
+        ("title", replaced(3), "title is 3, and must be a text"),
+        ("completeness", renamed, "completeness is missing"),
+        ("declaration", replaced(None), "declaration is null, and must be a mapping"),
+        ("declaration.claims", replaced({}), r"declaration.claims is {}, and must be a list"),
+        ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
+        ("declaration.claims.0.id", replaced(None), r"claims\[0\].id is null, and must be a text"),
+        ("declaration.claims.0.tolerance", replaced(10**400), r"must be a number"),
+        (
+            "declaration.claims.0.where.case",
+            replaced([]),
+            r"claims\[0\].where is refused .*must be a text",
+        ),
+        ("declaration.claims.0.novel", replaced(1), r"declaration.claims\[0\].novel is unknown"),
+        ("declaration.base.phi", removed, "declaration.base.phi is missing"),
+        ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
+        ("declaration.accuracy.rtol", replaced("1e-7"), 'rtol is "1e-7", and must be a number'),
+        ("declaration.novel", replaced(1), "declaration.novel is unknown"),
+        ("provenance.fingerprint.own_code", removed, "provenance.fingerprint.own_code is missing"),
+        ("provenance.versions.numpy", replaced(2), "provenance.versions.numpy is 2, and must be"),
+        ("provenance.declared_in", replaced(None), "provenance.declared_in is null"),
+    ],
+)
+def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_path):
+    way = tuple(int(key) if key.isdigit() else key for key in at.split("."))
+    file = sealed(with_other_attributes(tiny, ("", *way), change), tmp_path / "tiny.nc")
+    with pytest.raises(DataError, match=f"tiny.nc: .*{complaint}.*another version|{complaint}"):
+        rsfstudy.open(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "how", "complaint"),
+    [
+        ("status", "removed", "status is missing"),
+        ("status", "numbers", "status holds float64, and must hold whole numbers"),
+        ("status", "whole numbers", "status is -77 in a cell"),
+        ("status", "dates", r"status holds datetime64\[ns\], and must hold whole numbers"),
+        ("rhs_evaluations", "texts", "rhs_evaluations holds .*, and must hold whole numbers"),
+        ("rhs_evaluations", "spans of time", "rhs_evaluations holds timedelta64"),
+        ("wall_time", "along nothing", r"wall_time lies along \(\), and status along"),
+        ("message", "whole numbers", "message holds int64, and must hold texts"),
+        ("critical_stiffness", "dates", "critical_stiffness holds datetime64.*numbers or texts"),
+        ("case", "removed", "case is no coordinate along the dimension of its name"),
+    ],
+)
+def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_path):
+    file = sealed(with_another_variable(tiny, name, how), tmp_path / "tiny.nc")
+    with pytest.raises(DataError, match=f"tiny.nc: {complaint}"):
+        rsfstudy.open(file)
+
+
+@pytest.mark.parametrize(
+    ("at", "change", "complaint"),
+    [
+        ("measure.novel", replaced(1), "declaration.measure.novel is unknown"),
+        ("reductions.0.on", removed, r"declaration.reductions\[0\].on is missing"),
+        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is \[1\], and must be a"),
+        ("axes.1.values", replaced([1.0, 2.0]), "load_velocity_ratio is not that axis of the decl"),
+        ("axes.1.dimension", replaced("a"), "status lies along .*, not the axes of the decl"),
+        ("plot", replaced("a\0b"), "declaration makes no study .*must be a text"),
+    ],
+)
+def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, tiny, tmp_path):
+    way = tuple(int(key) if key.isdigit() else key for key in at.split("."))
+    other = with_other_attributes(tiny, ("", "declaration", *way), change)
+    file = sealed(other, tmp_path / "tiny.nc")
+    rsfstudy.open(file)
+    for again in (
+        lambda: rsfstudy.rerun(file, workers=0, progress=False),
+        lambda: rsfstudy.cell(file, PLACE),
+    ):
+        with pytest.raises(DataError, match=complaint):
+            again()
+
+
+@pytest.mark.parametrize("name", ["problem", "sought"])
+def test_a_measure_that_is_no_measure_of_ours(name, tiny, tmp_path):
+    """Though a module beside the measures bears its name."""
+    other = with_other_attributes(tiny, ("", "declaration", "measure", "name"), replaced(name))
+    with pytest.raises(InvalidValue, match=f"measure = '{name}': is not part of rsfstudy"):
+        rsfstudy.rerun(sealed(other, tmp_path / "tiny.nc"), workers=0, progress=False)
+
+
+def test_objects_are_no_texts(tiny):
+    """As a notebook may make them; no file holds such."""
+    other = tiny.copy(deep=True)
+    other["message"][0, 0] = None
+    with pytest.raises(DataError, match="message holds objects, and must hold texts"):
+        contents.check(other)
+
+
+def test_a_claim_does_not_apply_where_numbers_have_become_times(tiny):
+    """In memory, where a notebook may have made anything of a dataset."""
+    assert rsfstudy.check(tiny).verdict.tolist() == ["reproduced"]
+    for name in ("critical_stiffness", "load_velocity_ratio", "case"):
+        for how in ("dates", "spans of time"):
+            other = with_another_variable(tiny, name, how)
+            assert rsfstudy.check(other).verdict.tolist() == ["not applicable"]
+
+
+def test_a_variable_without_a_name_is_shown(tiny, tmp_path):
+    mine = tiny.copy(deep=True)
+    mine["log"] = np.log(mine["critical_stiffness"]).drop_attrs()
+    code, said = called(["show", sealed(mine, tmp_path / "tiny.nc")])
+    assert "log (case, load_velocity_ratio)" in said
+    assert code == 1  # one cell is marked as failed
+
+
+def test_a_cell_of_a_store_by_its_label(tmp_path):
+    run(TINY, output=tmp_path, format="zarr")
+    scene, _outcome = rsfstudy.cell(tmp_path / "tiny.zarr", PLACE)
+    assert (scene.alpha, scene.load_velocity_ratio) == (0.3, 2.0)
