@@ -18,7 +18,7 @@ from rich.table import Table
 
 from rsfstudy import api, catalogue, terminal
 from rsfstudy.cells import DEFAULT_TIME_LIMIT
-from rsfstudy.errors import InvalidValue, RsfStudyError
+from rsfstudy.errors import InvalidValue, RsfStudyError, brief
 from rsfstudy.runner import FORMATS
 from rsfstudy.study import Study
 from rsfstudy.terminal import FAILED, OK
@@ -33,9 +33,16 @@ RESULTS = (".nc", ".zarr")
 _stderr = terminal.Plain(stderr=True, markup=False, emoji=False, highlight=False)
 
 _all = click.option("--all", "every", is_flag=True, help="Every named study.")
+
+
+def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
+    return api.directory(value)
+
+
 _output = click.option(
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(file_okay=False),
+    callback=_directory,
     default=api.OUTPUT,
     show_default=True,
     help="Directory of the results.",
@@ -85,6 +92,7 @@ def main() -> None:
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
+        error.message = brief(error.message)  # type: ignore[misc]
         error.show()
         sys.exit(WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
@@ -195,7 +203,8 @@ def run(
 )
 @click.option(
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(file_okay=False),
+    callback=_directory,
     help="Directory to keep the new results in; nothing is written without it.",
 )
 @_workers

@@ -142,7 +142,7 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
     """
     complete = known == study.size
     when, version = provenance["time"], provenance["versions"]["rsfstudy"]
-    return {
+    found = {
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
@@ -162,3 +162,5 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         "provenance": json.dumps(dict(provenance)),
         **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
     }
+    # a command, or the environment, may hold bytes that are no text
+    return {name: text.encode(errors="backslashreplace").decode() for name, text in found.items()}

@@ -18,6 +18,7 @@ from rich.text import Text
 from rsfstudy import api, contents, runner
 from rsfstudy.claims import NOT_APPLICABLE
 from rsfstudy.core.accuracy import DEFAULT_RTOL
+from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.plan import Plan
 from rsfstudy.scene import Scene
@@ -40,6 +41,13 @@ class Plain(Console):
         spelt = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
         shown = "".join(c if isinstance(c, str) else c.decode() for c in spelt)
         return super().render_str(shown, **options)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, or say why not: what is printed may go to a file on a full disk."""
+        try:
+            super().print(*objects, **options)
+        except OSError as error:
+            raise RunError(f"cannot print: {error.strerror}.") from error
 
 
 console = Plain(markup=False, emoji=False)

@@ -1,9 +1,12 @@
-"""Files from strangers: results that were altered, digests and all. Each command ends with an
-answer, or with an error that names what is wrong; never with a traceback.
+"""Files from strangers: results that were altered, digests and all, and paths that are no results.
+Each command ends with an answer, or with an error that names what is wrong; never with a traceback.
 """
 
 import contextlib
 import json
+import os
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -12,7 +15,7 @@ import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from running import called, run
+from running import called, command, ended, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, api, contents, store, terminal
@@ -330,3 +333,179 @@ def test_a_cell_of_a_store_by_its_label(tmp_path):
     run(TINY, output=tmp_path, format="zarr")
     scene, _outcome = rsfstudy.cell(tmp_path / "tiny.zarr", PLACE)
     assert (scene.alpha, scene.load_velocity_ratio) == (0.3, 2.0)
+
+
+# ---- paths that are no results ------------------------------------------------------------------
+
+
+@pytest.fixture
+def nowhere(tmp_path, monkeypatch):
+    """A directory of things that are no results."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("dir", "dir.nc", "dir.zarr", "odd.zarr"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "file.txt").write_text("text")
+    (tmp_path / "odd.zarr" / "zarr.json").write_text("[]")
+    (tmp_path / "dangling.nc").symlink_to("/nowhere")
+    (tmp_path / "circle.nc").symlink_to("circle.nc")
+    (tmp_path / "circle.py").symlink_to("circle.py")
+    (tmp_path / "root.zarr").symlink_to("/")
+    for name in ("zero.nc", "zero.py"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    return tmp_path
+
+
+@pytest.mark.parametrize("command_", ["show", "check", "plot", "rerun"])
+@pytest.mark.parametrize(
+    "path",
+    ["/", "//", ".", "..", "", "/dev/null", "/etc/passwd", "dir", "dir.nc", "dir.zarr", "odd.zarr",
+     "file.txt", "file.txt/x.nc", "dangling.nc", "circle.nc", "circle.py", "root.zarr", "zero.nc",
+     "zero.py", "*", "**/x", "small[1].nc", "a" * 9999, f"{'a' * 9999}.nc", f"{'a' * 9999}.py",
+     "a/" * 5000 + "x.nc", "a b " * 2500],
+    ids=lambda path: path[:20],
+)  # fmt: skip
+def test_a_path_that_is_no_results_file(command_, path, nowhere):
+    """It is named, briefly."""
+    code, said = called([command_, path])
+    assert code in (1, 2)
+    assert said.startswith("error: ")
+    assert path[:30].strip() in said
+    assert len(said) < 1000
+
+
+@pytest.mark.parametrize("words", [["show", "pipe.nc"], ["check", "pipe.zarr"], ["run", "pipe.py"]])
+def test_a_pipe_is_not_waited_for(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo(words[1])
+    code, _out, said = ended(command(*words))
+    assert code in (1, 2)
+    assert "is no file, but a" in said
+
+
+def test_a_pipe_within_a_store_is_not_waited_for(tmp_path):
+    run(TINY, output=tmp_path, format="zarr")
+    os.mkfifo(tmp_path / "tiny.zarr" / "c")
+    with pytest.raises(DataError, match="c is no file, but a pipe, a device or a broken link"):
+        rsfstudy.open(tmp_path / "tiny.zarr")
+
+
+@pytest.mark.parametrize("beside", [".tiny.nc.new", "tiny.cells.sqlite"])
+def test_a_pipe_in_the_way_of_a_run_is_not_waited_for(beside, tmp_path):
+    os.mkfifo(tmp_path / beside)
+    words = ["--serial", "--quiet", "--set", "b_over_a=2", "--set", "law=slip", "--fresh"]
+    os.rename(tmp_path / beside, tmp_path / beside.replace("tiny", "displacement_boundary"))
+    code, out, _said = ended(command("run", "displacement_boundary", *words, "--output", tmp_path))
+    assert (code, "wrote" in out) == (0, True)
+
+
+def test_what_may_not_be_read_is_told(tiny, tmp_path, monkeypatch):
+    file = sealed(tiny, tmp_path / "tiny.nc")
+
+    def forbidden(*_args, **_options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "exists", forbidden)
+    with pytest.raises(DataError, match=r"tiny.nc cannot be read: .*Permission denied"):
+        rsfstudy.open(file)
+    for use in (lambda: run(output=tmp_path), lambda: rsfstudy.open("tiny", tmp_path)):
+        with pytest.raises(InvalidValue, match="output = .*: cannot be used .Permission denied"):
+            use()
+
+
+# ---- options ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "rate_step_boundary", "--serial"],
+        ["check", "rate_step_boundary"],
+        ["plot", "rate_step_boundary"],
+        ["rerun", "tiny.nc"],
+    ],
+)
+def test_an_output_that_is_empty(words, tmp_path, monkeypatch):
+    """It is not the directory one happens to be in."""
+    monkeypatch.chdir(tmp_path)
+    code, said = called([*words, "--output", ""])
+    assert code == 2
+    assert "output = '': is empty. Name a directory; . is the one you are in." in said
+    assert os.listdir(tmp_path) == []
+    for use in (lambda: run(output=""), lambda: rsfstudy.open("rate_step_boundary", "")):
+        with pytest.raises(InvalidValue, match="output = '': is empty"):
+            use()
+
+
+@pytest.mark.parametrize("output", ["a\0b", "\udcff", "a" * 10_000, "a/" * 5000])
+def test_an_output_that_can_be_no_directory(output):
+    with pytest.raises(InvalidValue, match="output = ") as refused:
+        run(output=output)
+    assert len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])
+def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(
+        "rsfstudy.api._computed", lambda _study, _keeping, workers: workers.threads()
+    )
+    assert run(workers=most) == most
+    for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
+        with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):
+            use()
+    code, said = called(["run", "rate_step_boundary", "--workers", "999999"])
+    assert code == 2
+    assert "--scheduler ADDRESS (client=)" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["{}"],
+        ["run", "{}"],
+        ["run", "rate_step_boundary", "--set", "{}=2"],
+        ["run", "rate_step_boundary", "--set", "law={}"],
+        ["run", "rate_step_boundary", "--workers", "{}"],
+        ["run", "rate_step_boundary", "--scheduler", "{}"],
+        ["run", "rate_step_boundary", "--output", "{}"],
+        ["rerun", "tiny.nc", "--study", "{}"],
+        ["rerun", "{}.nc", "--cell", "a=2"],
+        ["check", "{}", "--output", "{}"],
+    ],
+)
+def test_a_name_without_end_is_answered_briefly(words):
+    code, said = called([word.format("a" * 10_000) for word in words])
+    assert code in (1, 2)
+    assert len(said) < 1200
+
+
+def test_an_error_keeps_both_ends_of_what_is_long():
+    error = InvalidValue("name", "begin" + "x" * 10_000 + "end", "must be short")
+    assert len(str(error)) < 200
+    assert str(error).startswith("name = 'begin")
+    assert str(error).endswith("end': must be short.")
+    many = InvalidValue("name", 1, "is unknown", choices=map(str, range(10_000)), remedy="Choose.")
+    assert str(many).endswith("58, 59 and 9,940 more. Choose.")
+    error = InvalidValue("name", "25", "is unknown", choices=map(str, range(300)))
+    assert "Did you mean '25'" in str(error)
+
+
+def test_a_command_may_hold_bytes_that_are_no_text(tmp_path, monkeypatch):
+    """What was typed, and who computed it, are told as far as they are text."""
+    monkeypatch.setenv("RSFSTUDY_CREATOR_NAME", "G\udcf6del")
+    for format_ in ("netcdf", "zarr"):
+        run(TINY, output=tmp_path / format_, format=format_, command="rsfstudy run \udcff")
+        found = rsfstudy.open("tiny", tmp_path / format_)
+        assert found.attrs["history"].endswith(r"rsfstudy run \udcff")
+        assert found.attrs["creator_name"] == r"G\udcf6del"
+
+
+def test_a_full_disk_where_the_output_goes_is_told(tiny, tmp_path):
+    file = sealed(tiny, tmp_path / "tiny.nc")
+    with open("/dev/full", "w") as full:
+        words = [sys.executable, "-m", "rsfstudy.cli", "show", file]
+        shown = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (shown.returncode, shown.stderr) == (
+        1,
+        "error: cannot print: No space left on device.\n",
+    )
