@@ -109,7 +109,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             derived = [formula(value) for value in np.ravel(values).tolist()]
             coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name))
     for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, values, _about(name))
+        coords[name] = (name, np.asarray(values), _about(name))
     return coords
 
 

@@ -160,10 +160,11 @@ def agreement(frame: pd.DataFrame) -> int:
 
 
 def _reductions(dataset: xr.Dataset) -> None:
-    """Slopes and their like: variables with a standard error, one row for each point of their
+    """Slopes and their like: reductions with a standard error, one row for each point of their
     dimensions.
     """
-    for slope in [str(n) for n in dataset.data_vars if f"{n}_stderr" in dataset]:
+    made = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    for slope in [name for name in made if f"{name}_stderr" in dataset]:
         frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
         rows = frame.to_dataframe().reset_index()
         places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
@@ -195,9 +196,9 @@ def _reductions(dataset: xr.Dataset) -> None:
 
 def _costs(dataset: xr.Dataset) -> None:
     """Where integrators were compared: the cheapest for each number of digits."""
-    if "cheapest_integrator" not in dataset:
-        return
     numbers = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
+    if not {"cheapest_integrator", *numbers} <= set(dataset.data_vars):
+        return
     frame = dataset[["cheapest_integrator", *numbers]].reset_coords(drop=True).to_dataframe()
     table = Table("", "digits", "cheapest", "its work", "work of the default", "rtol to ask for")
     for place, digits, name, least, work, request in frame.reset_index().itertuples(index=False):
