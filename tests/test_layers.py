@@ -34,6 +34,7 @@ FLOORS = {
     "pieces": 5,
     "restore": 5,
     "comparison": 5,
+    "overheard": 5,
     "own_code": 5,
     "provenance": 5,
     "cells": 6,
