@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -13,11 +14,13 @@ import pandas as pd
 import xarray as xr
 from rich import progress as bars
 
-from rsfstudy import catalogue, own_code, provenance, restore, runner, store
+from rsfstudy import catalogue, contents, own_code, provenance, restore, runner, store
+from rsfstudy.axis import check_text
 from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
-from rsfstudy.claims import Claim, verdicts
-from rsfstudy.comparison import cell_number, compared, differences, fingerprint_of
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.claims import verdicts
+from rsfstudy.comparison import cell_number, compared, differences
+from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.lattice import coordinates
 from rsfstudy.measures import Outcome
 from rsfstudy.runner import Keeping, Progress
 from rsfstudy.scene import Scene
@@ -27,6 +30,8 @@ from rsfstudy.workers import on_client, on_local_cluster, threads
 OUTPUT = Path("outputs")
 #: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
 _LONGEST = 1e8
+#: Most worker processes for each core, and what any machine may have.
+_A_CORE, _ANYWHERE = 4, 8
 
 
 def studies() -> dict[str, Study]:
@@ -97,7 +102,7 @@ def run(
     """
     declared = declaration(study, rtol, overrides)
     keeping = Keeping(
-        output=_directory(output),
+        output=directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
@@ -130,6 +135,11 @@ class Workers:
         whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
         if not whole or self.processes < 0:
             raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
+        most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
+        if self.client is None and self.processes > most:
+            rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
+            remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
+            raise InvalidValue("workers", self.processes, rule, remedy=remedy)
         if self.client is not None and not hasattr(self.client, "submit"):
             raise InvalidValue("client", self.client, "must be a distributed.Client")
         limit: object = self.time_limit
@@ -151,11 +161,26 @@ class Workers:
         return on_local_cluster(self.processes, log) if self.processes > 0 else serial
 
 
-def _directory(output: str | Path | None) -> Path | None:
+def directory(output: str | Path | None) -> Path | None:
+    """Where results go: a directory, which need not be there yet, or nowhere.
+
+    Raises
+    ------
+    InvalidValue
+        For what cannot be the path of one.
+    """
     if output is None:
         return None
     if not isinstance(output, str | Path):
         raise InvalidValue("output", output, "must be a path, or None")
+    check_text("output", str(output))
+    if output == "":
+        remedy = "Name a directory; . is the one you are in."
+        raise InvalidValue("output", output, "is empty", remedy=remedy)
+    try:
+        Path(output).exists()
+    except OSError as error:
+        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
     return Path(output)
 
 
@@ -217,13 +242,12 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
     path = Path(name)
-    if path.suffix == ".py":
-        name = catalogue.load(str(path)).name
     if path.suffix not in (".nc", ".zarr"):
+        study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
         try:
-            path = _results(str(name), Path(output))
+            path = _results(study, directory(output) or OUTPUT)
         except OSError as error:
-            raise DataError(f"{name} cannot be looked for: {error}") from error
+            raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
     return store.read(path)
 
 
@@ -239,8 +263,10 @@ def _results(name: str, output: Path) -> Path:
         raise DataError(
             f"{file} does not exist, but {partial} does: run the study again, or name it."
         )
-    if not any(output.glob(f"{name}.*")) and name not in catalogue.names():
-        raise InvalidValue("study", name, f"has no results in {output}", choices=catalogue.names())
+    there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
+    if not there and name not in catalogue.names():
+        rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
+        raise InvalidValue("study", name, rule, choices=catalogue.names(), remedy=remedy)
     return file
 
 
@@ -254,13 +280,8 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
         where the verdict is not the expected one.
     """
     results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
-    declared = store.declaration(results)
-    try:
-        claims = [Claim(**claim) for claim in declared["claims"]]
-        overrides = dict(declared["overrides"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"the study declaration is damaged: {error}") from error
-    return verdicts(results, claims, overrides)
+    declared = contents.declaration(results)
+    return verdicts(results, list(declared.claims), declared.overrides)
 
 
 def rerun(
@@ -300,13 +321,13 @@ def rerun(
     """
     theirs = open(file)
     declared = study_of(theirs, study)
-    directory = _directory(output)
-    if directory is not None:
-        for taken in directory.glob(f"{declared.name}.*"):
+    place = directory(output)
+    if place is not None:
+        for taken in place.glob(f"{declared.name}.*"):
             rule = f"holds {taken.name}, which this would take the place of"
             raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
     keeping = Keeping(
-        output=directory,
+        output=place,
         fresh=True,
         keep_going=True,
         despite_failures="reduced_despite" in theirs.attrs,
@@ -320,18 +341,31 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """The study that made a dataset: from its own declaration, or, where that does not suffice,
     from the file that declares it.
     """
-    declared = store.declaration(results)
+    declared = contents.declaration(results)
     if file is None:
-        if fingerprint_of(results)["own_code"] != "none":
+        if contents.provenance(results)["fingerprint"]["own_code"] != "none":
             rule = "is a user's own, and code is never taken from a results file"
             remedy = "Name the file that declares it: --study FILE (study=)."
-            raise InvalidValue("measure", declared["measure"]["name"], rule, remedy=remedy)
-        return restore.study(declared)
-    named = catalogue.load(str(file))
-    if named.name != declared["name"]:
-        rule = f"declares the study {named.name!r}, and the results are of {declared['name']!r}"
-        raise InvalidValue("study", str(file), rule)
-    return restore.study(declared, of_its_own=named)
+            raise InvalidValue("measure", declared.measure["name"], rule, remedy=remedy)
+        study = restore.study(declared)
+    else:
+        named = catalogue.load(str(file))
+        if named.name != declared.name:
+            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+            raise InvalidValue("study", str(file), rule)
+        study = restore.study(declared, of_its_own=named)
+    _check_lattice(study, results)
+    return study
+
+
+def _check_lattice(study: Study, results: xr.Dataset) -> None:
+    """Refuse results whose cells are not those of their own declaration."""
+    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
+    if dims != study.dimensions:
+        raise contents.refused("status", f"lies along {dims}, not the axes of the declaration")
+    for name in study.dimensions:
+        if ours[name].values.tolist() != results[name].values.tolist():
+            raise contents.refused(name, "is not that axis of the declaration")
 
 
 def cell(
@@ -366,7 +400,8 @@ def cell(
     number = cell_number(results, place)
     declared = study_of(results, study)
     now = provenance.fingerprint(declared)
-    for name, (then, ours) in differences(fingerprint_of(results), now).items():
-        warnings.warn(f"{name}: {then} then, {ours} now", stacklevel=2)
+    then = contents.provenance(results)["fingerprint"]
+    for name, (theirs, ours) in differences(then, now).items():
+        warnings.warn(f"{name}: {theirs} then, {ours} now", stacklevel=2)
     scene, changes = declared.cell(number)
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)

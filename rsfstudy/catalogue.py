@@ -44,7 +44,7 @@ def load(name: str) -> Study:
     return study
 
 
-def _run(path: Path) -> ModuleType:
+def _run(given: Path) -> ModuleType:
     """The module a file makes.
 
     It is taken out of the list of modules again, and so are those beside it that it imports: worker
@@ -52,10 +52,13 @@ def _run(path: Path) -> ModuleType:
     have others of the same names.
     """
     try:
-        path = path.resolve(strict=True)
+        path = given.resolve(strict=True)
+        if not path.is_file():  # a pipe or a device may never end
+            raise InvalidValue("study", str(given), "is no file, but a directory or the like")
         path.read_bytes()
-    except OSError as error:
-        raise InvalidValue("study", str(path), f"is no file ({error.strerror})") from error
+    except (OSError, RuntimeError) as error:  # links in a circle are a RuntimeError
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidValue("study", str(given), f"is no file ({reason})") from error
     spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
     assert spec is not None
     assert spec.loader is not None

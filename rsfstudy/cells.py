@@ -20,9 +20,10 @@ import cloudpickle
 
 from rsfstudy import own_code, provenance
 from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.journal import Finished
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.overheard import Overhearing
 from rsfstudy.status import Status
 from rsfstudy.study import Cell
 
@@ -36,6 +37,8 @@ _TELL, _TELL_DRIVER = 0.2, 0.5
 _HERE = uuid.uuid4().hex
 #: What Dask may compute beside the cells of a worker, as a share of their CPU time.
 _BESIDE = 0.25
+#: Characters of a message that are kept.
+_LONGEST_MESSAGE = 2000
 
 #: Cells by their names.
 Batch = Sequence[tuple[bytes, Cell]]
@@ -169,15 +172,17 @@ def on_worker(sent: bytes, batch: bytes) -> Found:
 def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()) -> Finished:
     """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
     begin = time.perf_counter()
-    try:
-        found = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
-    except let_through:
-        raise
-    except BaseException as error:  # a cell may raise SystemExit or CancelledError too
-        # not str(error), which may raise as well
-        text = traceback.format_exception_only(error)[-1].strip()
-        found = Outcome(Status.CELL_RAISED, message=text)
-    message = found.message.encode(errors="backslashreplace").decode()
+    with Overhearing() as heard:
+        try:
+            found = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
+        except let_through:
+            raise
+        except BaseException as error:  # a cell may raise SystemExit or CancelledError too
+            # not str(error), which may raise as well
+            text = traceback.format_exception_only(error)[-1].strip()
+            found = Outcome(Status.CELL_RAISED, message=text)
+    message = brief("; ".join(filter(None, [found.message, *heard])), _LONGEST_MESSAGE)
+    message = message.encode(errors="backslashreplace").decode()
     return replace(found, message=message.replace("\0", "\\0")), time.perf_counter() - begin
 
 

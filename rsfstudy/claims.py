@@ -7,6 +7,7 @@ else.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -24,6 +25,7 @@ UNDECIDED = "undecided"
 NOT_APPLICABLE = "not applicable"
 
 RELATIONS = ("equals", "below", "above")
+_TEXTS = ("id", "statement", "source", "variable", "minus_variable", "reason", "because")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +77,10 @@ class Claim:
     because: str = ""
 
     def __post_init__(self) -> None:
+        for name in _TEXTS:
+            if not isinstance(getattr(self, name), str):
+                rule = f"must be a text, in claim {self.id}"
+                raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
         if self.expected not in (REPRODUCED, DIFFERS):
@@ -84,12 +90,16 @@ class Claim:
 
         for name in ("published", "tolerance"):
             value = getattr(self, name)
-            if not isinstance(value, int | float) or not math.isfinite(value):
+            if not _is_number(value) or not math.isfinite(value):
                 raise InvalidValue(name, value, f"must be a number, in claim {self.id}")
         for name in ("where", "minus"):
             if not isinstance(getattr(self, name), Mapping):
                 rule = f"must map coordinates to values, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
+            for value in getattr(self, name).values():
+                if not isinstance(value, str) and not _is_number(value):
+                    rule = f"must be a text or a number, in claim {self.id}"
+                    raise InvalidValue(name, value, rule)
 
     def describe(self) -> dict[str, Any]:
         """The claim as plain data."""
@@ -170,6 +180,11 @@ def verdicts(
     return pd.DataFrame(rows)
 
 
+def _is_number(value: object) -> bool:
+    """Whether a value is a number that a float can hold."""
+    return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
+
+
 def _keeps(dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]) -> bool:
     """Whether a variable still has every dimension that was changed."""
     changed = {str(d) for n in overrides if n in dataset.coords for d in dataset[n].dims}
@@ -181,23 +196,24 @@ def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float
     values = dataset[variable]
     for name, wanted in where.items():
         coordinate = dataset[name]
-        text = coordinate.dtype.kind in "OUST"
-        if text != isinstance(wanted, str):
+        text = isinstance(wanted, str)
+        if coordinate.dtype.kind not in ("OUST" if text else "iufb"):
             raise KeyError(name)
         if coordinate.ndim == 0:
             if coordinate.item() != wanted:
                 raise KeyError(name)
             continue
-        (dimension,) = coordinate.dims
+        if len(coordinate.dims) > 1 or coordinate.dims[0] not in values.dims:
+            raise KeyError(name)
         if text:
             matches = np.flatnonzero(coordinate.values == wanted)
         else:
             matches = np.flatnonzero(np.isclose(coordinate.values, wanted, rtol=1e-9, atol=0.0))
         if matches.size != 1:
             raise KeyError(name)
-        values = values.isel({dimension: int(matches[0])})
-    if values.ndim:
-        raise KeyError(variable)  # the lattice has more dimensions than the claim speaks of
+        values = values.isel({coordinate.dims[0]: int(matches[0])})
+    if values.ndim or values.dtype.kind not in "iufb":
+        raise KeyError(variable)  # more dimensions than the claim speaks of, or no number
     if variable == "status" and int(values) == int(Status.PENDING):
         return math.nan
     return float(values)

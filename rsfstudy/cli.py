@@ -19,7 +19,7 @@ from rich.table import Table
 
 from rsfstudy import api, catalogue, terminal
 from rsfstudy.cells import DEFAULT_TIME_LIMIT
-from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError
+from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, brief
 from rsfstudy.runner import FORMATS, Keeping
 from rsfstudy.study import Study
 from rsfstudy.terminal import FAILED, OK, Ended
@@ -34,9 +34,16 @@ RESULTS = (".nc", ".zarr")
 _stderr = terminal.Plain(stderr=True, markup=False, emoji=False, highlight=False)
 
 _all = click.option("--all", "every", is_flag=True, help="Every named study.")
+
+
+def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
+    return api.directory(value)
+
+
 _output = click.option(
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(file_okay=False),
+    callback=_directory,
     default=api.OUTPUT,
     show_default=True,
     help="Directory of the results.",
@@ -90,6 +97,7 @@ def main() -> None:
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
+        error.message = brief(error.message)  # type: ignore[misc]
         error.show()
         sys.exit(WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
@@ -221,7 +229,8 @@ def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: K
 )
 @click.option(
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(file_okay=False),
+    callback=_directory,
     help="Directory to keep the new results in; nothing is written without it.",
 )
 @_workers

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from rsfstudy.contents import provenance
 from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import MEASURED_TIMES
@@ -32,7 +33,7 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     for name in theirs.data_vars:
         if name in MEASURED_TIMES:
             continue
-        if name not in ours or ours[name].shape != theirs[name].shape:
+        if name not in ours or not _comparable(theirs[name], ours[name]):
             gone = {"values": theirs[name].size, "identical": 0, "largest_difference": np.nan}
             rows.append({"variable": name, **gone})
             continue
@@ -44,8 +45,13 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
             continue  # a reduction over cells that one of them has not
         rows.append({"variable": name, **_agreement(a.values[known], b.values[known])})
     frame = pd.DataFrame(rows)
-    frame.attrs["differs"] = differences(fingerprint_of(theirs), fingerprint_of(ours))
+    frame.attrs["differs"] = differences(*(provenance(d)["fingerprint"] for d in (theirs, ours)))
     return frame
+
+
+def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
+    """Whether values of the same kind lie in the same way."""
+    return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
 
 
 def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
@@ -56,11 +62,6 @@ def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
     gap = np.abs(theirs - ours)[~same]
     largest = float(np.max(gap)) if gap.size else 0.0
     return {"values": same.size, "identical": int(same.sum()), "largest_difference": largest}
-
-
-def fingerprint_of(dataset: xr.Dataset) -> dict[str, Any]:
-    """What decided the numbers of a results dataset, as it says."""
-    return dict(json.loads(dataset.attrs["provenance"])["fingerprint"])
 
 
 def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
@@ -115,5 +116,5 @@ def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
         gaps = np.abs(values - number)
         nearest = int(np.argmin(gaps))
         return nearest if gaps[nearest] <= 1e-5 * abs(number) else None
-    found = np.flatnonzero(values.astype(str) == str(wanted))
+    found = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
     return int(found[0]) if found.size else None

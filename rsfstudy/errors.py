@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+
+#: Most characters of a text, and most choices, that a message has room for.
+_MOST_CHARACTERS, _MOST_CHOICES = 200, 60
+
+_values = reprlib.Repr()
+_values.maxstring = _values.maxother = _values.maxlong = 100
+_values.maxlist = _values.maxtuple = _values.maxdict = _values.maxset = 20
 
 
 class RsfStudyError(Exception):
@@ -11,7 +19,7 @@ class RsfStudyError(Exception):
 
 
 class InvalidValue(RsfStudyError, ValueError):
-    """A value that breaks a rule.
+    """A value that breaks a rule; of what is long, the message leaves the middle out.
 
     Parameters
     ----------
@@ -37,12 +45,15 @@ class InvalidValue(RsfStudyError, ValueError):
         remedy: str = "",
     ) -> None:
         choices = list(choices)
-        text = f"{name} = {value!r}: {rule}."
-        close = difflib.get_close_matches(str(value), choices, n=3, cutoff=0.5)
+        shown = _values.repr(value)
+        text = f"{brief(name)} = {shown}: {rule}."
+        close = difflib.get_close_matches(shown.strip("'\""), choices, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
         if choices:
-            text += f" Choices: {', '.join(choices)}."
+            more = len(choices) - _MOST_CHOICES
+            text += f" Choices: {', '.join(map(brief, choices[:_MOST_CHOICES]))}"
+            text += f" and {more:,} more." if more > 0 else "."
         if remedy:
             text += f" {remedy}"
         super().__init__(text)
@@ -52,7 +63,7 @@ class InvalidValue(RsfStudyError, ValueError):
     def at(self, place: str) -> InvalidValue:
         """The same error, with the place it was met at."""
         found = InvalidValue.__new__(InvalidValue)
-        Exception.__init__(found, f"{place}: {self}")
+        Exception.__init__(found, f"{brief(place)}: {self}")
         found.name, found.value = self.name, self.value
         return found
 
@@ -67,3 +78,9 @@ class RunError(RsfStudyError):
 
 class Interrupted(RunError):
     """A run that the user ended."""
+
+
+def brief(text: object, most: int = _MOST_CHARACTERS) -> str:
+    """A text, such as a name a user gave, without its middle where it is too long for a message."""
+    whole, half = str(text), most // 2
+    return whole if len(whole) <= most else f"{whole[:half]}...{whole[-half:]}"

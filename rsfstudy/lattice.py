@@ -113,7 +113,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             derived = [formula(value) for value in np.ravel(values).tolist()]
             coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name))
     for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, values, _about(name))
+        coords[name] = (name, np.asarray(values), _about(name))
     return coords
 
 
@@ -147,7 +147,7 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
     """
     complete = known == study.size
     when, version = provenance["time"], provenance["versions"]["rsfstudy"]
-    return {
+    found = {
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
@@ -167,3 +167,5 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         "provenance": json.dumps(dict(provenance)),
         **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
     }
+    # a command, or the environment, may hold bytes that are no text
+    return {name: text.encode(errors="backslashreplace").decode() for name, text in found.items()}

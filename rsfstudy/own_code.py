@@ -145,7 +145,7 @@ class _Walk:
             yield from self._all(value, names)
         elif isinstance(value, set | frozenset):
             yield from sorted(map(repr, value))
-        elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
+        elif type(value) is np.ndarray and value.dtype.kind != "O":
             yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
         else:
             yield from self._class(type(value))

@@ -6,28 +6,28 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from types import ModuleType
+from typing import Any, TypedDict
 
 from rsfstudy import measures, reduce
 from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.contents import Declaration, PlainMeasure, PlainReduction, fit, refused
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.problem import Problem
 from rsfstudy.reduce import Reduction
-from rsfstudy.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.study import Study
 
 
-def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> Study:
+def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
     """The study that describes itself by this declaration.
 
     Parameters
     ----------
-    declaration : mapping
+    declared : Declaration
     of_its_own : Study, optional
         Where to take the measure and the reductions from, if they are not part of rsfstudy; the
         measure with the plain fields that the declaration states.
@@ -37,78 +37,85 @@ def study(declaration: Mapping[str, Any], of_its_own: Study | None = None) -> St
     InvalidValue
         Where its measure or a reduction is not part of rsfstudy.
     DataError
-        Where the declaration is damaged.
+        Where the declaration makes no study, naming the part.
     """
-    parts = dict(declaration)
+    parts = {field.name: getattr(declared, field.name) for field in fields(declared)}
+    if of_its_own is None:
+        parts["measure"] = measure(declared.measure, "declaration.measure")
+        parts["reductions"] = [
+            _reduction(described, f"declaration.reductions[{number}]")
+            for number, described in enumerate(declared.reductions)
+        ]
+    else:
+        for name in ("measure", "reductions", "declared_in"):
+            parts[name] = getattr(of_its_own, name)
+        own = of_its_own.measure
+        stated = {name: v for name, v in declared.measure.items() if name in own.plain_fields}
+        parts["measure"] = own.with_(**stated)
     try:
-        described = parts.pop("measure"), parts.pop("reductions")
-        if of_its_own is None:
-            found, reductions = measure(described[0]), [_reduction(kind) for kind in described[1]]
-        else:
-            own = of_its_own.measure
-            stated = {name: described[0][name] for name in own.plain_fields if name in described[0]}
-            found, reductions = own.with_(**stated), list(of_its_own.reductions)
-        return Study(
-            base=Scene(**parts.pop("base")),
-            axes=[Axis(axis["dimension"], axis["values"]) for axis in parts.pop("axes")],
-            measure=found,
-            accuracy=accuracy(parts.pop("accuracy")),
-            reductions=reductions,
-            claims=[Claim(**claim) for claim in parts.pop("claims")],
-            **parts,
-            declared_in="" if of_its_own is None else of_its_own.declared_in,
-        )
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InvalidValue) and error.name in ("measure", "reduction"):
-            raise
-        raise DataError(f"the study declaration is damaged: {error}") from error
+        parts["axes"] = [Axis(axis["dimension"], axis["values"]) for axis in declared.axes]
+        return Study(**parts)
+    except InvalidValue as error:
+        raise refused("declaration", f"makes no study ({error})") from error
 
 
-def accuracy(described: Mapping[str, Any]) -> Accuracy:
-    """The accuracy that describes itself so."""
-    values = dict(described)
-    methods = tuple((regime, name) for regime, name in values.pop("methods"))
-    return Accuracy(**values, methods=methods)
-
-
-def measure(described: Mapping[str, Any]) -> Measure:
-    """The measure that describes itself so."""
-    values = dict(described)
-    name = values.pop("name")
-    if name not in _measures():
-        raise InvalidValue("measure", name, "is not part of rsfstudy", choices=_measures())
-    module = importlib.import_module(f"{measures.__name__}.{name}")
-    kind = next(m for m in _members(Measure) if m.__module__ == module.__name__ and m.name == name)
+def measure(described: PlainMeasure, path: str) -> Measure:
+    """The measure that describes itself so, at a path in a file."""
+    values: dict[str, Any] = dict(described)
+    name, kinds = values.pop("name"), _kinds(Measure, measures)
+    if name not in kinds:
+        raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
     if "problems" in values:
-        values["problems"] = [_problem(problem) for problem in values["problems"]]
-    found: Measure = kind(**_tuples(values))
+        values["problems"] = _problems(values["problems"], f"{path}.problems")
+    found: Measure = fit(values, kinds[name], path)
     return found
 
 
-def _measures() -> list[str]:
-    return sorted(m.name for m in pkgutil.iter_modules(measures.__path__))
+class _PlainProblem(TypedDict):
+    """A problem; what else it holds is numbers and texts."""
+
+    measure: PlainMeasure
+    status: str
+    scale: float | None
 
 
-def _problem(described: Mapping[str, Any]) -> Problem:
-    values = dict(described)
-    return Problem(
-        scene=Scene(**values.pop("scene")),
-        measure=measure(values.pop("measure")),
-        status=Status[values.pop("status").upper()],
-        scale=values.pop("scale") or 0.0,
-        **values,
-    )
+def _problems(described: Any, path: str) -> list[Problem]:
+    plain: Sequence[_PlainProblem] = fit(described, Sequence[_PlainProblem], path)
+    return [_problem(problem, f"{path}[{number}]") for number, problem in enumerate(plain)]
 
 
-def _reduction(described: Mapping[str, Any]) -> Reduction:
-    values = dict(described)
-    wanted = values.pop("kind")
-    kinds: dict[str, type[Reduction]] = {
-        k.kind: k for k in _members(Reduction) if k.__module__.startswith(reduce.__name__)
+def _problem(described: _PlainProblem, path: str) -> Problem:
+    statuses = {status.label: status for status in Status}
+    if described["status"] not in statuses:
+        raise refused(f"{path}.status", "is unknown")
+    made = {
+        "measure": measure(described["measure"], f"{path}.measure"),
+        "status": statuses[described["status"]],
+        "scale": described["scale"] or 0.0,
     }
+    found: Problem = fit({**described, **made}, Problem, path)
+    return found
+
+
+def _reduction(described: PlainReduction, path: str) -> Reduction:
+    values: dict[str, Any] = dict(described)
+    wanted, kinds = values.pop("kind"), _kinds(Reduction, reduce)
     if wanted not in kinds:
         raise InvalidValue("reduction", wanted, "is not part of rsfstudy", choices=kinds)
-    return kinds[wanted](**_tuples(values))
+    found: Reduction = fit(values, kinds[wanted], path)
+    return found
+
+
+def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
+    """The classes of a package that are derived from one, by what they call themselves."""
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    within = f"{package.__name__}."
+    return {
+        vars(kind).get("name") or vars(kind)["kind"]: kind
+        for kind in _members(base)
+        if kind.__module__.startswith(within)
+    }
 
 
 def _members(base: Any) -> Iterator[Any]:
@@ -117,8 +124,3 @@ def _members(base: Any) -> Iterator[Any]:
         yield from _members(kind)
         if "name" in vars(kind) or "kind" in vars(kind):
             yield kind
-
-
-def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists as the tuples they were before they were written as JSON."""
-    return {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}

@@ -19,7 +19,8 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError
+from rsfstudy import contents
+from rsfstudy.errors import DataError, brief
 
 #: Root attributes that a verdict or a rerun turns on.
 _SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
@@ -140,6 +141,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove(beside)  # were it a link or a pipe, writing would go elsewhere
         # a lock that xarray would ask the Dask cluster for is of no use, and may never come
         with dask.config.set(scheduler="synchronous"):
             clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
@@ -199,22 +201,36 @@ def read(path: Path) -> xr.Dataset:
     DataError
         If it is missing, unreadable, not written by rsfstudy, or damaged.
     """
+    where = brief(path)
     try:
-        if not path.exists():
-            raise DataError(f"{path} does not exist. Run the study first, or name another file.")
+        _check_there(path, where)
         if path.is_dir():
             _check_codecs(path)
             dataset = xr.open_dataset(path, **ZARR)
         else:
             _check_bytes(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
-        declaration(dataset, str(path))
-        Digests().check(dataset, str(path))
+        Digests().check(dataset, where)
     except DataError:
         raise
     except Exception as error:  # damage makes HDF5, Zarr, netCDF4 and xarray raise almost anything
-        raise DataError(f"{path} cannot be read: {error}") from error
+        raise DataError(f"{where} cannot be read: {brief(error)}") from error
+    try:
+        contents.check(dataset)
+    except DataError as error:
+        raise DataError(f"{where}: {error}") from error
     return dataset
+
+
+def _check_there(path: Path, where: str) -> None:
+    """Refuse what is no file and no Zarr store: whoever opens a pipe may wait for ever."""
+    if not path.exists():
+        raise DataError(f"{where} does not exist. Run the study first, or name another file.")
+    if path.is_dir() and not (path / "zarr.json").is_file():
+        raise DataError(f"{where} is a directory, and no Zarr store.")
+    for part in path.rglob("*") if path.is_dir() else [path]:
+        if not (part.is_file() or part.is_dir()):
+            raise DataError(f"{brief(part)} is no file, but a pipe, a device or a broken link.")
 
 
 def _check_codecs(path: Path) -> None:
@@ -227,28 +243,6 @@ def _check_codecs(path: Path) -> None:
                     f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
                     f"{codec['name']!r}, which may run code."
                 )
-
-
-def declaration(dataset: xr.Dataset, where: str = "the dataset") -> dict[str, Any]:
-    """The study declaration a dataset carries, as plain data.
-
-    Raises
-    ------
-    DataError
-        If it carries none.
-    """
-    try:
-        found = json.loads(dataset.attrs["declaration"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(
-            f"{where} carries no study declaration: it was not written by rsfstudy, or damaged."
-        ) from error
-    parts = {"name": str, "claims": list, "plot": str, "overrides": dict}
-    if not isinstance(found, dict) or any(
-        not isinstance(found.get(name), kind) for name, kind in parts.items()
-    ):
-        raise DataError(f"{where} carries a study declaration that is damaged.")
-    return found
 
 
 def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:

@@ -94,12 +94,15 @@ class Study:
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
-        try:
-            json.dumps(dict(self.overrides))
-        except (TypeError, ValueError) as error:
-            raise InvalidValue("overrides", self.overrides, "must be plain data") from error
+        if not isinstance(self.overrides, Mapping):
+            raise InvalidValue("overrides", self.overrides, "must map names to values")
         self._check_parts()
         self._check_fields()
+        for name, value in self.describe().items():
+            try:
+                json.dumps(value)
+            except (TypeError, ValueError) as error:
+                raise InvalidValue(name, value, f"must be plain data ({error})") from error
         taken: dict[str, str] = {}
         for axis in self.axes:
             for name in {axis.dimension, *axis.fields}:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +16,10 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api, runner, store
+from rsfstudy import api, contents, runner
 from rsfstudy.claims import NOT_APPLICABLE
 from rsfstudy.core.accuracy import DEFAULT_RTOL
+from rsfstudy.errors import RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.plan import Plan
 from rsfstudy.scene import Scene
@@ -40,6 +40,13 @@ class Plain(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out."""
         return super().render_str(spelt(text), **options)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, or say why not: what is printed may go to a file on a full disk."""
+        try:
+            super().print(*objects, **options)
+        except OSError as error:
+            raise RunError(f"cannot print: {error.strerror}.") from error
 
 
 def spelt(text: str) -> str:
@@ -156,7 +163,7 @@ def _tally(dataset: xr.Dataset) -> str:
 
 def results(dataset: xr.Dataset, file: str) -> int:
     """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
-    attrs, about = dataset.attrs, json.loads(dataset.attrs["provenance"])
+    attrs, about = dataset.attrs, contents.provenance(dataset)
     console.print(f"{attrs['id']}: {attrs['title']}\n", style="bold")
     table = Table("", "", box=None, show_header=False)
     dims = dataset["status"].dims
@@ -168,7 +175,8 @@ def results(dataset: xr.Dataset, file: str) -> int:
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
     for name, values in dataset.data_vars.items():
-        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {values.long_name}")
+        words = values.attrs.get("long_name", "")  # what a notebook added may have none
+        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {words}")
     console.print(table)
     return failures(dataset, file)
 
@@ -205,10 +213,11 @@ def agreement(frame: pd.DataFrame) -> int:
 
 
 def _reductions(dataset: xr.Dataset) -> None:
-    """Slopes and their like: variables with a standard error, one row for each point of their
+    """Slopes and their like: reductions with a standard error, one row for each point of their
     dimensions.
     """
-    for slope in [str(n) for n in dataset.data_vars if f"{n}_stderr" in dataset]:
+    made = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    for slope in [name for name in made if f"{name}_stderr" in dataset]:
         frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
         rows = frame.to_dataframe().reset_index()
         places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
@@ -240,9 +249,9 @@ def _reductions(dataset: xr.Dataset) -> None:
 
 def _costs(dataset: xr.Dataset) -> None:
     """Where integrators were compared: the cheapest for each number of digits."""
-    if "cheapest_integrator" not in dataset:
-        return
     numbers = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
+    if not {"cheapest_integrator", *numbers} <= set(dataset.data_vars):
+        return
     frame = dataset[["cheapest_integrator", *numbers]].reset_coords(drop=True).to_dataframe()
     table = Table("", "digits", "cheapest", "its work", "work of the default", "rtol to ask for")
     for place, digits, name, least, work, request in frame.reset_index().itertuples(index=False):
@@ -266,7 +275,7 @@ def checked(dataset: xr.Dataset) -> int:
 def claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
     table_of = api.check(dataset)
-    overrides = store.declaration(dataset)["overrides"]
+    overrides = contents.declaration(dataset).overrides
     console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
     if overrides:
         console.print(f"not as declared: {settings(overrides)}")
@@ -366,7 +375,7 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
 def _reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
     """The command that computes one cell alone."""
     words = ["rsfstudy", "rerun", file]
-    declared_in = json.loads(dataset.attrs["provenance"]).get("declared_in")
+    declared_in = contents.provenance(dataset)["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
     for name, value in place.items():

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from rsfstudy.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
-from rsfstudy.errors import RunError
+from rsfstudy.errors import RunError, brief
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
@@ -342,7 +342,8 @@ def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
             client = Client(address, timeout=timeout)
         except Exception as error:  # what Dask makes of an address that is none has no end
             raise RunError(
-                f"no Dask scheduler answers at {address!r}: {str(error) or 'it took too long'}. "
+                f"no Dask scheduler answers at {brief(address)!r}: "
+                f"{brief(error) or 'it took too long'}. "
                 "Start one with `dask scheduler`, or leave --scheduler out."
             ) from error
         with client:

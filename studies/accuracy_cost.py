@@ -117,7 +117,7 @@ def cheapest(label: str, digits: float, factor: float) -> Claim:
     """The default integrator against the best."""
     return Claim(
         id="A2",
-        statement=f"{label}: DOP853 takes at most {factor:g} times the least work, {digits:g} digits",
+        statement=f"{label}: DOP853 takes up to {factor:g} times the least work, {digits:g} digits",
         source="this project's choice of DOP853 in every regime",
         variable="cheapest_ratio",
         where={"problem": label, "digits": digits},

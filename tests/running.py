@@ -10,12 +10,13 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, cli
@@ -102,6 +103,21 @@ def ended(process: subprocess.Popen) -> tuple[int, str, str]:
     out, said = process.communicate(timeout=HANGS)
     assert "Traceback" not in said, said
     return process.returncode, out, said
+
+
+def called(words: Sequence[str]) -> tuple[int, str]:
+    """Exit status and what is said by the command in this process, from its real entry point; what
+    would be a traceback is raised.
+    """
+    with pytest.MonkeyPatch.context() as patch, CliRunner().isolation() as (out, err, _both):
+        patch.setattr(sys, "argv", ["rsfstudy", *words])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as ended_with:
+            code = int(ended_with.code or 0)
+        said = out.getvalue().decode(errors="replace") + err.getvalue().decode(errors="replace")
+    return code, " ".join(said.split())
 
 
 def cells_in(journal: Path) -> int:

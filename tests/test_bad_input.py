@@ -5,7 +5,6 @@ never a half-written output.
 import json
 import os
 import string
-import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from faulty import declared
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import FAULTY, SMALL, command, ended, run, same_numbers
+from running import FAULTY, SMALL, called, command, ended, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, catalogue, cli, plots, restore, store, terminal
+from rsfstudy import Axis, Scene, Study, catalogue, contents, plots, restore, store, terminal
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.scene import FIELDS
@@ -154,23 +152,6 @@ def test_unknown_names_come_with_suggestions(words, suggestion):
 
 
 # ---- the command line ---------------------------------------------------------------------------
-
-
-def called(words):
-    """Exit status and what is said, with the same handling of errors as the real entry point."""
-    runner = CliRunner()
-    with runner.isolation() as (out, err, _both):
-        try:
-            sys_argv, sys.argv = sys.argv, ["rsfstudy", *words]
-            try:
-                cli.main()
-                code = 0
-            except SystemExit as ended_with:
-                code = int(ended_with.code or 0)
-        finally:
-            sys.argv = sys_argv
-        said = out.getvalue().decode(errors="replace") + err.getvalue().decode(errors="replace")
-    return code, " ".join(said.split())
 
 
 #: Nearly right settings, and anything at all.
@@ -313,7 +294,7 @@ def test_a_declaration_that_was_meddled_with(small, data):
         )
     place[key] = data.draw(JSON)
     meddled = dataset.assign_attrs(declaration=json.dumps(declared))
-    for use in (rsfstudy.check, plots.figure, lambda d: restore.study(store.declaration(d))):
+    for use in (rsfstudy.check, plots.figure, lambda d: restore.study(contents.declaration(d))):
         try:
             use(meddled)
         except RsfStudyError:

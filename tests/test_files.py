@@ -14,7 +14,7 @@ import xarray as xr
 from running import FAULTY, SMALL, command, ended, run
 
 import rsfstudy
-from rsfstudy import Scene, catalogue, plots, restore, store
+from rsfstudy import Scene, catalogue, contents, plots, restore, store
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.journal import Journal, Layout
 from rsfstudy.measures import Measure, Outcome
@@ -99,7 +99,7 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     with pytest.raises(DataError, match="text.nc cannot be read"):
         store.read(tmp_path / "text.nc")
     xr.Dataset({"v": 1.0}).to_netcdf(tmp_path / "foreign.nc")
-    with pytest.raises(DataError, match="carries no study declaration"):
+    with pytest.raises(DataError, match="foreign.nc carries no digests: it was not written by"):
         store.read(tmp_path / "foreign.nc")
 
 
@@ -210,7 +210,7 @@ def test_an_attribute_changed_in_a_file_is_named(name, small):
     with netCDF4.Dataset(small, "r+") as file:
         text = file.getncattr(name)
         file.setncattr(name, text.replace(text[2], "x", 1))
-    with pytest.raises(DataError, match=f"{name}|carries a study declaration that is damaged"):
+    with pytest.raises(DataError, match=f"the attribute '{name}' is not what was written"):
         rsfstudy.open(small)
 
 
@@ -301,7 +301,7 @@ def test_git_tells_the_commit_and_whether_it_was_clean():
 def test_every_declaration_restores_its_study(name):
     study = catalogue.load(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = restore.study(described)
+    restored = restore.study(contents.fit(described, contents.Declaration, "declaration"))
     assert json.loads(json.dumps(restored.describe())) == described
     assert set(restored.scenes()) == set(study.scenes())
 

@@ -18,7 +18,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import Accuracy, relative_work
+from rsfstudy.core.accuracy import (
+    DEFAULT_RTOL,
+    LOOSEST_RTOL,
+    TIGHTEST_RTOL,
+    Accuracy,
+    relative_work,
+)
 from rsfstudy.core.stepping import Halt, Meter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.scene import FIELDS, Scene
@@ -142,6 +148,23 @@ class Measure:
 
     def check(self) -> None:
         """Raise InvalidValue where the measure declares what no lattice can hold."""
+        try:
+            self._check_names()
+            for name, values in self.inner_coordinates.items():
+                _check_coordinate(name, values)
+            self._check_cost()
+            self._check_description()
+        except InvalidValue:
+            raise
+        except Exception as error:
+            rule = f"declares what no lattice can hold ({type(error).__name__}: {error})"
+            raise InvalidValue("measure", type(self).__name__, rule) from error
+
+    def _check_names(self) -> None:
+        for name in ("__call__", "metered"):
+            if getattr(type(self), name) is not getattr(Measure, name):
+                rule, remedy = f"has a {name} of its own", "Write find: what it gives is checked."
+                raise InvalidValue("measure", self.name, rule, remedy=remedy)
         names = [*self.variables, *self.inner_coordinates]
         if not self.variables:
             raise InvalidValue("variables", {}, f"must name a number, in measure {self.name}")
@@ -152,18 +175,33 @@ class Measure:
                 rule = f"names something else, or nothing, in measure {self.name}"
                 raise InvalidValue("variable", name, rule)
         for name, dims in self.variables.items():
+            if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
+                raise InvalidValue("dimensions", dims, f"of {name!r} must be names, each once")
             for dim in dims:
                 if dim not in self.inner_coordinates:
                     raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
-        work = self.typical_work
+        for name in self.sought:
+            if name not in FIELDS:
+                raise InvalidValue("sought", name, "is not a field of a scene", choices=FIELDS)
+
+    def _check_cost(self) -> None:
+        work: object = self.typical_work
         if not isinstance(work, int | float) or not 0 < work < np.inf:
             raise InvalidValue("typical_work", work, "must be a number greater than 0")
+        for rtol in (TIGHTEST_RTOL, DEFAULT_RTOL, LOOSEST_RTOL):
+            expected = self.expected_work(Accuracy(rtol))
+            if not 0 < expected < np.inf:
+                raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {rtol:g}")
+
+    def _check_description(self) -> None:
         try:
-            json.dumps(self.describe())
+            name: object = json.loads(json.dumps(self.describe()))["name"]
         except (TypeError, ValueError) as error:
             remedy = "Use Python's own numbers and texts, and tuples of them."
             rule = f"is no plain data ({error})"
             raise InvalidValue("measure", self.name, rule, remedy=remedy) from error
+        if not isinstance(name, str):
+            raise InvalidValue("name", name, "must be a text, in a measure")
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""
@@ -176,7 +214,7 @@ class Measure:
             found = self._checked(self.find(scene, accuracy, meter))
         except Halt as halt:
             found = Outcome(halt.status, message=str(halt))
-        return Outcome(found.status, found.values, found.message, meter.spent), meter
+        return Outcome(found.status, found.values, found.message, _count(meter.spent)), meter
 
     def _checked(self, found: Outcome) -> Outcome:
         """What was found, if it is what was declared; an answer without a finite number is none.
@@ -188,28 +226,36 @@ class Measure:
         """
         if not isinstance(found, Outcome) or not isinstance(found.status, Status):
             raise InvalidValue("measured", found, "must be an Outcome with a Status")
+        if not isinstance(found.values, Mapping):
+            raise InvalidValue("measured", found.values, "must map names to numbers")
         if not isinstance(found.message, str):
             raise InvalidValue("message", type(found.message).__name__, "must be a text")
         if found.status is Status.PENDING:
             raise InvalidValue("measured", found, "must say what became of the cell")
-        for name, value in found.values.items():
-            if name not in self.variables:
-                raise InvalidValue("measured", name, "is not declared", choices=self.variables)
-            shape = tuple(len(self.inner_coordinates[d]) for d in self.variables[name])
-            if np.shape(value) != shape:
-                rule = f"has the shape {np.shape(value)} and must have {shape}"
-                raise InvalidValue("measured", name, rule)
-            masked = isinstance(value, np.ma.MaskedArray)
-            if masked or np.asarray(value).dtype.kind not in "iufb":
-                raise InvalidValue("measured", name, f"is {value!r} and must be a real number")
+        values = {name: self._number(name, value) for name, value in found.values.items()}
         if found.status is not Status.OK:
-            return found
-        headline = np.asarray(found.values.get(self.headline, np.nan), dtype=float)
+            return Outcome(found.status, values, found.message)
+        headline = np.asarray(values.get(self.headline, np.nan), dtype=float)
         if np.isfinite(headline).any():
-            return found
-        return Outcome(
-            Status.NOT_FINITE, found.values, f"{self.headline} = {headline}", found.rhs_evaluations
-        )
+            return Outcome(Status.OK, values, found.message)
+        return Outcome(Status.NOT_FINITE, values, f"{self.headline} = {headline}")
+
+    def _number(self, name: str, value: Any) -> Value:
+        """A measured number, or an array of them, as NumPy's or Python's own."""
+        if name not in self.variables:
+            raise InvalidValue("measured", name, "is not declared", choices=self.variables)
+        if isinstance(value, float) and not self.variables[name]:
+            return value  # as most are
+        if isinstance(value, np.ma.MaskedArray):
+            raise InvalidValue(name, value, "is masked, and must be a real number")
+        array = np.asarray(value)
+        if array.dtype.kind not in "iufb":
+            raise InvalidValue(name, value, "must be a real number")
+        shape = tuple(len(self.inner_coordinates[d]) for d in self.variables[name])
+        if array.shape != shape:
+            rule = f"has the shape {array.shape} and must have {shape}"
+            raise InvalidValue("measured", name, rule)
+        return array if shape else array.item()
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""
@@ -233,3 +279,28 @@ def _kind(value: object) -> str:
     if isinstance(value, str):
         return "a text"
     return "a number" if isinstance(value, int | float) else "something else"
+
+
+def _check_coordinate(name: str, values: Any) -> None:
+    """Raise InvalidValue for coordinate values that do not tell points apart, or that no file can
+    hold.
+    """
+    array = np.asarray(values)
+    if isinstance(values, np.ma.MaskedArray) or array.ndim != 1 or not array.size:
+        raise InvalidValue(name, values, "must be a list of coordinate values")
+    texts = array.dtype.kind in "OU" and all(isinstance(text, str) for text in array)
+    # no file holds the half and the long floats of NumPy
+    numbers = array.dtype.kind in "iufb" and array.dtype.char not in "eg"
+    if texts:
+        texts = "\0" not in "".join(array).encode().decode()
+    if not texts and not (numbers and np.isfinite(array).all()):
+        raise InvalidValue(name, values, "must be finite numbers, or texts, on an inner dimension")
+    if len(set(array.tolist())) < array.size:
+        raise InvalidValue(name, values, "has a value that stands twice on its inner dimension")
+
+
+def _count(spent: Any) -> int:
+    """Right-hand sides as a file can hold them."""
+    if not isinstance(spent, int | np.integer) or not 0 <= spent < 2**63:
+        raise InvalidValue("rhs_evaluations", spent, "must be a whole number from 0 to 2**63 - 1")
+    return int(spent)

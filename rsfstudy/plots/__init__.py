@@ -18,10 +18,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rsfstudy.contents import declaration
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.status import Status
-from rsfstudy.store import declaration
 from rsfstudy.study import settings
 
 Panel = Callable[[xr.Dataset, Axes], Axes]
@@ -48,7 +48,7 @@ def figure(dataset: xr.Dataset) -> Figure:
     found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):
         draw(dataset, found.add_subplot(rows, columns, number), panel)
-    overrides = declaration(dataset)["overrides"]
+    overrides = declaration(dataset).overrides
     if overrides:
         found.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
     return found
@@ -80,7 +80,7 @@ def _module(dataset: xr.Dataset) -> ModuleType:
     """The module that draws a dataset: the one it declares, or plain lines where it has more axes
     than that has room for.
     """
-    name = declaration(dataset)["plot"]
+    name = declaration(dataset).plot
     if name not in NAMES:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     module = importlib.import_module(f"{__name__}.{name}")
@@ -113,10 +113,11 @@ def save(dataset: xr.Dataset, path: Path) -> None:
         raise
     except Exception as error:
         rule = f"does not fit these results ({type(error).__name__}: {error})"
-        raise InvalidValue("plot", declaration(dataset)["plot"], rule, choices=NAMES) from error
+        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES) from error
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
     try:
+        beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
         beside.write_bytes(image.getvalue())
         os.replace(beside, path)
     finally:

@@ -1,0 +1,324 @@
+"""A measure of a user's own that goes wrong: what no lattice can hold is refused before any work,
+and an outcome that cannot be is a failed cell, with its message.
+"""
+
+import sys
+import threading
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from running import run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.claims import Claim
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.reduce import LinearFit
+from rsfstudy.status import Status
+
+
+class Own(Measure):
+    """Gives b/a."""
+
+    name = "own"
+    headline = "total"
+    variables = {"total": ()}  # noqa: RUF012
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        meter.charge("any", 7)
+        return Outcome(Status.OK, {"total": scene.b_over_a})
+
+
+def study(measure, **parts):
+    axes = [Axis("b_over_a", [2.0, 3.0])]
+    return Study(name="own", title="Own", base=Scene(), axes=axes, measure=measure, **parts)
+
+
+def own(**declared) -> Measure:
+    """A measure that declares something else."""
+    return type("Own", (Own,), declared)()
+
+
+def along(values) -> Measure:
+    """A measure with an inner dimension."""
+    return own(variables={"total": (), "curve": ("x",)}, inner_coordinates={"x": values})
+
+
+# ---- what no lattice can hold -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.ones((2, 2)),
+        np.float64(3.0),
+        [],
+        [[1.0], [1.0, 2.0]],
+        [1.0, np.nan],
+        [1.0, np.inf],
+        [1.0, 1.0],
+        ["a", "a"],
+        ["a", "b\0c"],
+        ["a", "\udc80"],
+        [1.0, 2j],
+        [1.0, None],
+        np.array([object(), 1.0]),
+        np.array([1.0, 2.0], dtype=object),
+        np.array([1.0, 2.0], dtype=np.longdouble),
+        np.array([1.0, 2.0], dtype=np.float16),
+        np.array(["2020-01-01", "2020-01-02"], dtype="M8[ns]"),
+        np.array([1, 2], dtype="m8[ns]"),
+        np.ma.masked_array([1.0, 2.0], [False, True]),
+        {"a": 1.0},
+        "ab",
+        None,
+        3,
+    ],
+    ids=repr,
+)
+def test_inner_coordinates_that_are_none(values):
+    with pytest.raises(InvalidValue, match="x = |measure = 'Own': declares what no lattice can"):
+        study(along(values))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [[0.0, 1.0], range(2), np.array([1, 2**63], dtype=np.uint64), ["a", "b"], np.array(["a", "é"])],
+    ids=repr,
+)
+def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
+    class Curve(Own):
+        variables = {"total": (), "curve": ("x",)}  # noqa: RUF012
+        inner_coordinates = {"x": values}  # noqa: RUF012
+
+        def find(self, scene, accuracy, meter):
+            return Outcome(Status.OK, {"total": 1.0, "curve": [3, 4]})
+
+    run(study(Curve()), output=tmp_path)
+    back = rsfstudy.open("own", tmp_path)
+    assert back["x"].values.tolist() == np.asarray(values).tolist()
+    assert back["curve"].values.tolist() == [[3.0, 4.0]] * 2
+
+
+@pytest.mark.parametrize(
+    ("declared", "complaint"),
+    [
+        ({"variables": ["total"]}, "declares what no lattice can hold"),
+        ({"variables": {}}, "must name a number"),
+        ({"variables": {"total": None}}, "dimensions = None: of 'total' must be names"),
+        ({"variables": {"total": "x"}}, "dimensions = 'x': of 'total' must be names"),
+        ({"variables": {"total": ("x",)}}, "dimension = 'x': of 'total' has no coordinate values"),
+        ({"variables": {"total": ("x", "x")}}, "must be names, each once"),
+        ({"headline": []}, "unhashable"),
+        ({"headline": "other"}, "headline = 'other': is not measured"),
+        ({"name": None}, "name = None: must be a text"),
+        ({"sought": ("b_ovr_a",)}, "sought = 'b_ovr_a': is not a field .* mean 'b_over_a'"),
+        ({"sought": 3}, "declares what no lattice can hold"),
+        ({"typical_work": "many"}, "typical_work = 'many': must be a number greater than 0"),
+        ({"typical_work": 10**400}, "declares what no lattice can hold .OverflowError"),
+        ({"work_by_digits": {}}, "declares what no lattice can hold .IndexError"),
+        ({"expected_work": lambda _self, _accuracy: np.nan}, "expected_work = nan: must exceed 0"),
+        ({"describe": lambda _self: None}, "is no plain data"),
+        ({"describe": lambda _self: {}}, "declares what no lattice can hold .KeyError: 'name'"),
+        ({"__call__": lambda _self, _scene, _accuracy: 3}, "has a __call__ of its own. Write find"),
+    ],
+    ids=str,
+)
+def test_declarations_that_make_no_lattice(declared, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        study(own(**declared))
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("id", 3),
+        ("because", None),
+        ("published", np.nan),
+        ("published", 10**400),
+        ("where", {"b_over_a": [2.0]}),
+        ("where", {"b_over_a": None}),
+        ("relation", "roughly"),
+    ],
+)
+def test_claims_that_are_none(part, value):
+    good = {"id": "T1", "statement": "", "source": "", "variable": "total", "published": 2.0,
+            "tolerance": 0.0, "reason": "", "where": {"b_over_a": 2.0}}  # fmt: skip
+    Claim(**good)
+    with pytest.raises(InvalidValue, match=f"{part} = |claim T1"):
+        Claim(**{**good, part: value})
+
+
+def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
+    monkeypatch.setattr("rsfstudy.cells.computed", None)
+    claim = Claim(id="T1", statement="", source="", variable="message", published=2.0,
+                  tolerance=0.0, reason="", where={"b_over_a": 2.0})  # fmt: skip
+    with pytest.raises(InvalidValue, match="is no place of the lattice, in claim T1"):
+        run(study(Own(), claims=[claim]))
+
+
+def test_parts_that_no_file_can_hold():
+    fit = LinearFit(name="slope", of="total", on="b_over_a", within=(np.float32(1.0), 2.0))
+    with pytest.raises(InvalidValue, match="reductions = .*must be plain data"):
+        study(Own(), reductions=[fit])
+
+
+def test_numbers_named_as_those_of_a_fit_are_only_numbers(tmp_path):
+    """A run prints the slopes of its reductions, not what looks like one."""
+    from rsfstudy import terminal
+
+    class Likely(Own):
+        variables = dict.fromkeys(("total", "total_stderr", "cheapest_integrator"), ())
+
+    assert terminal.report(run(study(Likely())), "own", [tmp_path / "own.nc"]) == 0
+
+
+# ---- outcomes that cannot be --------------------------------------------------------------------
+
+
+class Raising:
+    def __array__(self, *_args, **_options):
+        raise ZeroDivisionError("no array")
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"a": 1.0}, "total = {'a': 1.0}: must be a real number"),
+        ([[1.0], [1.0, 2.0]], "ValueError: setting an array element with a sequence"),
+        (10**400, "must be a real number"),
+        (np.datetime64("2020-01-01"), "must be a real number"),
+        (np.timedelta64(1, "s"), "must be a real number"),
+        (np.array(None), "must be a real number"),
+        (np.ma.masked, "is masked, and must be a real number"),
+        (np.ma.masked_array([1.0], [True]), "is masked, and must be a real number"),
+        (Raising(), "ZeroDivisionError: no array"),
+    ],
+    ids=repr,
+)
+def test_numbers_that_are_none(value, message, tmp_path):
+    class Odd(Own):
+        def find(self, scene, accuracy, meter):
+            return Outcome(Status.OK, {"total": value})
+
+    failed(Odd(), message, tmp_path)
+
+
+def failed(measure, message, output):
+    """Each cell ends as one that raised; the journal and the file hold it."""
+    run(study(measure), output=output)
+    found = rsfstudy.open("own", output)
+    assert found["status"].values.tolist() == [Status.CELL_RAISED] * 2
+    assert message in found["message"].values[0]
+
+
+@pytest.mark.parametrize("values", [None, [1.0], "total"])
+def test_numbers_that_are_no_mapping(values, tmp_path):
+    class Odd(Own):
+        def find(self, scene, accuracy, meter):
+            return Outcome(Status.OK, values)
+
+    failed(Odd(), "must map names to numbers", tmp_path)
+
+
+@pytest.mark.parametrize("count", [2**63, 2**70, -1, -(2**70), 1.5, np.nan, "many"])
+def test_counts_of_work_that_are_none(count, tmp_path):
+    class Odd(Own):
+        def find(self, scene, accuracy, meter):
+            meter.spent = count
+            return Outcome(Status.OK, {"total": 1.0})
+
+    failed(Odd(), "must be a whole number from 0 to 2**63 - 1", tmp_path)
+
+
+@pytest.mark.parametrize(("charged", "message"), [(2**70, "2**63 - 1"), (-1, "2**63 - 1")])
+def test_charges_that_are_none(charged, message, tmp_path):
+    class Odd(Own):
+        def find(self, scene, accuracy, meter):
+            meter.charge("any", charged)
+            return Outcome(Status.OK, {"total": 1.0})
+
+    failed(Odd(), message, tmp_path)
+
+
+def test_counts_of_numpy_are_counts(tmp_path):
+    class Counting(Own):
+        def find(self, scene, accuracy, meter):
+            meter.charge("any", np.int64(5))
+            return Outcome(Status.OK, {"total": 1.0})
+
+    run(study(Counting()), output=tmp_path)
+    assert rsfstudy.open("own", tmp_path)["rhs_evaluations"].values.tolist() == [5, 5]
+
+
+def test_an_endless_message_is_cut(tmp_path):
+    class Talking(Own):
+        def find(self, scene, accuracy, meter):
+            return Outcome(Status.OK, {"total": 1.0}, "begin " + "a" * 10**6 + " end")
+
+    (message, _other) = run(study(Talking())).message.values
+    assert message.startswith("begin a")
+    assert message.endswith("a end")
+    assert len(message) < 2100
+
+
+# ---- what a cell raises beside itself -----------------------------------------------------------
+
+
+def raises():
+    raise ZeroDivisionError("in a thread")
+
+
+class Dying:
+    def __del__(self):
+        raise KeyError("in a destructor")
+
+
+@dataclass(frozen=True)
+class Threaded(Measure):
+    """Starts a thread that raises, and drops what cannot be dropped."""
+
+    name: ClassVar[str] = "threaded"
+    headline: ClassVar[str] = "total"
+    variables: ClassVar = {"total": ()}
+    typical_work: ClassVar[int] = 1
+
+    def find(self, scene, accuracy, meter):
+        for target in (raises, sys.exit):  # which ends a thread without a word
+            thread = threading.Thread(target=target)
+            thread.start()
+            thread.join()
+        Dying()
+        return Outcome(Status.OK, {"total": scene.b_over_a}, "found")
+
+
+HEARD = (
+    "found; a thread raised ZeroDivisionError: in a thread; "
+    "a destructor raised KeyError: 'in a destructor'"
+)
+
+
+def test_what_threads_and_destructors_raise_is_told_by_their_cell(cluster, capfd):
+    """And not by the terminal, over the progress bar; here and on workers."""
+    hooks = threading.excepthook, sys.unraisablehook
+    for where in ({"workers": 0}, {"client": cluster}):
+        dataset = run(study(Threaded()), **where)
+        assert dataset["message"].values.tolist() == [HEARD] * 2
+        assert dataset["status"].values.tolist() == [0, 0]
+    assert "Traceback" not in "".join(capfd.readouterr())
+    assert (threading.excepthook, sys.unraisablehook) == hooks
+
+
+def test_a_cell_that_runs_a_study_hears_what_is_its_own():
+    class Outer(Own):
+        def find(self, scene, accuracy, meter):
+            inner = run(study(Threaded())).message.values[0]
+            Dying()
+            return Outcome(Status.OK, {"total": 1.0}, f"[{inner}]")
+
+    (message, _other) = run(study(Outer())).message.values
+    assert message == f"[{HEARD}]; a destructor raised KeyError: 'in a destructor'"

@@ -1,0 +1,511 @@
+"""Files from strangers: results that were altered, digests and all, and paths that are no results.
+Each command ends with an answer, or with an error that names what is wrong; never with a traceback.
+"""
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from running import called, command, ended, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, api, contents, store, terminal
+from rsfstudy.claims import Claim
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.reduce import LinearFit
+from rsfstudy.status import Status
+
+#: It has all that a file can have, and costs next to nothing.
+TINY = Study(
+    name="tiny",
+    title="A tiny lattice",
+    base=Scene(),
+    axes=[
+        Axis("case", {"constant": {"normal_stress": "constant"}, "variable": {"alpha": 0.3}}),
+        Axis("load_velocity_ratio", [1.0, 2.0, 4.0]),
+    ],
+    measure=LinearStability(),
+    reductions=[
+        LinearFit(name="slope", of="critical_stiffness", on="log_load_velocity_ratio"),
+    ],
+    claims=[
+        Claim(
+            id="C1",
+            statement="critical stiffness is b - a",
+            source="eq. 7",
+            variable="critical_stiffness",
+            where={"case": "constant", "load_velocity_ratio": 1.0},
+            published=0.0145,
+            tolerance=1e-6,
+            reason="six digits",
+        )
+    ],
+    references=["a paper"],
+)
+PLACE = {"case": "variable", "load_velocity_ratio": "2"}
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory) -> xr.Dataset:
+    output = tmp_path_factory.mktemp("tiny")
+    dataset = run(TINY.with_(load_velocity_ratio=[1.0, 2.0, 4.0]), output=output)
+    dataset["status"][0, 0] = int(Status.UNVERIFIED)  # one cell to list
+    return dataset
+
+
+# ---- altered files ------------------------------------------------------------------------------
+
+#: What may stand where something else was.
+OTHERS = [None, True, 3, 1.5, "other", "", [], {}, ["a"], {"a": None}, 10**400, float("nan")]
+KINDS = {
+    "numbers": lambda shape: np.full(shape, 1.5),
+    "missing numbers": lambda shape: np.full(shape, np.nan),
+    "whole numbers": lambda shape: np.full(shape, -77),
+    "texts": lambda shape: np.full(shape, "other", dtype=object),
+    "flags": lambda shape: np.full(shape, True),
+    "dates": lambda shape: np.full(shape, np.datetime64("2020-01-01", "ns")),
+    "spans of time": lambda shape: np.full(shape, np.timedelta64(10**9, "ns")),
+}
+_JSON = ("declaration", "provenance")
+
+
+def places(value, at=()):
+    """Where something stands in plain data."""
+    if at:
+        yield at
+    if isinstance(value, dict | list):
+        parts = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, part in parts:
+            yield from places(part, (*at, key))
+
+
+def attributes(dataset):
+    """All attributes: those of the variables by their names, those of the file by none."""
+    attrs = {str(name): dict(values.attrs) for name, values in dataset.variables.items()}
+    attrs[""] = dataset.attrs | {name: json.loads(dataset.attrs[name]) for name in _JSON}
+    return attrs
+
+
+def with_other_attributes(dataset, at, change):
+    """The dataset with one attribute, or one part of what its JSON says, changed."""
+    inside = whole = attributes(dataset)
+    for key in at[:-1]:
+        inside = inside[key]
+    change(inside, at[-1])
+    whole[""] |= {name: json.dumps(whole[""][name]) for name in _JSON if name in whole[""]}
+    other = dataset.assign_attrs()
+    other.attrs = whole[""]
+    for name in other.variables:
+        other[name].attrs = whole[name]
+    return other
+
+
+def removed(inside, key):
+    del inside[key]
+
+
+def renamed(inside, key):
+    value = inside.pop(key)
+    if isinstance(inside, dict):
+        inside[f"{key}_"] = value
+
+
+def replaced(by):
+    def change(inside, key):
+        inside[key] = by
+
+    return change
+
+
+def with_another_variable(dataset, name, how):
+    """The dataset with one variable changed."""
+    dims, shape, rest = dataset[name].dims, dataset[name].shape, dataset.drop_vars(name)
+    if how == "removed":
+        return rest
+    if how == "renamed":
+        return dataset.rename({name: f"{name}_"})
+    if how == "along nothing":
+        return rest.assign({name: 1.0})
+    if how == "elsewhere":
+        return rest.assign({name: ("elsewhere", np.arange(3.0))})
+    return rest.assign({name: (dims, KINDS[how](shape))})
+
+
+def altered(draw, dataset):
+    """The dataset with one part that is not as it was."""
+    if draw(st.integers(0, 3)):
+        at = draw(st.sampled_from([at for at in places(attributes(dataset)) if len(at) > 1]))
+        by = st.sampled_from(OTHERS).map(replaced)
+        return with_other_attributes(dataset, at, draw(st.sampled_from([removed, renamed]) | by))
+    name = draw(st.sampled_from(sorted(map(str, dataset.variables))))
+    ways = [
+        "removed",
+        "renamed",
+        "elsewhere",
+        *KINDS,
+        *["along nothing"] * (name not in dataset.dims),
+    ]
+    return with_another_variable(dataset, name, draw(st.sampled_from(ways)))
+
+
+def sealed(dataset, path: Path) -> str:
+    """Written as by someone who meant it: the digests are right."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of xarray, on what it writes
+        store.write(dataset, path)
+    return str(path)
+
+
+def used(dataset):
+    """What commands do with results, short of drawing and computing."""
+    with contextlib.suppress(RsfStudyError):
+        contents.check(dataset)
+        terminal.results(dataset, "tiny.nc")
+        terminal.checked(dataset)
+        api.study_of(dataset)
+
+
+def test_whatever_is_missing(tiny, capsys):
+    """Each attribute, each part of what their JSON says, and each variable."""
+    for at in places(attributes(tiny)):
+        if len(at) > 1:
+            used(store.sealed(with_other_attributes(tiny, at, removed)))
+    for name in tiny.variables:
+        used(store.sealed(tiny.drop_vars(name)))
+    assert "reproduced" in capsys.readouterr().out
+
+
+# it shrinks for minutes, and one alteration is as simple as another
+ALTERED = {"phases": [Phase.generate]}
+
+
+@settings(max_examples=200, **ALTERED)
+@given(data=st.data())
+def test_altered_results_are_used_or_refused(tiny, data):
+    used(store.sealed(altered(data.draw, tiny)))
+
+
+@pytest.mark.filterwarnings("ignore")  # of xarray, and of what is not as it was for the file
+@settings(max_examples=40, **ALTERED)
+@given(data=st.data())
+def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, data):
+    """Whatever part of it was altered."""
+    place = tmp_path_factory.mktemp("altered")
+    try:
+        file = sealed(altered(data.draw, tiny), place / "tiny.nc")
+    except (DataError, OverflowError, TypeError, ValueError):
+        return  # what no file can hold
+    cell = [word for name, value in PLACE.items() for word in ("--cell", f"{name}={value}")]
+    for words in (
+        ["show", file],
+        ["check", file],
+        ["plot", file],
+        ["rerun", file, *cell],
+        ["rerun", file, "--serial", "--quiet"],
+    ):
+        code, said = called(words)
+        assert (code in (0, 1, 2), said != "") == (True, True), words
+
+
+@pytest.mark.parametrize(
+    ("at", "change", "complaint"),
+    [
+        ("id", removed, "id is missing"),
+        ("id", replaced("../other"), "id is '../other', and the declared study 'tiny'"),
+        ("title", replaced(3), "title is 3, and must be a text"),
+        ("completeness", renamed, "completeness is missing"),
+        ("declaration", replaced(None), "declaration is null, and must be a mapping"),
+        ("declaration.claims", replaced({}), r"declaration.claims is {}, and must be a list"),
+        ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
+        ("declaration.claims.0.id", replaced(None), r"claims\[0\].id is null, and must be a text"),
+        ("declaration.claims.0.tolerance", replaced(10**400), r"must be a number"),
+        (
+            "declaration.claims.0.where.case",
+            replaced([]),
+            r"claims\[0\].where is refused .*must be a text",
+        ),
+        ("declaration.claims.0.novel", replaced(1), r"declaration.claims\[0\].novel is unknown"),
+        ("declaration.base.phi", removed, "declaration.base.phi is missing"),
+        ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
+        ("declaration.accuracy.rtol", replaced("1e-7"), 'rtol is "1e-7", and must be a number'),
+        ("declaration.novel", replaced(1), "declaration.novel is unknown"),
+        ("provenance.fingerprint.own_code", removed, "provenance.fingerprint.own_code is missing"),
+        ("provenance.versions.numpy", replaced(2), "provenance.versions.numpy is 2, and must be"),
+        ("provenance.declared_in", replaced(None), "provenance.declared_in is null"),
+    ],
+)
+def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_path):
+    way = tuple(int(key) if key.isdigit() else key for key in at.split("."))
+    file = sealed(with_other_attributes(tiny, ("", *way), change), tmp_path / "tiny.nc")
+    with pytest.raises(DataError, match=f"tiny.nc: .*{complaint}.*another version|{complaint}"):
+        rsfstudy.open(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "how", "complaint"),
+    [
+        ("status", "removed", "status is missing"),
+        ("status", "numbers", "status holds float64, and must hold whole numbers"),
+        ("status", "whole numbers", "status is -77 in a cell"),
+        ("status", "dates", r"status holds datetime64\[ns\], and must hold whole numbers"),
+        ("rhs_evaluations", "texts", "rhs_evaluations holds .*, and must hold whole numbers"),
+        ("rhs_evaluations", "spans of time", "rhs_evaluations holds timedelta64"),
+        ("wall_time", "along nothing", r"wall_time lies along \(\), and status along"),
+        ("message", "whole numbers", "message holds int64, and must hold texts"),
+        ("critical_stiffness", "dates", "critical_stiffness holds datetime64.*numbers or texts"),
+        ("case", "removed", "case is no coordinate along the dimension of its name"),
+    ],
+)
+def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_path):
+    file = sealed(with_another_variable(tiny, name, how), tmp_path / "tiny.nc")
+    with pytest.raises(DataError, match=f"tiny.nc: {complaint}"):
+        rsfstudy.open(file)
+
+
+@pytest.mark.parametrize(
+    ("at", "change", "complaint"),
+    [
+        ("measure.novel", replaced(1), "declaration.measure.novel is unknown"),
+        ("reductions.0.on", removed, r"declaration.reductions\[0\].on is missing"),
+        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is \[1\], and must be a"),
+        ("axes.1.values", replaced([1.0, 2.0]), "load_velocity_ratio is not that axis of the decl"),
+        ("axes.1.dimension", replaced("a"), "status lies along .*, not the axes of the decl"),
+        ("plot", replaced("a\0b"), "declaration makes no study .*must be a text"),
+    ],
+)
+def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, tiny, tmp_path):
+    way = tuple(int(key) if key.isdigit() else key for key in at.split("."))
+    other = with_other_attributes(tiny, ("", "declaration", *way), change)
+    file = sealed(other, tmp_path / "tiny.nc")
+    rsfstudy.open(file)
+    for again in (
+        lambda: rsfstudy.rerun(file, workers=0, progress=False),
+        lambda: rsfstudy.cell(file, PLACE),
+    ):
+        with pytest.raises(DataError, match=complaint):
+            again()
+
+
+@pytest.mark.parametrize("name", ["problem", "sought"])
+def test_a_measure_that_is_no_measure_of_ours(name, tiny, tmp_path):
+    """Though a module beside the measures bears its name."""
+    other = with_other_attributes(tiny, ("", "declaration", "measure", "name"), replaced(name))
+    with pytest.raises(InvalidValue, match=f"measure = '{name}': is not part of rsfstudy"):
+        rsfstudy.rerun(sealed(other, tmp_path / "tiny.nc"), workers=0, progress=False)
+
+
+def test_objects_are_no_texts(tiny):
+    """As a notebook may make them; no file holds such."""
+    other = tiny.copy(deep=True)
+    other["message"][0, 0] = None
+    with pytest.raises(DataError, match="message holds objects, and must hold texts"):
+        contents.check(other)
+
+
+def test_a_claim_does_not_apply_where_numbers_have_become_times(tiny):
+    """In memory, where a notebook may have made anything of a dataset."""
+    assert rsfstudy.check(tiny).verdict.tolist() == ["reproduced"]
+    for name in ("critical_stiffness", "load_velocity_ratio", "case"):
+        for how in ("dates", "spans of time"):
+            other = with_another_variable(tiny, name, how)
+            assert rsfstudy.check(other).verdict.tolist() == ["not applicable"]
+
+
+def test_a_variable_without_a_name_is_shown(tiny, tmp_path):
+    mine = tiny.copy(deep=True)
+    mine["log"] = np.log(mine["critical_stiffness"]).drop_attrs()
+    code, said = called(["show", sealed(mine, tmp_path / "tiny.nc")])
+    assert "log (case, load_velocity_ratio)" in said
+    assert code == 1  # one cell is marked as failed
+
+
+def test_a_cell_of_a_store_by_its_label(tmp_path):
+    run(TINY, output=tmp_path, format="zarr")
+    scene, _outcome = rsfstudy.cell(tmp_path / "tiny.zarr", PLACE)
+    assert (scene.alpha, scene.load_velocity_ratio) == (0.3, 2.0)
+
+
+# ---- paths that are no results ------------------------------------------------------------------
+
+
+@pytest.fixture
+def nowhere(tmp_path, monkeypatch):
+    """A directory of things that are no results."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("dir", "dir.nc", "dir.zarr", "odd.zarr"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "file.txt").write_text("text")
+    (tmp_path / "odd.zarr" / "zarr.json").write_text("[]")
+    (tmp_path / "dangling.nc").symlink_to("/nowhere")
+    (tmp_path / "circle.nc").symlink_to("circle.nc")
+    (tmp_path / "circle.py").symlink_to("circle.py")
+    (tmp_path / "root.zarr").symlink_to("/")
+    for name in ("zero.nc", "zero.py"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    return tmp_path
+
+
+@pytest.mark.parametrize("command_", ["show", "check", "plot", "rerun"])
+@pytest.mark.parametrize(
+    "path",
+    ["/", "//", ".", "..", "", "/dev/null", "/etc/passwd", "dir", "dir.nc", "dir.zarr", "odd.zarr",
+     "file.txt", "file.txt/x.nc", "dangling.nc", "circle.nc", "circle.py", "root.zarr", "zero.nc",
+     "zero.py", "*", "**/x", "small[1].nc", "a" * 9999, f"{'a' * 9999}.nc", f"{'a' * 9999}.py",
+     "a/" * 5000 + "x.nc", "a b " * 2500],
+    ids=lambda path: path[:20],
+)  # fmt: skip
+def test_a_path_that_is_no_results_file(command_, path, nowhere):
+    """It is named, briefly."""
+    code, said = called([command_, path])
+    assert code in (1, 2)
+    assert said.startswith("error: ")
+    assert path[:30].strip() in said
+    assert len(said) < 1000
+
+
+@pytest.mark.parametrize("words", [["show", "pipe.nc"], ["check", "pipe.zarr"], ["run", "pipe.py"]])
+def test_a_pipe_is_not_waited_for(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo(words[1])
+    code, _out, said = ended(command(*words))
+    assert code in (1, 2)
+    assert "is no file, but a" in said
+
+
+def test_a_pipe_within_a_store_is_not_waited_for(tmp_path):
+    run(TINY, output=tmp_path, format="zarr")
+    os.mkfifo(tmp_path / "tiny.zarr" / "c")
+    with pytest.raises(DataError, match="c is no file, but a pipe, a device or a broken link"):
+        rsfstudy.open(tmp_path / "tiny.zarr")
+
+
+@pytest.mark.parametrize("beside", [".tiny.nc.new", "tiny.cells.sqlite"])
+def test_a_pipe_in_the_way_of_a_run_is_not_waited_for(beside, tmp_path):
+    os.mkfifo(tmp_path / beside)
+    words = ["--serial", "--quiet", "--set", "b_over_a=2", "--set", "law=slip", "--fresh"]
+    os.rename(tmp_path / beside, tmp_path / beside.replace("tiny", "displacement_boundary"))
+    code, out, _said = ended(command("run", "displacement_boundary", *words, "--output", tmp_path))
+    assert (code, "wrote" in out) == (0, True)
+
+
+def test_what_may_not_be_read_is_told(tiny, tmp_path, monkeypatch):
+    file = sealed(tiny, tmp_path / "tiny.nc")
+
+    def forbidden(*_args, **_options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "exists", forbidden)
+    with pytest.raises(DataError, match=r"tiny.nc cannot be read: .*Permission denied"):
+        rsfstudy.open(file)
+    for use in (lambda: run(output=tmp_path), lambda: rsfstudy.open("tiny", tmp_path)):
+        with pytest.raises(InvalidValue, match="output = .*: cannot be used .Permission denied"):
+            use()
+
+
+# ---- options ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "rate_step_boundary", "--serial"],
+        ["check", "rate_step_boundary"],
+        ["plot", "rate_step_boundary"],
+        ["rerun", "tiny.nc"],
+    ],
+)
+def test_an_output_that_is_empty(words, tmp_path, monkeypatch):
+    """It is not the directory one happens to be in."""
+    monkeypatch.chdir(tmp_path)
+    code, said = called([*words, "--output", ""])
+    assert code == 2
+    assert "output = '': is empty. Name a directory; . is the one you are in." in said
+    assert os.listdir(tmp_path) == []
+    for use in (lambda: run(output=""), lambda: rsfstudy.open("rate_step_boundary", "")):
+        with pytest.raises(InvalidValue, match="output = '': is empty"):
+            use()
+
+
+@pytest.mark.parametrize("output", ["a\0b", "\udcff", "a" * 10_000, "a/" * 5000])
+def test_an_output_that_can_be_no_directory(output):
+    with pytest.raises(InvalidValue, match="output = ") as refused:
+        run(output=output)
+    assert len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])
+def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(
+        "rsfstudy.api._computed", lambda _study, _keeping, workers: workers.threads()
+    )
+    assert run(workers=most) == most
+    for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
+        with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):
+            use()
+    code, said = called(["run", "rate_step_boundary", "--workers", "999999"])
+    assert code == 2
+    assert "--scheduler ADDRESS (client=)" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["{}"],
+        ["run", "{}"],
+        ["run", "rate_step_boundary", "--set", "{}=2"],
+        ["run", "rate_step_boundary", "--set", "law={}"],
+        ["run", "rate_step_boundary", "--workers", "{}"],
+        ["run", "rate_step_boundary", "--scheduler", "{}"],
+        ["run", "rate_step_boundary", "--output", "{}"],
+        ["rerun", "tiny.nc", "--study", "{}"],
+        ["rerun", "{}.nc", "--cell", "a=2"],
+        ["check", "{}", "--output", "{}"],
+    ],
+)
+def test_a_name_without_end_is_answered_briefly(words):
+    code, said = called([word.format("a" * 10_000) for word in words])
+    assert code in (1, 2)
+    assert len(said) < 1200
+
+
+def test_an_error_keeps_both_ends_of_what_is_long():
+    error = InvalidValue("name", "begin" + "x" * 10_000 + "end", "must be short")
+    assert len(str(error)) < 200
+    assert str(error).startswith("name = 'begin")
+    assert str(error).endswith("end': must be short.")
+    many = InvalidValue("name", 1, "is unknown", choices=map(str, range(10_000)), remedy="Choose.")
+    assert str(many).endswith("58, 59 and 9,940 more. Choose.")
+    error = InvalidValue("name", "25", "is unknown", choices=map(str, range(300)))
+    assert "Did you mean '25'" in str(error)
+
+
+def test_a_command_may_hold_bytes_that_are_no_text(tmp_path, monkeypatch):
+    """What was typed, and who computed it, are told as far as they are text."""
+    monkeypatch.setenv("RSFSTUDY_CREATOR_NAME", "G\udcf6del")
+    for format_ in ("netcdf", "zarr"):
+        run(TINY, output=tmp_path / format_, format=format_, command="rsfstudy run \udcff")
+        found = rsfstudy.open("tiny", tmp_path / format_)
+        assert found.attrs["history"].endswith(r"rsfstudy run \udcff")
+        assert found.attrs["creator_name"] == r"G\udcf6del"
+
+
+def test_a_full_disk_where_the_output_goes_is_told(tiny, tmp_path):
+    file = sealed(tiny, tmp_path / "tiny.nc")
+    with open("/dev/full", "w") as full:
+        words = [sys.executable, "-m", "rsfstudy.cli", "show", file]
+        shown = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (shown.returncode, shown.stderr) == (
+        1,
+        "error: cannot print: No space left on device.\n",
+    )
