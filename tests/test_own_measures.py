@@ -2,6 +2,7 @@
 and an outcome that cannot be is a failed cell, with its message.
 """
 
+import re
 import sys
 import threading
 from dataclasses import dataclass
@@ -18,6 +19,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status
+
+
+def named(value: object) -> str:
+    """The name of a case: the same in each process, where the address of an object is not."""
+    return re.sub(" at 0x[0-9a-f]+", "", repr(value))[:80]
 
 
 class Own(Measure):
@@ -78,7 +84,7 @@ def along(values) -> Measure:
         None,
         3,
     ],
-    ids=repr,
+    ids=named,
 )
 def test_inner_coordinates_that_are_none(values):
     with pytest.raises(InvalidValue, match="x = |measure = 'Own': declares what no lattice can"):
@@ -88,7 +94,7 @@ def test_inner_coordinates_that_are_none(values):
 @pytest.mark.parametrize(
     "values",
     [[0.0, 1.0], range(2), np.array([1, 2**63], dtype=np.uint64), ["a", "b"], np.array(["a", "é"])],
-    ids=repr,
+    ids=named,
 )
 def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
     class Curve(Own):
@@ -126,7 +132,7 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
         ({"describe": lambda _self: {}}, "declares what no lattice can hold .KeyError: 'name'"),
         ({"__call__": lambda _self, _scene, _accuracy: 3}, "has a __call__ of its own. Write find"),
     ],
-    ids=str,
+    ids=named,
 )
 def test_declarations_that_make_no_lattice(declared, complaint):
     with pytest.raises(InvalidValue, match=complaint):
@@ -198,7 +204,7 @@ class Raising:
         (np.ma.masked_array([1.0], [True]), "is masked, and must be a real number"),
         (Raising(), "ZeroDivisionError: no array"),
     ],
-    ids=repr,
+    ids=named,
 )
 def test_numbers_that_are_none(value, message, tmp_path):
     class Odd(Own):
