@@ -11,7 +11,7 @@ import xarray as xr
 from running import command, ended, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cells, restore
+from rsfstudy import Axis, Scene, Study, cells, contents, restore
 from rsfstudy.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.lattice import coordinates
@@ -202,7 +202,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = restore.study(BOTH.describe())
+    restored = restore.study(contents.declaration(rsfstudy.open(file)))
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
         xr.Dataset(coords=coordinates(restored)), xr.Dataset(coords=coordinates(BOTH))
