@@ -99,7 +99,7 @@ HEADLINES = (
 )
 
 
-def proportional(label: str) -> Claim:
+def proportional(label: str, because: str = "") -> Claim:
     """Tolerance proportionality of a headline number."""
     return Claim(
         id="A1",
@@ -110,6 +110,8 @@ def proportional(label: str) -> Claim:
         published=1.0,
         tolerance=0.3,
         reason="the band a user can plan with",
+        expected="differs" if because else "reproduced",
+        because=because,
     )
 
 
@@ -128,6 +130,10 @@ def cheapest(label: str, digits: float, factor: float) -> Claim:
     )
 
 
+TOO_GOOD = (
+    "where few digits are asked for, its cycles have up to four more, because limits on the length "
+    "of steps bind before the tolerance does; beyond 8 digits the work budget of a run ends it"
+)
 CYCLES = HEADLINES[1:]
 
 study = Study(
@@ -157,7 +163,8 @@ study = Study(
         Cheapest(name="cheapest", of="achieved_digits", default="DOP853"),
     ],
     claims=[
-        *(proportional(label) for label in HEADLINES),
+        *(proportional(label) for label in HEADLINES[:-1]),
+        proportional(HEADLINES[-1], TOO_GOOD),
         *(cheapest(label, 9.0, 1.25) for label in HEADLINES),
         cheapest("critical step", 6.0, 1.25),
         # RK45, of lower order, takes less for a few digits of a cycle

@@ -446,9 +446,7 @@ def test_an_output_that_can_be_no_directory(output):
 @pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])
 def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    monkeypatch.setattr(
-        "rsfstudy.api._computed", lambda _study, _keeping, workers: workers.threads()
-    )
+    monkeypatch.setattr("rsfstudy.api.prepared", lambda _study, _keeping, workers: workers.threads)
     assert run(workers=most) == most
     for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
         with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):

@@ -79,7 +79,9 @@ class Coverage(Measure):
     @property
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         numbers = ("error_over_estimate", "error_over_request")
-        return dict.fromkeys(("status_kept", "ended_as"), ()) | dict.fromkeys(numbers, ("number",))
+        return dict.fromkeys(("status_kept", "status_kept_error", "ended_as"), ()) | dict.fromkeys(
+            numbers, ("number",)
+        )
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -101,6 +103,7 @@ class Coverage(Measure):
         meter.spent = spent.spent + more.spent
         values: dict[str, Any] = {
             "ended_as": float(found.status),
+            "status_kept_error": 0.0,
             # a failure claims nothing, and nothing is known where the tighter run fails
             "status_kept": float(
                 found.status is truth.status
