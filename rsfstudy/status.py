@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, unique
 
 
+@unique
 class Status(IntEnum):
     """Outcome of one cell; the integer is what the NetCDF flag variable holds."""
 
@@ -28,11 +29,11 @@ class Status(IntEnum):
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
     UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
-    NO_STEP = 13, "the scene has no step to respond to"
-    SLIP_STOPPED = 14, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
     STABLE_AT_ANY_STIFFNESS = 12, "radiation damps every perturbation however soft the spring"
+    NO_STEP = 13, "the scene has no step to respond to"
     NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
     ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"
+    SLIP_STOPPED = 16, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
 
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
@@ -40,9 +41,9 @@ class Status(IntEnum):
     UNVERIFIED = 22, "two formulations disagree: no bracket confirms the value"
     CELL_RAISED = 23, "the measure raised an exception"
     WORKER_LOST = 24, "the worker process died each time it computed this cell alone"
+    PENDING = 25, "not computed yet"
     NOT_FINITE = 26, "the measure answered ok without a finite number"
     TIME_LIMIT_SPENT = 27, "no answer came within the time limit of a cell"
-    PENDING = 25, "not computed yet"
 
     @property
     def label(self) -> str:

@@ -74,15 +74,15 @@ def test_a_thousand_cycles_do_not_drift():
         normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
     )
     intervals = []
-    for cycle in cycles(scene, Accuracy(1e-6, budget=10**7), Meter(10**7), None):
+    for cycle in cycles(scene, Accuracy(1e-5, budget=10**7), Meter(10**7), None):
         intervals.append(cycle.interval)
         if len(intervals) == 1003:
             break
     settled = np.array(intervals[3:])
     # the same to rounding of the steps, which fall elsewhere in each cycle
-    assert np.ptp(settled) < 1e-6 * settled.mean()
+    assert np.ptp(settled) < 1e-5 * settled.mean()
     drift = np.polyfit(np.arange(len(settled)), settled, 1)[0]
-    assert abs(drift) * len(settled) < 1e-7 * settled.mean()
+    assert abs(drift) * len(settled) < 1e-6 * settled.mean()
 
 
 @pytest.mark.parametrize(("law", "slope"), [("slowness", -2.0), ("slip", 0.0)])
@@ -124,7 +124,7 @@ SCENES = {
 }
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(
     **SCENES,
     measure=st.sampled_from(
@@ -147,8 +147,8 @@ def test_any_scene_ends_in_numbers_or_in_a_name(
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = measure(scene, Accuracy(1e-5, budget=60_000))
-    assert found.rhs_evaluations <= 60_001
+        found = measure(scene, Accuracy(1e-5, budget=30_000))
+    assert found.rhs_evaluations <= 30_001
     if found.status is Status.OK:
         for name in (measure.headline, f"{measure.headline}_error"):
             assert math.isfinite(found.values[name]), name

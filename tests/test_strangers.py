@@ -189,14 +189,14 @@ def test_whatever_is_missing(tiny, capsys):
 ALTERED = {"phases": [Phase.generate]}
 
 
-@settings(max_examples=200, **ALTERED)
+@settings(max_examples=100, **ALTERED)
 @given(data=st.data())
 def test_altered_results_are_used_or_refused(tiny, data):
     used(store.sealed(altered(data.draw, tiny)))
 
 
 @pytest.mark.filterwarnings("ignore")  # of xarray, and of what is not as it was for the file
-@settings(max_examples=40, **ALTERED)
+@settings(max_examples=12, **ALTERED)
 @given(data=st.data())
 def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, data):
     """Whatever part of it was altered."""

@@ -82,7 +82,7 @@ class WorkPrecision(Measure):
     integrator: str = "DOP853"
     requested_digits: float = 6.0
     repeats: int = 9
-    budget: int = 85_000
+    budget: int = 45_000
     name: ClassVar[str] = "work_precision"
 
     def __post_init__(self) -> None:
