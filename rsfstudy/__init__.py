@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rsfstudy.api import cell, check, open, rerun, run, studies
-    from rsfstudy.axis import Axis
+    from rsfstudy.declare.axis import Axis
+    from rsfstudy.declare.study import Study
     from rsfstudy.one_scene import critical_step, limit_cycle, to_si
-    from rsfstudy.scene import Scene
-    from rsfstudy.study import Study
+    from rsfstudy.slider.scene import Scene
     from rsfstudy.trajectory import simulate
 
 # loaded on first use, so that a worker does not import what only its driver needs
 _HOMES = {
-    "Scene": "scene",
-    "Study": "study",
-    "Axis": "axis",
+    "Scene": "slider.scene",
+    "Study": "declare.study",
+    "Axis": "declare.axis",
     "run": "api",
     "rerun": "api",
     "cell": "api",

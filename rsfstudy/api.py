@@ -14,18 +14,20 @@ import pandas as pd
 import xarray as xr
 from rich import progress as bars
 
-from rsfstudy import catalogue, contents, own_code, provenance, restore, runner, store
-from rsfstudy.axis import check_text
-from rsfstudy.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
-from rsfstudy.claims import verdicts
-from rsfstudy.comparison import cell_number, compared, differences
+from rsfstudy.compute import own_code, provenance, runner
+from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
+from rsfstudy.compute.runner import Keeping, Progress
+from rsfstudy.compute.workers import on_client, on_local_cluster, threads
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.axis import check_text
+from rsfstudy.declare.claims import verdicts
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, InvalidValue, brief
-from rsfstudy.lattice import coordinates
+from rsfstudy.files import contents, restore, store
+from rsfstudy.files.comparison import cell_number, compared, differences
+from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Outcome
-from rsfstudy.runner import Keeping, Progress
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
-from rsfstudy.workers import on_client, on_local_cluster, threads
+from rsfstudy.slider.scene import Scene
 
 OUTPUT = Path("outputs")
 #: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.

@@ -17,13 +17,14 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-from rsfstudy import api, catalogue, terminal
-from rsfstudy.cells import DEFAULT_TIME_LIMIT
+from rsfstudy import api, terminal
+from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT
+from rsfstudy.compute.runner import FORMATS, Keeping
+from rsfstudy.compute.workers import existing_cluster
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, brief
-from rsfstudy.runner import FORMATS, Keeping
-from rsfstudy.study import Study
 from rsfstudy.terminal import FAILED, OK, Ended
-from rsfstudy.workers import existing_cluster
 
 WRONG_USAGE = 2
 _SPACED = "must read start:stop:count, two finite numbers and a count"

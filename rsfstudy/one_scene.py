@@ -7,12 +7,12 @@ import json
 import numpy as np
 import xarray as xr
 
-from rsfstudy.core.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
+from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import quantity
 
 

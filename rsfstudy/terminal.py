@@ -16,15 +16,17 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api, contents, runner
-from rsfstudy.claims import NOT_APPLICABLE
-from rsfstudy.core.accuracy import DEFAULT_RTOL
+from rsfstudy import api
+from rsfstudy.compute import runner
+from rsfstudy.compute.plan import Plan
+from rsfstudy.declare.claims import NOT_APPLICABLE
+from rsfstudy.declare.study import Study, settings, short
 from rsfstudy.errors import RunError
+from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
-from rsfstudy.plan import Plan
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import DEFAULT_RTOL
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Study, settings, short
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from rsfstudy.core.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
-from rsfstudy.core.motion import motion
-from rsfstudy.core.stepping import Halt, Meter, Step
-from rsfstudy.core.timeline import OBSERVED, elapsed, observed, timed
 from rsfstudy.errors import InvalidValue
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
+from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.stepping import Halt, Meter, Step
+from rsfstudy.motion.timeline import OBSERVED, elapsed, observed, timed
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 

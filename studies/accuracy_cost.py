@@ -1,16 +1,16 @@
 """What accuracy costs: every integrator on problems whose answer is known to more digits."""
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.problem import Problem
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import INTEGRATORS, WorkPrecision
 from rsfstudy.reduce import Cheapest, LinearFit
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 from . import _references as known
 

@@ -1,11 +1,11 @@
 """Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.reduce import Difference, Parting
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 

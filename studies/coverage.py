@@ -1,11 +1,11 @@
 """Coverage: do error estimates cover the errors, over random scenes?"""
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.coverage import QUESTIONS, Coverage
 from rsfstudy.reduce import Covered
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 DYNAMICS: dict[str, dict[str, bool | float]] = {
     "quasi-static": {"inertia": False},

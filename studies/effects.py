@@ -2,12 +2,12 @@
 
 import math
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.reduce import RelativeDifference
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 #: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
 #: stress.

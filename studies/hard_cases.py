@@ -2,20 +2,20 @@
 
 import math
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure
+from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.hard_case import HardCase
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.problem import Problem
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
-from rsfstudy.scene import Scene
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Study
 
 from . import _references as known
 

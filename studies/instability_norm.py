@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import Inverse
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 

@@ -1,10 +1,10 @@
 """Stick-slip limit cycles: both laws, constant and variable normal stress (Figs. 9, 10 and 11)."""
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 

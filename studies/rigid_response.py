@@ -1,11 +1,11 @@
 """Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4)."""
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.reduce import RelativeDifference, Spread
-from rsfstudy.scene import Scene
-from rsfstudy.study import Study
+from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from rsfstudy.axis import Axis
-from rsfstudy.claims import Claim
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
-from rsfstudy.scene import Scene
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.study import Study
 
 from ._paper import PAPER, REFERENCE
 

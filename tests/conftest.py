@@ -9,10 +9,11 @@ from collections.abc import Callable
 import pytest
 from hypothesis import HealthCheck, settings
 
-from rsfstudy import Scene, workers
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.motion import motion
-from rsfstudy.core.stepping import Meter, Step
+from rsfstudy import Scene
+from rsfstudy.compute import workers
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.stepping import Meter, Step
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True

@@ -11,17 +11,18 @@ import xarray as xr
 from extended_precision import critical_velocity, slider
 
 import rsfstudy
-from rsfstudy import Scene, catalogue
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import METHODS, Meter, steps
-from rsfstudy.equations import quasi_static
+from rsfstudy import Scene
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome, work_precision
+from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.problem import Problem
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import WorkPrecision
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import METHODS, Meter, steps
 from rsfstudy.reduce import Cheapest, reduced
+from rsfstudy.slider.equations import quasi_static
 from rsfstudy.status import Status
 
 SCENE = Scene(law="slowness", normal_stress="constant", load_velocity_ratio=20.0)

@@ -18,10 +18,12 @@ from hypothesis import strategies as st
 from running import FAULTY, SMALL, called, command, ended, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, catalogue, contents, plots, restore, store, terminal
+from rsfstudy import Axis, Scene, Study, plots, terminal
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.files import contents, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.scene import FIELDS
+from rsfstudy.slider.scene import FIELDS
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(
@@ -326,7 +328,7 @@ def test_a_study_file_of_bytes(tmp_path):
 @pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
 def test_an_output_that_cannot_be_written(output, monkeypatch):
     """Told before any cell is computed."""
-    monkeypatch.setattr("rsfstudy.cells.computed", None)
+    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)
 

@@ -13,8 +13,10 @@ from running import SMALL as LATTICE
 from running import call
 
 import rsfstudy
-from rsfstudy import catalogue, cli, store
-from rsfstudy.claims import Claim
+from rsfstudy import cli
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.claims import Claim
+from rsfstudy.files import store
 from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"

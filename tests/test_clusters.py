@@ -19,7 +19,7 @@ from faulty import declared
 from running import FAULTY, HANGS, SMALL, command, ended, run, same_numbers, until, until_kept
 
 import rsfstudy
-from rsfstudy import provenance, workers
+from rsfstudy.compute import provenance, workers
 from rsfstudy.errors import RunError
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"

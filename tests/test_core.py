@@ -11,11 +11,11 @@ from conftest import follow
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.motion import motion
-from rsfstudy.core.stepping import Halt, Meter, steps
-from rsfstudy.equations import Equations, Point, log_rate_at
 from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.stepping import Halt, Meter, steps
+from rsfstudy.slider.equations import Equations, Point, log_rate_at
 from rsfstudy.status import Status
 
 

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import limit_cycle
 from rsfstudy.measures.coverage import QUESTIONS, Coverage, random_scene
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Covered, reduced
 from rsfstudy.status import Status
 

@@ -12,14 +12,15 @@ from scipy.integrate import solve_ivp
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.motion import error_of_slow_manifold
-from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import log_rate_at, quasi_static
+from rsfstudy.boundaries import swing
+from rsfstudy.boundaries.touching import touching_point
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import critical_step, swing
+from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.touching import touching_point
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.regimes import error_of_slow_manifold
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.equations import log_rate_at, quasi_static
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.effects import inclined_driving, inertia, linker_dieterich
-from rsfstudy.equations import (
+from rsfstudy.measures import effect_cost
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.effects import inclined_driving, inertia, linker_dieterich
+from rsfstudy.slider.equations import (
     inertial,
     log_rate_at,
     quasi_static,
@@ -18,7 +19,6 @@ from rsfstudy.equations import (
     slow_manifold,
     strength_of,
 )
-from rsfstudy.measures import effect_cost
 
 shear = st.floats(-0.5, 0.5)
 

@@ -16,11 +16,12 @@ from faulty import declared
 from running import FAULTY, HANGS, call, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli, runner, terminal, worker_log, workers
+from rsfstudy import Axis, Scene, Study, cli, terminal
+from rsfstudy.compute import runner, worker_log, workers
+from rsfstudy.compute.runner import Run
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
-from rsfstudy.runner import Run
 from rsfstudy.status import Status
 
 LABELS = {s.label: s for s in Status}

@@ -14,11 +14,13 @@ import xarray as xr
 from running import FAULTY, SMALL, command, ended, run
 
 import rsfstudy
-from rsfstudy import Scene, catalogue, contents, plots, restore, store
+from rsfstudy import Scene, plots
+from rsfstudy.compute.plan import cell_key
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.journal import Journal, Layout
+from rsfstudy.files import contents, restore, store
+from rsfstudy.files.journal import Journal, Layout
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.plan import cell_key
 from rsfstudy.status import Status
 
 

@@ -12,15 +12,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rsfstudy
-from rsfstudy import Scene, catalogue
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
+from rsfstudy import Scene
+from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.measures.hard_case import HardCase
 from rsfstudy.measures.limit_cycle import LimitCycle, cycles
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
 from rsfstudy.status import Status
 
 STUDY = catalogue.load("hard_cases")

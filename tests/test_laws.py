@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rsfstudy import Scene, laws
-from rsfstudy.core.stepping import Meter, steps
-from rsfstudy.equations import evolving, rigid
-from rsfstudy.laws import slip, slowness
+from rsfstudy import Scene
+from rsfstudy.motion.stepping import Meter, steps
+from rsfstudy.slider import laws
+from rsfstudy.slider.equations import evolving, rigid
+from rsfstudy.slider.laws import slip, slowness
 
 
 @pytest.mark.parametrize("law", laws.NAMES)

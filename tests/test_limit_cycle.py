@@ -9,9 +9,9 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
 
 CASES = [

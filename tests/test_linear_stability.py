@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rsfstudy import Scene, steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.equations import inertial, strength_of
+from rsfstudy import Scene
 from rsfstudy.measures.linear_stability import LinearStability, growth
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.equations import inertial, strength_of
 from rsfstudy.status import Status
 
 

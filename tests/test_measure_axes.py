@@ -11,13 +11,15 @@ import xarray as xr
 from running import command, ended, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cells, contents, restore
-from rsfstudy.claims import Claim
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.compute import cells
+from rsfstudy.compute.plan import Plan
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.lattice import coordinates
+from rsfstudy.files import contents, restore
+from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.plan import Plan
 from rsfstudy.status import Status
 
 BOTH = Study(

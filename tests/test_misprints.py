@@ -11,8 +11,8 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.equations import log_rate_at, strength_of
-from rsfstudy.laws import evolution_of
+from rsfstudy.slider.equations import log_rate_at, strength_of
+from rsfstudy.slider.laws import evolution_of
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 

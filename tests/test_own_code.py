@@ -9,7 +9,8 @@ import textwrap
 import pytest
 
 import rsfstudy
-from rsfstudy import catalogue, own_code
+from rsfstudy.compute import own_code
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 
@@ -148,7 +149,7 @@ def test_it_is_the_same_in_other_processes(tmp_path):
     """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
-    ask = "\nfrom rsfstudy import own_code\nprint(own_code.digest(Own))"
+    ask = "\nfrom rsfstudy.compute import own_code\nprint(own_code.digest(Own))"
     script.write_text(MEASURE + ask)
     for words in ([str(script)], ["-c", MEASURE + ask]):
         for seed in "12":

@@ -14,7 +14,7 @@ from running import run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.claims import Claim
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.reduce import LinearFit
@@ -160,7 +160,7 @@ def test_claims_that_are_none(part, value):
 
 
 def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
-    monkeypatch.setattr("rsfstudy.cells.computed", None)
+    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
     claim = Claim(id="T1", statement="", source="", variable="message", published=2.0,
                   tolerance=0.0, reason="", where={"b_over_a": 2.0})  # fmt: skip
     with pytest.raises(InvalidValue, match="is no place of the lattice, in claim T1"):

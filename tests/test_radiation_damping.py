@@ -9,15 +9,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from rsfstudy import Scene, equations, steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.effects import radiation_damping
-from rsfstudy.equations import quasi_dynamic, strength_of
+from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.laws import evolution_of
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import equations, steady_state
+from rsfstudy.slider.effects import radiation_damping
+from rsfstudy.slider.equations import quasi_dynamic, strength_of
+from rsfstudy.slider.laws import evolution_of
 from rsfstudy.status import Status
 
 #: Impedance of spring and mass of the paper's slider, K T V_*/(2 pi D_c).

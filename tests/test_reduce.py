@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.stats import linregress
 
-from rsfstudy.claims import Claim, verdicts
+from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce import (
     Boundary,

@@ -27,8 +27,9 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy import cells, journal, workers
+from rsfstudy.compute import cells, workers
 from rsfstudy.errors import DataError, RunError
+from rsfstudy.files import journal
 from rsfstudy.status import Status
 
 CELLS = 30
@@ -368,7 +369,7 @@ def test_other_tolerances_are_not_mixed(tmp_path):
 
 @pytest.mark.parametrize("name", ["physics", "numpy", "scipy"])
 def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
-    from rsfstudy import provenance
+    from rsfstudy.compute import provenance
 
     run(output=tmp_path)
     other = {**provenance.code(), name: "other"}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.equations import log_rate_at
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.rigid_response import RigidResponse, friction_after_step
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.status import Status
 
 

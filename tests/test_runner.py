@@ -12,10 +12,11 @@ import pytest
 from running import HANGS, SMALL, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Scene, Study, runner
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy import Scene, Study
+from rsfstudy.compute import runner
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
 
 

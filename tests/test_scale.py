@@ -11,9 +11,11 @@ from running import SMALL, run, same_numbers
 from scale import apart
 
 import rsfstudy
-from rsfstudy import Axis, Study, pieces, plan, plots, runner
+from rsfstudy import Axis, Study, plots
+from rsfstudy.compute import plan, runner
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.scene import Scene
+from rsfstudy.files import pieces
+from rsfstudy.slider.scene import Scene
 
 
 @pytest.mark.parametrize("format", ["netcdf", "zarr"])

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rsfstudy import Scene, steady_state
-from rsfstudy.equations import quasi_static, strength_of
+from rsfstudy import Scene
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.equations import quasi_static, strength_of
 
 
 @given(st.floats(-30, 12), st.floats(45, 85), st.floats(0, 1))

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
 
 SLOWNESS = {"law": "slowness", "normal_stress": "constant"}

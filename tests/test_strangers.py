@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 from running import called, command, ended, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, api, contents, store, terminal
-from rsfstudy.claims import Claim
+from rsfstudy import Axis, Scene, Study, api, terminal
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.files import contents, store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status

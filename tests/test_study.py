@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.lattice import coordinates
+from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import ProportionalFit, Spread

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import rsfstudy
-from rsfstudy import catalogue
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
 
 DECLARATION = """

@@ -6,8 +6,8 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.core.accuracy import Accuracy
 from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
 
 

@@ -18,16 +18,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import (
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import (
     DEFAULT_RTOL,
     LOOSEST_RTOL,
     TIGHTEST_RTOL,
     Accuracy,
     relative_work,
 )
-from rsfstudy.core.stepping import Halt, Meter
-from rsfstudy.errors import InvalidValue
-from rsfstudy.scene import FIELDS, Scene
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.scene import FIELDS, Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
 

@@ -10,14 +10,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import TIGHTEST_RTOL, Accuracy
-from rsfstudy.core.stepping import Meter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: What may be asked of a random scene, by name.

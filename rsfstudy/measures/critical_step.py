@@ -17,14 +17,14 @@ from typing import ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.core.accuracy import ROUNDING, Accuracy, error_between
-from rsfstudy.core.motion import error_of_slow_manifold, mass_acts
-from rsfstudy.core.stepping import Halt, Meter
+from rsfstudy.boundaries.sought import DisplacementSteps, RateSteps, Steps
+from rsfstudy.boundaries.swing import Swing, settles, stability_margin, swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.sought import DisplacementSteps, RateSteps, Steps
-from rsfstudy.measures.swing import Swing, settles, stability_margin, swing
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
+from rsfstudy.motion.regimes import error_of_slow_manifold, mass_acts
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 KINDS: Mapping[str, type[Steps]] = {

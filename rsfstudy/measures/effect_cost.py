@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Halt, Meter
-from rsfstudy.equations import Equations, inertial, slow_manifold, without_mass
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.equations import Equations, inertial, slow_manifold, without_mass
+from rsfstudy.slider.scene import Scene
 
 #: Evaluations timed together, and how often: the forms of the equations take short turns, so that
 #: a busy moment of the machine falls on all of them.

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.problem import Problem, posed_by
-from rsfstudy.scene import Scene
+from rsfstudy.measures._problem import Problem, posed_by
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

@@ -17,15 +17,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import Accuracy, error_between
-from rsfstudy.core.motion import motion
-from rsfstudy.core.stepping import Halt, Meter, Step
-from rsfstudy.core.timeline import OBSERVED, along_path, elapsed, sampled, timed
-from rsfstudy.equations import Point
+from rsfstudy.boundaries.swing import settles
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.swing import settles
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.stepping import Halt, Meter, Step
+from rsfstudy.motion.timeline import OBSERVED, along_path, elapsed, sampled, timed
+from rsfstudy.slider.equations import Point
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 LN10 = math.log(10.0)

@@ -12,11 +12,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy import steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
-from rsfstudy.effects import radiation_damping
-from rsfstudy.equations import (
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.effects import radiation_damping
+from rsfstudy.slider.equations import (
     Equations,
     inertial,
     radiated,
@@ -24,8 +25,7 @@ from rsfstudy.equations import (
     strength_of,
     without_mass,
 )
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation

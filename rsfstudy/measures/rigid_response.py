@@ -12,13 +12,13 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy import steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Halt, Meter, steps
-from rsfstudy.equations import rigid, strength_of
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Halt, Meter, steps
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.equations import rigid, strength_of
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

@@ -9,13 +9,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.core.accuracy import Accuracy, error_between
-from rsfstudy.core.motion import motion
-from rsfstudy.core.stepping import Meter
-from rsfstudy.core.timeline import OBSERVED, along_path, sampled, timed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.timeline import OBSERVED, along_path, sampled, timed
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 LN10 = math.log(10.0)

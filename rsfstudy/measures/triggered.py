@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
+from rsfstudy.boundaries.swing import swing
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.swing import swing
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

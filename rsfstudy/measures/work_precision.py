@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from rsfstudy.core.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
-from rsfstudy.core.stepping import METHODS, Meter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.problem import Problem, posed_by
-from rsfstudy.scene import Scene
+from rsfstudy.measures._problem import Problem, posed_by
+from rsfstudy.motion.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.stepping import METHODS, Meter
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Seconds of timing that are enough.

@@ -18,11 +18,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsfstudy.contents import declaration
+from rsfstudy.declare.study import settings
 from rsfstudy.errors import InvalidValue, RsfStudyError
+from rsfstudy.files.contents import declaration
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.status import Status
-from rsfstudy.study import settings
 
 Panel = Callable[[xr.Dataset, Axes], Axes]
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy import steady_state
+from rsfstudy.slider import steady_state
 from rsfstudy.vocabulary import quantity
 
 LN10 = math.log(10.0)

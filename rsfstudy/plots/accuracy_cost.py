@@ -122,7 +122,7 @@ def draw_proportionality(dataset: xr.Dataset, axes: Axes) -> Axes:
 PANELS = (
     draw,
     _other(0, "relative_time"),
-    *(_other(p, work) for p in range(1, 6) for work in _LABELS),
+    *(_other(p, work) for p in range(1, 5) for work in _LABELS),
     draw_digits,
     draw_proportionality,
 )

@@ -11,13 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots import Panel
-from rsfstudy.plots._phase_plane import (
-    LN10,
-    constant_state_line,
-    cot_phi,
-    label_axes,
-    steady_line,
-)
+from rsfstudy.plots._phase_plane import LN10, constant_state_line, cot_phi, label_axes, steady_line
 from rsfstudy.vocabulary import quantity
 
 #: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the

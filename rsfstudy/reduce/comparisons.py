@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy.closed_forms import FORMS
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
+from rsfstudy.slider.closed_forms import FORMS
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class OverClosedForm(Reduction):
     of : str
         Variable to compare.
     form : str
-        Name in `rsfstudy.closed_forms`.
+        Name in `rsfstudy.slider.closed_forms`.
     """
 
     form: str = ""

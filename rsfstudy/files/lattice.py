@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.journal import Columns, Layout
-from rsfstudy.scene import FIELDS
+from rsfstudy.declare.study import Study
+from rsfstudy.files.journal import Columns, Layout
+from rsfstudy.slider.scene import FIELDS
 from rsfstudy.status import Status
-from rsfstudy.study import Study
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"

@@ -15,29 +15,19 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from rsfstudy import own_code
-from rsfstudy.study import Study
+from rsfstudy.compute import own_code
+from rsfstudy.declare.study import Study
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parent.parent
 #: Code whose change may change a number.
-_PHYSICS = (
-    "laws",
-    "effects",
-    "core",
-    "measures",
-    "loading.py",
-    "scene.py",
-    "equations.py",
-    "steady_state.py",
-)
+_PHYSICS = ("slider", "motion", "boundaries", "measures")
 
 
 def physics_digest() -> str:
     """Digest of the source of everything that decides the number of a cell."""
     digest = hashlib.sha256()
     for part in _PHYSICS:
-        path = _PACKAGE / part
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+        for file in sorted((_PACKAGE / part).rglob("*.py")):
             digest.update(file.relative_to(_PACKAGE).as_posix().encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

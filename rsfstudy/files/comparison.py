@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.contents import provenance
 from rsfstudy.errors import InvalidValue
+from rsfstudy.files.contents import provenance
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import MEASURED_TIMES
 

@@ -18,14 +18,14 @@ from dataclasses import dataclass, field, replace
 
 import cloudpickle
 
-from rsfstudy import own_code, provenance
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.compute import own_code, provenance
+from rsfstudy.compute.overheard import Overhearing
+from rsfstudy.declare.study import Cell
 from rsfstudy.errors import InvalidValue, RunError, brief
-from rsfstudy.journal import Finished
+from rsfstudy.files.journal import Finished
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.overheard import Overhearing
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
-from rsfstudy.study import Cell
 
 #: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0

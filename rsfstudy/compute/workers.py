@@ -22,7 +22,7 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any
 
-from rsfstudy.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
+from rsfstudy.compute.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
 from rsfstudy.errors import RunError, brief
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -201,7 +201,7 @@ def on_local_cluster(processes: int, log: Path | None) -> Mapper:
     """On worker processes of this machine, started when there is something to compute."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-        from rsfstudy import worker_log
+        from rsfstudy.compute import worker_log
 
         with worker_log.kept(log) as file, local_cluster(processes, file) as client:
             yield from on_client(client, str(file))(task, batches)
@@ -274,7 +274,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    from rsfstudy import worker_log
+    from rsfstudy.compute import worker_log
 
     quiet = {
         "distributed.scheduler.allowed-failures": 0,

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
-from rsfstudy.equations import LONGEST_STEP, Equations, Point
+from rsfstudy.slider.equations import LONGEST_STEP, Equations, Point
 from rsfstudy.status import Status
 
 Vector = np.ndarray

@@ -8,7 +8,7 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.scene import Scene
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from rsfstudy import steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.motion import check_start, mass_acts, motion
-from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.effects import radiation_damping
-from rsfstudy.equations import radiated, strength_of, without_mass
-from rsfstudy.measures.touching import cycle_misfit
-from rsfstudy.scene import Scene
+from rsfstudy.boundaries.touching import cycle_misfit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.regimes import check_start, mass_acts, motion
+from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.effects import radiation_damping
+from rsfstudy.slider.equations import radiated, strength_of, without_mass
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Part of the critical stiffness below it that no motion can tell from none.

@@ -10,17 +10,13 @@ from typing import ClassVar
 
 from scipy.optimize import brentq
 
-from rsfstudy import steady_state
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Meter
-from rsfstudy.equations import log_rate_at, radiated, strength_of
-from rsfstudy.measures.swing import swing
-from rsfstudy.measures.touching import (
-    cycle_misfit,
-    displacement_on_path,
-    rate_step_misfit,
-)
-from rsfstudy.scene import Scene
+from rsfstudy.boundaries.swing import swing
+from rsfstudy.boundaries.touching import cycle_misfit, displacement_on_path, rate_step_misfit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider import steady_state
+from rsfstudy.slider.equations import log_rate_at, radiated, strength_of
+from rsfstudy.slider.scene import Scene
 
 #: Smallest step the search tries, and slowest load point velocity over V_* it goes down to.
 SMALLEST_STEP = 1e-3

@@ -16,10 +16,10 @@ from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_type
 import numpy as np
 import xarray as xr
 
-from rsfstudy.claims import Claim
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
-from rsfstudy.scene import Scene
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

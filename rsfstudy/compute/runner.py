@@ -14,15 +14,16 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from rsfstudy import pieces, provenance, store
-from rsfstudy.cells import Found, Mapper, Task
+from rsfstudy.compute import provenance
+from rsfstudy.compute.cells import Found, Mapper, Task
+from rsfstudy.compute.plan import Plan, scattered
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
-from rsfstudy.journal import Columns, Journal, Layout
-from rsfstudy.lattice import assemble
-from rsfstudy.plan import Plan, scattered
+from rsfstudy.files import pieces, store
+from rsfstudy.files.journal import Columns, Journal, Layout
+from rsfstudy.files.lattice import assemble
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
-from rsfstudy.study import Study
 
 #: Typical time of one right-hand side in s, the time a task should last, and the most cells it may
 #: hold: as many are lost with the machine.

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rsfstudy.core.stepping import Step
-from rsfstudy.equations import Point
-from rsfstudy.scene import Scene
+from rsfstudy.motion.stepping import Step
+from rsfstudy.slider.equations import Point
+from rsfstudy.slider.scene import Scene
 
 #: What is observed along a motion, in this order.
 OBSERVED = (

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-_PACKAGE = Path(__file__).parent.name
+_PACKAGE = Path(__file__).parent.parent.name
 _INSTALLED = tuple(
     Path(path).resolve()
     for path in {

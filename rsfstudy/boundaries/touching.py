@@ -16,10 +16,10 @@ from collections.abc import Callable
 
 from scipy.optimize import brentq
 
-from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.equations import Point, between_ruptures, log_rate_at, radiated, strength_of
-from rsfstudy.laws import evolution_of
-from rsfstudy.scene import Scene
+from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.slider.equations import Point, between_ruptures, log_rate_at, radiated, strength_of
+from rsfstudy.slider.laws import evolution_of
+from rsfstudy.slider.scene import Scene
 
 #: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is
 #: given up.

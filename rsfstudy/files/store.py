@@ -19,8 +19,8 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy import contents
 from rsfstudy.errors import DataError, brief
+from rsfstudy.files import contents
 
 #: Root attributes that a verdict or a rerun turns on.
 _SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")

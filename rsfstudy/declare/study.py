@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy.axis import Axis, Row, check_text, is_list, plain, select, spread
-from rsfstudy.claims import Claim
-from rsfstudy.core.accuracy import Accuracy
+from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select, spread
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure, is_name
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Reduction
-from rsfstudy.scene import FIELDS, Scene
+from rsfstudy.slider.scene import FIELDS, Scene
 
 #: Fields that only scenes with variable normal stress have.
 _OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")

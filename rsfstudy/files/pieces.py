@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.journal import Columns
-from rsfstudy.lattice import attributes, coordinates, variables
+from rsfstudy.files.journal import Columns
+from rsfstudy.files.lattice import attributes, coordinates, variables
+from rsfstudy.files.store import ZARR, Digests
 from rsfstudy.status import Status
-from rsfstudy.store import ZARR, Digests
-from rsfstudy.study import Study
 
 #: Numbers in one piece: 32 MB of float64.
 _NUMBERS = 4_000_000

@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import Any
 
-from rsfstudy import laws, loading, steady_state
-from rsfstudy.effects.inertia import inertial_time
 from rsfstudy.errors import InvalidValue
+from rsfstudy.slider import laws, loading, steady_state
+from rsfstudy.slider.effects.inertia import inertial_time
 
 NORMAL_STRESSES = ("constant", "variable")
 _DEFAULT_ALPHA = 0.56
@@ -27,7 +27,7 @@ class Scene:
     Parameters
     ----------
     law : {"slip", "slowness"}
-        State evolution law; any module of `rsfstudy.laws`.
+        State evolution law; any module of `rsfstudy.slider.laws`.
     normal_stress : {"constant", "variable"}
         Constant, or coupled to shear stress by a driving stress inclined at `phi`.
     alpha : float, optional

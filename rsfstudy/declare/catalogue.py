@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.study import Study
 
 #: Where the files of `studies/` are installed.
 _PACKAGE = "rsfstudy.named_studies"

@@ -8,9 +8,9 @@ import math
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 
-from rsfstudy.core.accuracy import Accuracy
-from rsfstudy.core.stepping import Halt, Meter, Step, steps
-from rsfstudy.equations import (
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.slider.equations import (
     LARGEST_EXPONENT,
     SLOWEST,
     Equations,
@@ -19,7 +19,7 @@ from rsfstudy.equations import (
     slow_manifold,
     without_mass,
 )
-from rsfstudy.scene import Scene
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.

@@ -12,14 +12,14 @@ from types import ModuleType
 from typing import Any, TypedDict
 
 from rsfstudy import measures, reduce
-from rsfstudy.axis import Axis
-from rsfstudy.contents import Declaration, PlainMeasure, PlainReduction, fit, refused
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
+from rsfstudy.files.contents import Declaration, PlainMeasure, PlainReduction, fit, refused
 from rsfstudy.measures import Measure
-from rsfstudy.measures.problem import Problem
+from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
 from rsfstudy.status import Status
-from rsfstudy.study import Study
 
 
 def study(declared: Declaration, of_its_own: Study | None = None) -> Study:

@@ -11,9 +11,9 @@ from operator import attrgetter
 
 import numpy as np
 
+from rsfstudy.declare.study import Cell, Study
 from rsfstudy.measures import Measure
-from rsfstudy.scene import FIELDS, Scene
-from rsfstudy.study import Cell, Study
+from rsfstudy.slider.scene import FIELDS, Scene
 
 _values = attrgetter(*FIELDS)
 _KEY = np.dtype("V16")

@@ -17,9 +17,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rsfstudy.effects import inclined_driving, inertia, linker_dieterich, radiation_damping
-from rsfstudy.laws import Evolution, evolution_of
-from rsfstudy.scene import Scene
+from rsfstudy.slider.effects import inclined_driving, inertia, linker_dieterich, radiation_damping
+from rsfstudy.slider.laws import Evolution, evolution_of
+from rsfstudy.slider.scene import Scene
 
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
 #: ln(V/V_*) = 276 (`slip_rate_unbounded`).

@@ -1,0 +1,1 @@
+"""From a study to its cells, computed in this process or by Dask workers."""

@@ -1,0 +1,1 @@
+"""The physics of a spring-slider: floats in, floats out. It can be read alone."""
