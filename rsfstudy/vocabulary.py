@@ -5,78 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """One named quantity.
-
-    Attributes
-    ----------
-    name : str
-        Its name in datasets and Python.
-    symbol : str
-        Mathematical text for axis labels.
-    units : str
-        UDUNITS string; "1" where dimensionless, and "" where units have no meaning.
-    long_name : str
-        A phrase that stands alone.
-    scale : str
-        What a dimensionless quantity is measured in: multiply by this to return to SI.
-    """
-
-    name: str
-    symbol: str
-    units: str
-    long_name: str
-    scale: str = ""
-
-    @property
-    def axis_label(self) -> str:
-        """Label with units, for the axis of a figure."""
-        text = f"{self.long_name[0].upper()}{self.long_name[1:]}"
-        if self.symbol:
-            text += f", {self.symbol}"
-        if self.units not in ("", "1"):
-            text += f" ({self.units})"
-        return text
-
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.scene import QUANTITIES as SCENE
 
 _QUANTITIES = (
     # the scene
-    Quantity("law", "", "", "state evolution law"),
-    Quantity("normal_stress", "", "", "normal stress condition"),
-    Quantity("inertia", "", "", "whether the slider has mass"),
-    Quantity("a", "$a$", "1", "direct effect parameter"),
-    Quantity("b_over_a", "$b/a$", "1", "ratio of evolution effect to direct effect"),
+    *SCENE,
     Quantity("a_over_b_minus_a", "$a/(b-a)$", "1", "direct effect over net rate weakening"),
-    Quantity("mu_star", r"$\mu_*$", "1", "steady-state friction coefficient at the reference rate"),
-    Quantity("alpha", r"$\alpha$", "1", "normal stress effect on the state variable"),
-    Quantity("phi", r"$\phi$", "degree", "angle between the driving stress and the fault normal"),
-    Quantity(
-        "stiffness_ratio", r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star"
-    ),
-    Quantity("load_velocity_ratio", "$V_0/V_*$", "1", "load point velocity after the step", "V_*"),
     Quantity(
         "log_load_velocity_ratio",
         r"$\ln(V_0/V_*)$",
         "1",
         "logarithm of load point velocity over V_star",
     ),
-    Quantity(
-        "displacement_step", r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
-    ),
-    Quantity(
-        "radiation_damping",
-        r"$\eta V_*/\sigma_*$",
-        "1",
-        "stress that waves carry away at V_star",
-        "sigma_*",
-    ),
-    Quantity("period", "$T$", "s", "period of free oscillation"),
-    Quantity("reference_rate", "$V_*/D_c$", "s-1", "reference slip rate over slip distance"),
-    Quantity("instability_norm", r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable"),
     # what is measured
     Quantity(
         "critical_velocity_ratio",

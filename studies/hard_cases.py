@@ -43,7 +43,7 @@ def number(
 ) -> None:
     """A case with a number to come out."""
     problem = Problem(
-        scene=Scene(**fields),  # type: ignore[arg-type]
+        scene=Scene(**fields),
         measure=measure,
         quantity=quantity,
         answer=answer,
@@ -56,7 +56,7 @@ def number(
 def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
     """A case that must end with a status."""
     problem = Problem(
-        scene=Scene(**fields),  # type: ignore[arg-type]
+        scene=Scene(**fields),
         measure=measure,
         quantity=measure.headline,
         status=status,

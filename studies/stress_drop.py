@@ -18,7 +18,7 @@ from ._paper import PAPER, REFERENCE
 
 base = Scene(b_over_a=2.0, alpha=0.56, inertia=True)
 weakening = base.b - base.a
-enhancement = 1.0 / (1.0 - base.mu_star * base.cot_phi)
+enhancement = 1.0 / (1.0 - base.mu_star / math.tan(math.radians(base.phi)))
 
 
 CONSTANT, VARIABLE, STEEP = "constant", "phi = 60", "phi = 50"

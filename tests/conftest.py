@@ -33,6 +33,11 @@ def follow(
     raise AssertionError("a motion never ends by itself")
 
 
+def cot_phi(scene: Scene) -> float:
+    """Cotangent of the driving angle; 0 at constant normal stress."""
+    return 0.0 if scene.phi is None else 1.0 / math.tan(math.radians(scene.phi))
+
+
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""

@@ -4,6 +4,7 @@ before a run.
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from rsfstudy.measures.work_precision import WorkPrecision
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import METHODS, Meter, steps
 from rsfstudy.reduce import Cheapest, reduced
-from rsfstudy.slider.equations import quasi_static
+from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.status import Status
 
 SCENE = Scene(law="slowness", normal_stress="constant", load_velocity_ratio=20.0)
@@ -40,14 +41,8 @@ CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_every_right_hand_side_is_counted(method, monkeypatch):
     """By the meter as by the equations themselves: Jacobians and interpolants included."""
-    system, calls = quasi_static(SCENE, clock=False), []
-    counted = type(system)(
-        system.regime,
-        system.unknowns,
-        system.scales,
-        lambda clock, state: (calls.append(clock), system.rate(clock, state))[1],
-        system.point,
-    )
+    system, calls = between_ruptures(SCENE, clock=False), []
+    counted = replace(system, rate=lambda state, p: (calls.append(state), system.rate(state, p))[1])
     meter = Meter(10**6, {"quasi_static": method})
     for number, step in enumerate(steps(counted, [0.0, 0.0], 1e-6, meter)):
         step.state_at(0.5 * (step.start + step.end))

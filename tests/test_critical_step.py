@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import cot_phi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -20,7 +21,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.regimes import error_of_slow_manifold
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider.equations import log_rate_at, quasi_static
+from rsfstudy.slider.equations import between_ruptures, log_rate_at
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -170,7 +171,13 @@ def peak_in_time(scene: Scene, load: float, displacement: float = 0.0) -> float:
     Unknowns are slip and the state variable Theta (or ln theta); nothing is shared with the
     package.
     """
-    a, b, mu, c, alpha = scene.a, scene.b, scene.mu_star, scene.cot_phi, scene.alpha or 0.0
+    a, b, mu, c, alpha = (
+        scene.a,
+        scene.b,
+        scene.mu_star,
+        cot_phi(scene),
+        scene.alpha or 0.0,
+    )
     k, norm = scene.stiffness, scene.log_norm_rate
 
     def stresses(t, slip):
@@ -526,7 +533,7 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     scene = Scene(law=law, load_velocity_ratio=load)
     start = touching_point(scene)
     assert start is not None
-    system = quasi_static(scene, clock=False)
-    point = system.point(start, system.rate(0.0, start))
+    system = between_ruptures(scene, clock=False)
+    point = system.at(start)
     assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)

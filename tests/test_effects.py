@@ -2,60 +2,62 @@
 
 import itertools
 import math
+import types
 
 import pytest
+from conftest import cot_phi
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.measures import effect_cost
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.effects import inclined_driving, inertia, linker_dieterich
 from rsfstudy.slider.equations import (
-    inertial,
+    between_ruptures,
+    in_rupture,
     log_rate_at,
-    quasi_static,
+    relation_of,
     rigid,
-    slow_manifold,
-    strength_of,
 )
 
 shear = st.floats(-0.5, 0.5)
 
 
-@given(shear, st.floats(0.05, 1.2), st.floats(0.1, 0.9))
-def test_friction_is_shear_over_normal_stress(g, cot_phi, mu_star):
+@given(shear, st.floats(50.0, 87.0), st.floats(0.1, 0.9))
+def test_strength_is_shear_over_normal_stress(g, phi, mu_star):
     """tau/sigma - mu_* from the stresses themselves."""
-    ratio = inclined_driving.normal_stress_ratio(g, cot_phi)
-    assert ratio == pytest.approx(1.0 + cot_phi * g, rel=1e-15)
-    value, _slope = inclined_driving.friction(g, ratio, mu_star, cot_phi)
-    assert value == pytest.approx((mu_star + g) / ratio - mu_star, abs=4e-15 / ratio)
+    scene = Scene(phi=phi, mu_star=mu_star, alpha=0.0)
+    ratio = 1.0 + cot_phi(scene) * g
+    exact = (mu_star + g) / ratio - mu_star
+    assert relation_of(scene)(g)[0] == pytest.approx(exact, abs=4e-15 / ratio)
 
 
 @given(shear, st.floats(0.0, 1.2), st.floats(50.0, 89.0))
-def test_slope_of_strength_is_its_derivative(g, alpha, phi):
-    strength = strength_of(Scene(alpha=alpha, phi=phi))
-    h = 1e-6
-    numeric = (strength(g + h)[0] - strength(g - h)[0]) / (2 * h)
-    # central difference: h**2 f'''/6 plus rounding 1e-16/h
-    assert strength(g)[1] == pytest.approx(numeric, rel=1e-7)
+def test_slopes_are_derivatives(g, alpha, phi):
+    relation, h = relation_of(Scene(alpha=alpha, phi=phi)), 1e-6
+    ahead, behind, here = relation(g + h), relation(g - h), relation(g)
+    for value in (0, 2):
+        numeric = (ahead[value] - behind[value]) / (2 * h)
+        # central difference: h**2 f'''/6 plus rounding 1e-16/h
+        assert here[value + 1] == pytest.approx(numeric, rel=1e-7, abs=1e-9)
 
 
-@given(shear, st.floats(0.01, 1.0), st.floats(0.05, 1.0))
-def test_state_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, cot_phi):
+@given(shear, st.floats(0.01, 1.0), st.floats(50.0, 87.0))
+def test_the_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, phi):
     """dTheta = -alpha dsigma/sigma over a jump from sigma_* is eq. 2 of the paper."""
-    ratio = inclined_driving.normal_stress_ratio(g, cot_phi)
-    shift, slope = linker_dieterich.state_shift(ratio, alpha, cot_phi)
-    assert -shift == pytest.approx(-alpha * math.log(1.0 + cot_phi * g), abs=1e-14)
-    assert slope == pytest.approx(alpha * cot_phi / (1.0 + cot_phi * g), rel=1e-14)
+    scene = Scene(alpha=alpha, phi=phi)
+    cot = cot_phi(scene)
+    _value, _slope, shift, slope = relation_of(scene)(g)
+    assert -shift == pytest.approx(-alpha * math.log(1.0 + cot * g), abs=1e-14)
+    assert slope == pytest.approx(alpha * cot / (1.0 + cot * g), rel=1e-14)
 
 
 def eq_13(scene: Scene, displacement: float) -> float:
     """Slip rate just after a displacement step, eq. 13 with its closing bracket in place."""
     jump = scene.stiffness * displacement
-    ratio = 1.0 + scene.cot_phi * jump
+    ratio = 1.0 + cot_phi(scene) * jump
     state = -(scene.alpha or 0.0) * math.log(ratio)
-    driving = (1.0 - scene.cot_phi * (scene.mu_star + state)) * jump / scene.a - state / scene.a
+    driving = (1.0 - cot_phi(scene) * (scene.mu_star + state)) * jump / scene.a - state / scene.a
     return math.exp(driving / ratio)
 
 
@@ -77,15 +79,15 @@ def test_jump_of_the_paper_is_2p697():
 @given(shear)
 def test_alpha_to_zero_is_the_effect_absent(g):
     """Each effect at vanishing strength equals the effect absent."""
-    absent, vanishing = strength_of(Scene(alpha=0.0)), strength_of(Scene(alpha=1e-12))
+    absent, vanishing = relation_of(Scene(alpha=0.0)), relation_of(Scene(alpha=1e-12))
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=3e-12)
 
 
 @given(shear)
 def test_phi_to_90_degrees_is_constant_normal_stress(g):
-    absent = strength_of(Scene(normal_stress="constant"))
-    vanishing = strength_of(Scene(phi=90.0 - 1e-10))
+    absent = relation_of(Scene(normal_stress="constant"))
+    vanishing = relation_of(Scene(phi=90.0 - 1e-10))
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-11)  # cot(phi) = 1.7e-12
 
@@ -95,36 +97,62 @@ def test_phi_to_90_degrees_is_constant_normal_stress(g):
     [
         (rigid(Scene(normal_stress="constant"), 1.0), 1),
         (rigid(Scene(), 1.0), 1),
-        (quasi_static(Scene(normal_stress="constant"), clock=False), 2),
-        (quasi_static(Scene(alpha=0.0), clock=False), 2),
-        (quasi_static(Scene(), clock=False), 2),
-        (quasi_static(Scene(), clock=True), 3),
-        (slow_manifold(Scene(inertia=True), clock=False), 2),
-        (inertial(Scene(inertia=True)), 3),
+        (between_ruptures(Scene(normal_stress="constant"), clock=False), 2),
+        (between_ruptures(Scene(alpha=0.0), clock=False), 2),
+        (between_ruptures(Scene(), clock=False), 2),
+        (between_ruptures(Scene(), clock=True), 3),
+        (between_ruptures(Scene(radiation_damping=0.1), clock=False), 2),
+        (between_ruptures(Scene(inertia=True), clock=False), 2),
+        (in_rupture(Scene(inertia=True)), 3),
     ],
 )
 def test_number_of_unknowns(equations, unknowns):
     assert len(equations.unknowns) == len(equations.scales) == unknowns
-    state = [0.01] * unknowns
-    assert len(equations.rate(0.0, state)) == unknowns
+    assert len(equations.rates([0.01] * unknowns)) == unknowns
 
 
-def test_an_absent_effect_is_never_called(monkeypatch):
-    def called(*_args):
-        raise AssertionError("an effect that is not in the scene was called")
+def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
+    """The functions of ours that a function may call, by name."""
+    seen = {} if seen is None else seen
+    for name in function.__code__.co_names:
+        called = function.__globals__.get(name)
+        if isinstance(called, types.FunctionType) and called not in seen.values():
+            seen[name] = called
+            reached(called, seen)
+    return seen
 
-    for module, name in [
-        (inclined_driving, "normal_stress_ratio"),
-        (inclined_driving, "friction"),
-        (linker_dieterich, "state_shift"),
-        (inertia, "acceleration"),
-        (inertia, "inertial_resistance"),
-    ]:
-        monkeypatch.setattr(module, name, called)
-    system = quasi_static(Scene(normal_stress="constant"), clock=True)
-    system.point([0.01, 0.0, 0.0], system.rate(0.0, [0.01, 0.0, 0.0]))
-    with pytest.raises(AssertionError, match="not in the scene"):
-        quasi_static(Scene(), clock=True).rate(0.0, [0.01, 0.0, 0.0])
+
+#: What the equations of any scene call.
+ALWAYS = {"balance", "strength", "evolving", "evolution"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "more"),
+    [
+        ({"normal_stress": "constant"}, set()),
+        ({"alpha": 0.0}, {"normal_stress", "coefficient"}),
+        ({}, {"normal_stress", "coefficient", "state_effect"}),
+        ({"normal_stress": "constant", "radiation_damping": 0.1}, set()),
+        ({"normal_stress": "constant", "inertia": True}, {"without_mass"}),
+    ],
+)
+def test_an_absent_effect_is_out_of_reach(fields, more):
+    rate = between_ruptures(Scene(**fields), clock=False).rate
+    assert set(reached(rate)) == ALWAYS | more
+
+
+def test_the_same_functions_serve_all_scenes_of_the_same_parts():
+    """None holds a number of a scene: those are arguments."""
+    one, other = (
+        between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), clock=False)
+        for a, phi, load in ((0.01, 55.0, 2.0), (0.02, 70.0, 3.0))
+    )
+    assert one.rate is other.rate
+    assert one.point is other.point
+    assert one.p != other.p
+    assert all(isinstance(number, float) for number in one.p)
+    for function in (one.rate, *reached(one.rate).values()):
+        assert function.__closure__ is None
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():
@@ -132,12 +160,13 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
     raises.
     """
     for scene in (Scene(), Scene(law="slowness"), Scene(normal_stress="constant")):
+        massive = scene.with_(inertia=True)
         for wild in (-1e6, -2.0, -1.7320508, 3.0, 1e6):
-            for system in (quasi_static(scene, clock=True), slow_manifold(scene, clock=True)):
+            for system in (between_ruptures(s, clock=True) for s in (scene, massive)):
                 for psi in (-50.0, 0.0, 50.0):
-                    assert all(map(math.isfinite, system.rate(0.0, [wild, psi, 0.0])))
+                    assert all(map(math.isfinite, system.rates([wild, psi, 0.0])))
             for x in (-1e4, 0.0, 1e4):
-                assert all(map(math.isfinite, inertial(scene).rate(0.0, [wild, x, wild])))
+                assert all(map(math.isfinite, in_rupture(massive).rates([wild, x, wild])))
 
 
 def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(monkeypatch):

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.slider.equations import log_rate_at, strength_of
-from rsfstudy.slider.laws import evolution_of
+from rsfstudy.slider.equations import evolution_of, log_rate_at, relation_of
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
@@ -21,9 +21,9 @@ def test_eq_3():
     """A jump of normal stress at V = V_*, by the assembled relation of stress, state and rate."""
     scene = Scene(alpha=0.56, phi=60.0)
     stress = 0.3  # of shear stress; normal stress follows
-    change = scene.cot_phi * stress
-    psi = strength_of(scene)(stress)[0]  # the state at which V stays V_* under that stress
-    state_change = psi - strength_of(scene)(stress)[2]
+    change = cot_phi(scene) * stress
+    psi = relation_of(scene)(stress)[0]  # the state at which V stays V_* under that stress
+    state_change = psi - relation_of(scene)(stress)[2]
     friction = scene.mu_star + state_change
     assert (1.0 + change) * friction == pytest.approx(scene.mu_star + stress, rel=1e-14)
     jump = -scene.alpha * math.log1p(change)
@@ -37,7 +37,7 @@ def test_eq_3():
 def test_eq_4b():
     """dTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
     b, theta, rate = 0.029, 0.7, 3.0
-    per_slip = evolution_of("slowness")(math.log(rate), b * math.log(theta), b)
+    per_slip = evolution_of(Scene(law="slowness", a=b / 2.0))(math.log(rate), b * math.log(theta))
     assert per_slip == pytest.approx(b * (1.0 - theta * rate) / theta / rate, rel=1e-13)
 
 
@@ -63,13 +63,13 @@ def test_eq_11():
 def test_eq_13():
     scene = Scene(alpha=0.56, b_over_a=2.0, stiffness_ratio=1.0)
     jump = scene.stiffness / (scene.b_over_a - 1.0)
-    state = -scene.alpha * math.log1p(scene.cot_phi * jump)
-    held = (1.0 - scene.cot_phi * (scene.mu_star + state)) * jump - state
-    corrected = held / scene.a / (1.0 + scene.cot_phi * jump)
+    state = -scene.alpha * math.log1p(cot_phi(scene) * jump)
+    held = (1.0 - cot_phi(scene) * (scene.mu_star + state)) * jump - state
+    corrected = held / scene.a / (1.0 + cot_phi(scene) * jump)
     assert corrected == pytest.approx(log_rate_at(scene, jump, 0.0), rel=1e-12)
     assert math.exp(corrected) == pytest.approx(2.6975, abs=5e-5)
-    printed = (1.0 - scene.cot_phi * (scene.mu_star + state) * jump - state) / scene.a
-    assert abs(printed / (1.0 + scene.cot_phi * jump) - corrected) > 1.0
+    printed = (1.0 - cot_phi(scene) * (scene.mu_star + state) * jump - state) / scene.a
+    assert abs(printed / (1.0 + cot_phi(scene) * jump) - corrected) > 1.0
 
 
 def test_eq_17a():

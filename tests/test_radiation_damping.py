@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import follow
+from conftest import cot_phi, follow
 from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -15,10 +15,8 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import equations, steady_state
-from rsfstudy.slider.effects import radiation_damping
-from rsfstudy.slider.equations import quasi_dynamic, strength_of
-from rsfstudy.slider.laws import evolution_of
+from rsfstudy.slider import closed_forms
+from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
 from rsfstudy.status import Status
 
 #: Impedance of spring and mass of the paper's slider, K T V_*/(2 pi D_c).
@@ -34,9 +32,11 @@ IMPEDANCE = Scene().stiffness * Scene().inertial_time
 )
 @example(spring=1.0, psi=0.0, log_damping=0.0, alpha=0.0, constant=False)
 def test_friction_and_radiation_balance_the_spring(spring, psi, log_damping, alpha, constant):
+    damping = math.exp(log_damping)
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
-    damping, strength = math.exp(log_damping), strength_of(scene)
-    x, friction = radiation_damping.balanced_rate(spring, psi, strength, scene.a, damping)
+    scene, strength = scene.with_(radiation_damping=damping), relation_of(scene)
+    point = between_ruptures(scene, clock=False).at((spring, psi))
+    x, friction = point.log_rate, point.friction
     # rounding of the stresses, and of x times the slope of radiation in x
     radiated = damping * math.expm1(x)
     scale = 1.0 + abs(spring) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
@@ -75,8 +75,8 @@ def test_critical_stiffness_is_the_threshold_of_growth(log_damping, log_rate, ph
     if outcome.status is Status.OK:
         found = outcome.values["critical_stiffness_from_growth"]
         # the difference of two numbers of the size of the undamped one
-        undamped = steady_state.critical_stiffness(
-            log_rate, scene.mu_star, scene.a, scene.b, scene.cot_phi, alpha
+        undamped = closed_forms.critical_stiffness(
+            log_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
         )
         assert found == pytest.approx(outcome.values["critical_stiffness"], abs=1e-6 * undamped)
     else:
@@ -86,8 +86,10 @@ def test_critical_stiffness_is_the_threshold_of_growth(log_damping, log_rate, ph
 def test_critical_stiffness_at_the_reference_rate():
     """K_cr = [(b - a) - eta D]/E, D = 1 - mu_* cot(phi), E = D + alpha cot(phi)."""
     scene = Scene(radiation_damping=0.003)
-    steadiness = 1.0 - scene.mu_star * scene.cot_phi
-    expected = (scene.b - scene.a - 0.003 * steadiness) / (steadiness + scene.alpha * scene.cot_phi)
+    steadiness = 1.0 - scene.mu_star * cot_phi(scene)
+    expected = (scene.b - scene.a - 0.003 * steadiness) / (
+        steadiness + scene.alpha * cot_phi(scene)
+    )
     found = LinearStability()(scene, Accuracy()).values["critical_stiffness"]
     assert found == pytest.approx(expected, rel=1e-13)
 
@@ -106,15 +108,15 @@ def test_a_second_formulation_in_time_agrees(law, effects):
         radiation_damping=1e-4,
         **effects,
     )
-    strength, evolution = strength_of(scene), evolution_of(law)
+    strength, evolution = relation_of(scene), evolution_of(scene)
     damping = scene.radiation_damping
 
     def rate(_time, y):
         spring, x = y
         v = math.exp(x)
-        value, slope, shift = strength(spring - damping * (v - 1.0))
+        value, slope, shift, _shift_slope = strength(spring - damping * (v - 1.0))
         loading = scene.stiffness * (scene.load_velocity - v)
-        weakening = v * evolution(x, value - scene.a * x - shift, scene.b)
+        weakening = v * evolution(x, value - scene.a * x - shift)
         return [loading, (slope * loading - weakening) / (scene.a + slope * damping * v)]
 
     highest = []
@@ -139,12 +141,12 @@ def test_a_second_formulation_in_time_agrees(law, effects):
 
 
 def test_growth_is_the_derivative_of_the_slip_rate():
-    system = quasi_dynamic(Scene(radiation_damping=0.01, load_velocity_ratio=2.0), clock=False)
+    system = between_ruptures(Scene(radiation_damping=0.01, load_velocity_ratio=2.0), clock=False)
     state = np.array([0.03, -0.01])
-    rates = np.array(system.rate(0.0, state))
-    ahead, behind = (system.point(state + h * rates, rates) for h in (1e-6, -1e-6))
+    rates = np.array(system.rates(state))
+    ahead, behind = (system.at((state + h * rates).tolist()) for h in (1e-6, -1e-6))
     growth = (ahead.log_rate - behind.log_rate) / 2e-6
-    assert system.point(state, rates).growth == pytest.approx(growth, rel=1e-7)
+    assert system.at(state.tolist()).growth == pytest.approx(growth, rel=1e-7)
 
 
 def test_stronger_damping_makes_slower_ruptures():
@@ -167,17 +169,6 @@ def test_damped_cycles_do_not_overshoot():
         for effect in ({"inertia": True}, {"radiation_damping": IMPEDANCE})
     ]
     assert 0.4 < cycles[1] / cycles[0] < 0.65
-
-
-def test_unknowns_and_absence(monkeypatch):
-    """Two unknowns; a scene without it never calls it."""
-    assert quasi_dynamic(Scene(radiation_damping=0.1), clock=False).unknowns == ("spring", "psi")
-
-    def forbidden(*_arguments):
-        raise AssertionError("called")
-
-    monkeypatch.setattr(equations.radiation_damping, "balanced_rate", forbidden)
-    follow(Scene(load_velocity_ratio=1.2), 1e-5, lambda step: step.end > 1.0)
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,12 @@ def test_the_table_of_zeta_is_ours():
         assert float(row.zeta_stderr) == pytest.approx(float(error), abs=0.51 * 10.0**-digits)
 
 
-def test_every_room_of_the_tree_is_there():
-    root = Path(rsfstudy.__file__).parent
-    for name in re.findall(r"^  ((?:[a-z_]+/?,? +)*[a-z_]+/?) {2,}", README, re.MULTILINE):
-        for room in re.split(r"[ ,]+", name):
-            assert (root / room).is_dir() or (root / f"{room}.py").is_file(), room
+def test_the_tree_names_every_room_and_no_other():
+    root, tree = Path(rsfstudy.__file__).parent, README[README.index("```\nstudies/") :]
+    for folder, indent in ((root, "  "), (root / "slider", "    ")):
+        lines = re.findall(rf"^{indent}((?:[a-z_]+/? +)*[a-z_]+/?) {{2,}}", tree, re.MULTILINE)
+        named = {room.strip("/") for line in lines for room in line.split()}
+        files = {
+            p.stem for p in folder.iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()
+        }
+        assert named == files - {"__init__"}

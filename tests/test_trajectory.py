@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
@@ -27,7 +28,7 @@ def test_a_stable_step_ends_in_the_new_steady_state(inertia):
     scene = Scene(load_velocity_ratio=1.5, stiffness_ratio=2.0, inertia=inertia)
     motion = rsfstudy.simulate(scene, duration=300.0, rtol=1e-9)
     mu_ss = scene.mu_star - (scene.b - scene.a) * math.log(1.5)
-    sigma = (1 - scene.mu_star * scene.cot_phi) / (1 - mu_ss * scene.cot_phi)
+    sigma = (1 - scene.mu_star * cot_phi(scene)) / (1 - mu_ss * cot_phi(scene))
     end = motion.isel(sample=-1)
     assert float(end.log10_slip_rate) == pytest.approx(math.log10(1.5), abs=1e-8)
     assert float(end.normal_stress_ratio) == pytest.approx(sigma, abs=1e-9)

@@ -14,8 +14,8 @@ from rsfstudy.boundaries.swing import swing
 from rsfstudy.boundaries.touching import cycle_misfit, displacement_on_path, rate_step_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider import steady_state
-from rsfstudy.slider.equations import log_rate_at, radiated, strength_of
+from rsfstudy.slider import steady
+from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene
 
 #: Smallest step the search tries, and slowest load point velocity over V_* it goes down to.
@@ -31,6 +31,8 @@ _LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
 _GIVE_UP = 3
 #: How much farther in ln V a displacement step may jump where mass delays the rise of slip rate.
 _RISE_OF_MASS = 5.0
+#: Spring stress over sigma_* that no displacement step goes beyond.
+_LARGEST_STRESS = 1e6
 
 
 class Steps:
@@ -217,8 +219,7 @@ class RateSteps(Steps):
         """Up: V_0 at the norm itself. Down: the slowest V_0 that has a steady state."""
         if self.sign > 0:
             return self.scene.log_norm_rate
-        scene = self.scene
-        slowest = steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, scene.cot_phi)
+        scene, slowest = self.scene, steady.slowest_steady(self.scene)
         return min(-math.log(SLOWEST_LOAD), -slowest) if scene.log_norm_rate > 0.0 else 0.0
 
 
@@ -285,18 +286,14 @@ class DisplacementSteps(Steps):
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
             return 0.0
         if self.sign < 0:
-            limit = scene.mu_star
-            return (min(limit, 1.0 / scene.cot_phi) if scene.cot_phi else limit) / scene.stiffness
+            weakest = scene.parts.normal_stress.weakest(scene)
+            return min(scene.mu_star, -weakest) / scene.stiffness
         farther = _RISE_OF_MASS if scene.inertia else 0.0
-        strength, norm = strength_of(scene), scene.a * (scene.log_norm_rate + farther)
-        reach = norm
-        while strength(reach)[0] < norm and reach < 1e6:
-            reach *= 2.0
-        if strength(reach)[0] < norm:
-            return reach / scene.stiffness
+        friction = steady.stress_after_jump(scene, scene.a * (scene.log_norm_rate + farther))
+        if friction is None:
+            return _LARGEST_STRESS / scene.stiffness
         self.jumps_to_norm = True
-        friction = float(brentq(lambda stress: strength(stress)[0] - norm, 0.0, reach))
-        return (friction + radiated(scene, scene.log_norm_rate)) / scene.stiffness
+        return (friction + scene.dynamics.radiated(scene.log_norm_rate)) / scene.stiffness
 
 
 def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, float]:

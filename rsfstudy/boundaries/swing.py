@@ -10,9 +10,8 @@ from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.regimes import check_start, mass_acts, motion
 from rsfstudy.motion.stepping import Halt, Meter, Step, steps
-from rsfstudy.slider import steady_state
-from rsfstudy.slider.effects import radiation_damping
-from rsfstudy.slider.equations import radiated, strength_of, without_mass
+from rsfstudy.slider import steady
+from rsfstudy.slider.equations import without_mass
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -95,8 +94,7 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
         return _held(scene, accuracy, meter)
     steady = _steady(scene)
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    damped = scene.radiation_damping > 0.0
-    if scene.normal_stress == "constant" and abs(steady.margin) < accuracy.rtol and not damped:
+    if orbits_may_close(scene) and abs(steady.margin) < accuracy.rtol:
         top = _top_of_closed_orbit(scene, accuracy, meter)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return Swing(top >= norm, top - norm)
@@ -106,6 +104,14 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
         reached = _grows_to_the_norm(scene, steady, first.slow_growth_at, accuracy, meter)
     excess = _excess(first, norm, heavy=heavy)
     return Swing(reached, max(excess, 1e-12) if reached else min(excess, -1e-12))
+
+
+def orbits_may_close(scene: Scene) -> bool:
+    """Whether every orbit closes at critical stiffness: where friction alone acts, without an
+    effect of stress on it (Gu et al. 1984 for the slip law, Ranjith and Rice 1999 for the slowness
+    law).
+    """
+    return not set(scene.effects) - {"inertia"}
 
 
 def settles(scene: Scene) -> bool:
@@ -158,7 +164,7 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     """
     check_start(scene)
     equations, start = without_mass(scene, clock=False), (scene.spring_stress_step, 0.0)
-    rising = equations.point(start, equations.rate(0.0, start)).growth > 0.0
+    rising = equations.at(start).growth > 0.0
     path = steps(equations, start, accuracy.solver, meter, backward=not rising)
     return _first_peak(path, scene.log_norm_rate)
 
@@ -254,29 +260,13 @@ def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
 
 def _steady(scene: Scene) -> _Steady:
     """Steady sliding at the load point velocity of the scene; `Halt` if there is none."""
-    load, cot_phi = scene.log_load_rate, scene.cot_phi
-    if load <= steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, cot_phi):
+    load = scene.log_load_rate
+    found = steady.steady_sliding(scene, load)
+    if found is None:
         raise Halt(
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
-    mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
-    friction = steady_state.steady_shear_stress(mu_ss, scene.mu_star, cot_phi)
-    critical = steady_state.critical_stiffness(
-        load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0
-    )
-    critical = radiation_damping.critical_stiffness(
-        critical, scene.radiation_damping * math.exp(load), mu_ss, scene.alpha or 0.0, cot_phi
-    )
-    if scene.inertia:
-        sigma_ss = steady_state.steady_normal_stress(mu_ss, scene.mu_star, cot_phi)
-        norm = scene.inertial_time * math.exp(load)
-        critical *= 1.0 + steady_state.rise_by_mass(
-            critical, norm, mu_ss, sigma_ss, scene.a, cot_phi
-        )
-    return _Steady(
-        load,
-        friction + radiated(scene, load),
-        strength_of(scene)(friction)[0] - scene.a * load,
-        scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf,
-    )
+    critical = steady.critical_stiffness(scene, load)
+    margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
+    return _Steady(load, found.spring, found.psi, margin)

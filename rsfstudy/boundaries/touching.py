@@ -17,8 +17,8 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 from rsfstudy.motion.stepping import Halt, Meter, Step, steps
-from rsfstudy.slider.equations import Point, between_ruptures, log_rate_at, radiated, strength_of
-from rsfstudy.slider.laws import evolution_of
+from rsfstudy.slider.equations import between_ruptures, evolution_of, log_rate_at, relation_of
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
 #: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is
@@ -33,22 +33,20 @@ def touching_point(scene: Scene) -> tuple[float, float] | None:
 
     There, strength'(f) K (V_0/V - 1) equals the evolution of the state per unit slip.
     """
-    strength, evolution = strength_of(scene), evolution_of(scene.law)
-    a, b, x = scene.a, scene.b, scene.log_norm_rate
+    relation, evolution = relation_of(scene), evolution_of(scene)
+    a, x = scene.a, scene.log_norm_rate
     pull = scene.stiffness * math.expm1(scene.log_load_rate - x)
 
     def acceleration(friction: float) -> float:
-        value, slope, shift = strength(friction)
-        return slope * pull - evolution(x, value - shift - a * x, b)
+        value, slope, shift, _shift_slope = relation(friction)
+        return slope * pull - evolution(x, value - shift - a * x)
 
-    reach = 2.0 * b * abs(x) + scene.stiffness
-    lowest = -reach
-    if scene.cot_phi > 0.0:
-        lowest = max(lowest, -(1.0 - 1e-6) / scene.cot_phi)
+    reach = 2.0 * scene.b * abs(x) + scene.stiffness
+    lowest = max(-reach, (1.0 - 1e-6) * scene.parts.normal_stress.weakest(scene))
     if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
         return None
     friction = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
-    return friction + radiated(scene, x), strength(friction)[0] - a * x
+    return friction + scene.dynamics.radiated(x), relation(friction)[0] - a * x
 
 
 def start_of_path(
@@ -122,7 +120,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
     spring = scene.spring_stress_step
     begin = log_rate_at(scene, spring, 0.0)
     rates = between_ruptures(scene, clock=False)
-    growth = rates.point((spring, 0.0), rates.rate(0.0, (spring, 0.0))).growth
+    growth = rates.at((spring, 0.0)).growth
     if growth == 0.0:
         return None
     found = start_of_path(

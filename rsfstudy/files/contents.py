@@ -19,7 +19,7 @@ import xarray as xr
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.scene import KINDS, Scene
 from rsfstudy.status import Status
 
 
@@ -212,7 +212,7 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     origin, of = get_origin(kind), get_args(kind)
     if kind is Any or _is_one(value, kind):
         return value
-    if (is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
+    if (kind is Scene or is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
         return _object(value, kind, path)
     if origin is UnionType:
         return _either(value, of, path)
@@ -267,8 +267,9 @@ def _list(value: Sequence[Any], origin: Any, of: tuple[Any, ...], path: str) -> 
 
 def _object(value: Mapping[str, Any], kind: Any, path: str) -> Any:
     """A dataclass has its fields and no others; a typed dictionary may have others."""
-    kinds, closed = get_type_hints(kind), is_dataclass(kind)
-    names = [field.name for field in fields(kind)] if closed else list(kinds)
+    kinds = KINDS if kind is Scene else get_type_hints(kind)
+    closed = kind is Scene or is_dataclass(kind)
+    names = [field.name for field in fields(kind)] if is_dataclass(kind) else list(kinds)
     for name in names:
         if name not in value:
             raise refused(_inside(path, name), "is missing")

@@ -155,10 +155,10 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
         "load_velocity_ratio": decades(1.1, 100.0) if rates else None,
     }
     angle, alpha = between(0.05, 0.95), between(0.0, 0.6)
-    if like.normal_stress == "variable":
+    if like.phi is not None:
         lowest = math.degrees(math.atan(fields["mu_star"]))
         fields |= {"phi": lowest + angle * (90.0 - lowest), "alpha": alpha}
-    if like.radiation_damping > 0.0:
+    if like.radiation_damping:
         # about the impedance of spring and mass
         inertial_time = fields["period"] * fields["reference_rate"] / (2.0 * math.pi)
         impedance = fields["stiffness_ratio"] * fields["a"] * inertial_time

@@ -18,7 +18,7 @@ from typing import ClassVar
 from scipy.optimize import toms748
 
 from rsfstudy.boundaries.sought import DisplacementSteps, RateSteps, Steps
-from rsfstudy.boundaries.swing import Swing, settles, stability_margin, swing
+from rsfstudy.boundaries.swing import Swing, orbits_may_close, settles, stability_margin, swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
@@ -280,8 +280,7 @@ def _neutral(scene: Scene, accuracy: Accuracy) -> bool:
     at any load point velocity.
     """
     margin = scene.stiffness_ratio - 1.0
-    damped = scene.radiation_damping > 0.0
-    return scene.normal_stress == "constant" and not damped and -10.0 * accuracy.rtol < margin < 0.0
+    return orbits_may_close(scene) and -10.0 * accuracy.rtol < margin < 0.0
 
 
 def _boundary(

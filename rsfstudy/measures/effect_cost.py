@@ -15,7 +15,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider.equations import Equations, inertial, slow_manifold, without_mass
+from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.scene import Scene
 
 #: Evaluations timed together, and how often: the forms of the equations take short turns, so that
@@ -76,12 +76,12 @@ class EffectCost(Measure):
 
 def _costs(scene: Scene) -> dict[str, float]:
     """Unknowns of the forms of the equations of a scene, and the time of a right-hand side."""
-    slow = (slow_manifold if scene.inertia else without_mass)(scene, clock=False)
+    slow = between_ruptures(scene, clock=False)
     forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _BETWEEN_RUPTURES)}
     if scene.inertia:
-        forms["_in_rupture"] = inertial(scene), _IN_RUPTURE
+        forms["_in_rupture"] = in_rupture(scene), _IN_RUPTURE
     plainest = scene.with_(normal_stress="constant", inertia=False, radiation_damping=0.0)
-    timed = {"plainest": (without_mass(plainest, clock=False), _BETWEEN_RUPTURES), **forms}
+    timed = {"plainest": (between_ruptures(plainest, clock=False), _BETWEEN_RUPTURES), **forms}
     turns = [{where: _seconds(*form) for where, form in timed.items()} for _turn in range(_TURNS)]
     costs = {}
     for where, (form, _state) in forms.items():
@@ -94,7 +94,8 @@ def _costs(scene: Scene) -> dict[str, float]:
 
 def _seconds(equations: Equations, state: tuple[float, ...]) -> float:
     """Processor time of one right-hand side."""
+    rate, p = equations.rate, equations.p
     began = time.thread_time()
     for _ in range(_EVALUATIONS):
-        equations.rate(0.0, state)
+        rate(state, p)
     return (time.thread_time() - began) / _EVALUATIONS

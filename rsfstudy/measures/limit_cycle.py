@@ -24,7 +24,7 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.regimes import motion
 from rsfstudy.motion.stepping import Halt, Meter, Step
 from rsfstudy.motion.timeline import OBSERVED, along_path, elapsed, sampled, timed
-from rsfstudy.slider.equations import Point
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -65,7 +65,7 @@ class Cycle:
     highest, lowest, at_peak : float
         Deviation of spring stress at its maximum, its minimum, and at peak slip rate.
     sliding : float
-        Deviation of frictional stress at peak slip rate.
+        Friction coefficient at peak slip rate.
     slowest, fastest : float
         Extremes of ln(V/V_*).
     landed, rested : Point
@@ -180,11 +180,10 @@ def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
     """What else is told of a cycle."""
     healed = cycle.rested.imbalance - cycle.landed.imbalance
     slowed = cycle.rested.log_rate - cycle.landed.log_rate
-    stress = scene.mu_star + cycle.sliding
     return {
         # d ln(theta)/d ln(V), with Theta = imbalance - b ln V = b ln(theta/theta_*)
         "healing_exponent": healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan,
-        "residual_friction": stress / (1.0 + scene.cot_phi * cycle.sliding),
+        "residual_friction": cycle.sliding,
         "drop_asymmetry": (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest),
     }
 
@@ -412,7 +411,7 @@ class _Watch:
             highest=turning.spring,
             lowest=self._arrested.spring,
             at_peak=self._fastest.spring,
-            sliding=self._fastest.friction,
+            sliding=self._fastest.coefficient,
             slowest=self._rested.log_rate,
             fastest=self._fastest.log_rate,
             landed=self._landed or self._rested,

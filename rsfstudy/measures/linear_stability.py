@@ -1,5 +1,5 @@
-"""Linear stability of steady sliding: the critical stiffness from algebra, and from growth of the
-assembled equations.
+"""Linear stability of steady sliding: the critical stiffness from the friction relation, from
+growth of the assembled equations, and in closed form.
 """
 
 from __future__ import annotations
@@ -15,17 +15,10 @@ from scipy.optimize import brentq
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider import steady_state
-from rsfstudy.slider.effects import radiation_damping
-from rsfstudy.slider.equations import (
-    Equations,
-    inertial,
-    radiated,
-    slow_manifold,
-    strength_of,
-    without_mass,
-)
+from rsfstudy.slider import closed_forms
+from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.steady import Steady, critical_stiffness, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
@@ -43,8 +36,9 @@ class LinearStability(Measure):
     """Critical stiffness of steady sliding at the load point velocity of the scene, over
     sigma_*/D_c.
 
-    Twice: by the closed form, and as the stiffness at which small perturbations of the assembled
-    equations neither grow nor decay, so that algebra and code vouch for each other.
+    Twice: from the friction relation, and as the stiffness at which small perturbations of the
+    assembled equations neither grow nor decay, so that they vouch for each other; and, for what
+    mass and radiation leave, by the closed form.
     """
 
     name: ClassVar[str] = "linear_stability"
@@ -76,76 +70,71 @@ class LinearStability(Measure):
         return 100
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Closed form, and the root of the growth in stiffness; their difference is the error of
-        the algebra.
+        """The critical stiffness, and the root of the growth in stiffness; their difference is the
+        error.
         """
-        load, cot_phi = scene.log_load_rate, scene.cot_phi
-        mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
-        if load <= steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, cot_phi):
+        load = scene.log_load_rate
+        steady = steady_sliding(scene, load)
+        mu_ss = scene.mu_star + (scene.a - scene.b) * load
+        if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
                 {"steady_friction": mu_ss},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
-        sigma_ss = steady_state.steady_normal_stress(mu_ss, scene.mu_star, cot_phi)
+        sigma_ss = normal_stress_at(scene, steady.friction)
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
-        parameters = (load, scene.mu_star, scene.a, scene.b, cot_phi, scene.alpha or 0.0)
-        massless, rise = steady_state.critical_stiffness(*parameters), 0.0
-        if scene.radiation_damping > 0.0:
-            damping = scene.radiation_damping * scene.load_velocity
-            damped = radiation_damping.critical_stiffness(
-                massless, damping, mu_ss, scene.alpha or 0.0, cot_phi
+        massless = critical_stiffness(scene, load, quasi_static=True)
+        critical = critical_stiffness(scene, load)
+        if critical <= 0.0:
+            return Outcome(
+                Status.STABLE_AT_ANY_STIFFNESS,
+                values,
+                f"at eta V = {scene.dynamics.damping(load):.3g} sigma_* radiation damps every "
+                "perturbation",
             )
-            if damped <= 0.0:
-                return Outcome(
-                    Status.STABLE_AT_ANY_STIFFNESS,
-                    values,
-                    f"at eta V = {damping:.3g} sigma_* radiation damps every perturbation",
-                )
-            rise = damped / massless - 1.0
-        if scene.inertia:
-            norm = scene.load_velocity * scene.inertial_time
-            rise = steady_state.rise_by_mass(massless, norm, mu_ss, sigma_ss, scene.a, cot_phi)
-            if rise > _LARGEST_RISE:
-                return Outcome(
-                    Status.UNSTABLE_AT_ANY_STIFFNESS,
-                    values,
-                    f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
-                )
-        closed = massless * (1.0 + rise)
-        found = _threshold(scene, closed, meter)
+        rise = critical / massless - 1.0
+        if rise > _LARGEST_RISE:
+            norm = scene.dynamics.norm(scene, load)
+            return Outcome(
+                Status.UNSTABLE_AT_ANY_STIFFNESS,
+                values,
+                f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
+            )
+        found = _threshold(scene, steady, critical, meter)
+        explicit = closed_forms.critical_stiffness(
+            load, scene.mu_star, scene.a, scene.b, _cot_phi(scene), scene.alpha or 0.0
+        )
         return Outcome(
             Status.OK,
             {
-                "critical_stiffness": closed,
-                "critical_stiffness_error": abs(found - closed) + 1e-15 * closed,
+                "critical_stiffness": critical,
+                "critical_stiffness_error": abs(found - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": found,
-                "critical_stiffness_explicit": steady_state.critical_stiffness_explicit(*parameters)
-                * (1.0 + rise),
-                "relative_critical_stiffness": closed / scene.critical_stiffness,
+                "critical_stiffness_explicit": explicit * (1.0 + rise),
+                "relative_critical_stiffness": critical / scene.critical_stiffness,
                 "rise_by_dynamics": rise,
                 **values,
             },
         )
 
 
-def _threshold(scene: Scene, near: float, meter: Meter) -> float:
+def _cot_phi(scene: Scene) -> float:
+    return 0.0 if scene.phi is None else 1.0 / math.tan(math.radians(scene.phi))
+
+
+def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
     """Stiffness at which perturbations of steady sliding neither grow nor decay."""
-    load = scene.log_load_rate
-    mu_ss = steady_state.steady_friction(load, scene.mu_star, scene.a, scene.b)
-    friction = steady_state.steady_shear_stress(mu_ss, scene.mu_star, scene.cot_phi)
-    psi = strength_of(scene)(friction)[0] - scene.a * load
-    spring = friction + radiated(scene, load)
-    with_mass = scene.inertia and scene.load_velocity * scene.inertial_time > _MASS_SHOWS
+    with_mass = scene.dynamics.norm(scene, steady.log_rate) > _MASS_SHOWS
     around = near / scene.critical_stiffness
 
     def growth_at(ratio: float) -> float:
         changed = scene.with_(stiffness_ratio=ratio)
         if with_mass:
             meter.charge("inertial", 6)
-            return growth_with_mass(changed, spring)
+            return growth_with_mass(changed, steady.spring)
         meter.charge("quasi_static", 4)
-        return growth(changed, spring, psi)
+        return growth(changed, steady.spring, steady.psi)
 
     found = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
     return found * scene.critical_stiffness
@@ -156,8 +145,7 @@ def growth(scene: Scene, spring: float, psi: float) -> float:
 
     Its determinant is positive for every stiffness, so the trace alone decides.
     """
-    assemble = slow_manifold if scene.inertia else without_mass
-    jacobian = _jacobian(assemble(scene, clock=False), (spring, psi))
+    jacobian = _jacobian(between_ruptures(scene, clock=False), (spring, psi))
     return math.fsum(jacobian[i][i] for i in range(2))
 
 
@@ -166,7 +154,7 @@ def growth_with_mass(scene: Scene, spring: float) -> float:
     characteristic polynomial p**3 + c2 p**2 + c1 p + c0, it is c0 - c1 c2 (Routh).
     """
     state = (spring, scene.log_load_rate, spring)
-    j = np.array(_jacobian(inertial(scene), state))
+    j = np.array(_jacobian(in_rupture(scene), state))
     c2 = -float(np.trace(j))
     c1 = 0.5 * (float(np.trace(j)) ** 2 - float(np.trace(j @ j)))
     c0 = -float(np.linalg.det(j))
@@ -179,7 +167,7 @@ def _jacobian(equations: Equations, state: tuple[float, ...]) -> list[list[float
     for number, scale in enumerate(equations.scales):
         step = _DIFFERENCE * scale
         ahead, behind = (
-            equations.rate(0.0, [x + sign * step * (i == number) for i, x in enumerate(state)])
+            equations.rates([x + sign * step * (i == number) for i, x in enumerate(state)])
             for sign in (1.0, -1.0)
         )
         columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])

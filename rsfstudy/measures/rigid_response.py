@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Halt, Meter, steps
-from rsfstudy.slider import steady_state
-from rsfstudy.slider.equations import rigid, strength_of
+from rsfstudy.slider.equations import rigid
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.steady import steady_sliding, stress_after_jump
 from rsfstudy.status import Status
 
 
@@ -76,13 +75,12 @@ class RigidResponse(Measure):
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Integrate the one unknown over slip, twice at different tolerances for the error."""
         log_rate = scene.log_load_rate
-        lowest = steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, scene.cot_phi)
         if log_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
-        if log_rate <= lowest:
+        sliding = steady_sliding(scene, log_rate)
+        if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
-        start = friction_after_step(scene, log_rate)
-        steady = _steady_stress(scene, log_rate)
+        start, steady = friction_after_step(scene, log_rate), sliding.friction
         level = steady + (start - steady) / math.e
         distance, left, rows = self._follow(scene, start, level, accuracy.solver, meter)
         loose, _left, _rows = self._follow(scene, start, level, 10.0 * accuracy.solver, meter)
@@ -101,7 +99,7 @@ class RigidResponse(Measure):
                 "closed_form_misfit": _closed_form_misfit(scene, slip, rows[:, 0]),
                 "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
-                "normal_stress_ratio": 1.0 + scene.cot_phi * rows[:, 0],
+                "normal_stress_ratio": rows[:, 2],
                 "state_variable": rows[:, 1],
             },
         )
@@ -109,11 +107,11 @@ class RigidResponse(Measure):
     def _follow(
         self, scene: Scene, start: float, level: float, tolerance: float, meter: Meter
     ) -> tuple[float, float, np.ndarray]:
-        """Slip at which stress passes the level, stress after D_c, and (stress, state) at the
-        points.
+        """Slip at which stress passes the level, stress after D_c, and (stress, state, normal
+        stress) at the points.
         """
         at = self.inner_coordinates["slip"]
-        rows: list[tuple[float, float]] = []
+        rows: list[tuple[float, float, float]] = []
         distance = left = math.nan
         equations = rigid(scene, scene.log_load_rate)
         for step in steps(equations, [start], tolerance, meter):
@@ -124,7 +122,7 @@ class RigidResponse(Measure):
                 left = step.point_at(1.0).friction
             while len(rows) < len(at) and at[len(rows)] <= step.end:
                 point = step.point_at(float(at[len(rows)]))
-                rows.append((point.friction, point.imbalance - scene.b * scene.log_load_rate))
+                rows.append((point.friction, point.state, point.normal_stress))
             if len(rows) == len(at) and not math.isnan(distance):
                 return distance, left, np.array(rows)
         raise Halt(Status.INTEGRATION_FAILED, "a response ended by itself")
@@ -138,7 +136,7 @@ def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> f
     the slowness law and ``b ln(V/V_*) exp(-slip/D_c)`` for the slip law (eqs. 17a and 17b of the
     paper, less mu_* sigma + a sigma ln(V/V_*), which they leave out).
     """
-    if scene.normal_stress == "variable":
+    if scene.parts.normal_stress.effects:
         return math.nan
     rate = scene.log_load_rate
     evolving = {
@@ -151,24 +149,18 @@ def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> f
     return float(np.abs(stress - exact).max())
 
 
-def _steady_stress(scene: Scene, log_rate: float) -> float:
-    """Deviation of steady-state stress at ln(V/V_*)."""
-    mu_ss = steady_state.steady_friction(log_rate, scene.mu_star, scene.a, scene.b)
-    return steady_state.steady_shear_stress(mu_ss, scene.mu_star, scene.cot_phi)
-
-
 def _asymmetry(scene: Scene, log_rate: float) -> dict[str, float]:
     """How much more a step changes than its inverse: at once, and over its evolution to the new
     steady state.
 
     NaN where the inverse step has no steady state to go to.
     """
-    lowest = steady_state.lowest_log_rate(scene.mu_star, scene.a, scene.b, scene.cot_phi)
-    if -log_rate <= lowest:
+    steady, inverse_steady = (steady_sliding(scene, x) for x in (log_rate, -log_rate))
+    if steady is None or inverse_steady is None:
         return {}
     direct, inverse = (friction_after_step(scene, x) for x in (log_rate, -log_rate))
-    evolves = direct - _steady_stress(scene, log_rate)
-    inverse_evolves = inverse - _steady_stress(scene, -log_rate)
+    evolves = direct - steady.friction
+    inverse_evolves = inverse - inverse_steady.friction
     return {
         "direct_asymmetry": -direct / inverse - 1.0,
         "evolution_asymmetry": -evolves / inverse_evolves - 1.0,
@@ -179,18 +171,15 @@ def friction_after_step(scene: Scene, log_rate: float) -> float:
     """Deviation of frictional stress just after a step to ln(V/V_*), the state freed of normal
     stress unchanged.
 
-    Solves ``strength(g) = a ln(V/V_*)``; strength grows with g.
-
     Raises
     ------
     Halt
         With `normal_stress_lost` where no stress above the fault's opening is that weak, and
         `locked` where none is that strong.
     """
-    strength, wanted = strength_of(scene), scene.a * log_rate
-    lowest = -1e3 if scene.cot_phi == 0.0 else -(1.0 - 1e-9) / scene.cot_phi
-    if strength(lowest)[0] >= wanted:
+    friction = stress_after_jump(scene, scene.a * log_rate)
+    if friction is None and log_rate < 0.0:
         raise Halt(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
-    if strength(1e6)[0] <= wanted:
+    if friction is None:
         raise Halt(Status.LOCKED, "no stress is strong enough for the direct effect")
-    return float(brentq(lambda g: strength(g)[0] - wanted, lowest, 1e6, xtol=1e-16, rtol=1e-15))
+    return friction

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.boundaries.swing import swing
+from rsfstudy.boundaries.swing import orbits_may_close, swing
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
@@ -48,7 +48,7 @@ class Triggered(Measure):
         accuracies = accuracy, accuracy.refined()
         answer, again = (swing(scene, asked, meter).reached for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
-        neutral = scene.normal_stress == "constant" and (
+        neutral = orbits_may_close(scene) and (
             0.0 < abs(scene.stiffness_ratio - 1.0) < 10.0 * accuracy.rtol
         )
         if answer != again or neutral:

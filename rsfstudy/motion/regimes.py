@@ -6,20 +6,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Halt, Meter, Step, steps
 from rsfstudy.slider.equations import (
-    LARGEST_EXPONENT,
-    SLOWEST,
     Equations,
-    Point,
-    inertial,
-    slow_manifold,
+    between_ruptures,
+    in_rupture,
     without_mass,
 )
+from rsfstudy.slider.forms import SLOWEST, Point
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.slots import LARGEST_EXPONENT
 from rsfstudy.status import Status
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
@@ -72,7 +71,7 @@ def motion(
         equations, state = without_mass(scene, clock=clock), _start(*start, clock)
         yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
         return
-    slow, fast = slow_manifold(scene, clock=clock), inertial(scene)
+    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene)
     handover = _Handover(scene, slow, accuracy)
     point = handover.slow_point(*start)
     rises = from_steady_sliding and handover.slip_of_rise(point) > accuracy.landing
@@ -81,7 +80,7 @@ def motion(
     elif from_steady_sliding:
         # a sudden step moves the spring alone; slip rate and friction follow within the inertial
         # time
-        point = replace(point, log_rate=0.0, friction=0.0)
+        point = point._replace(log_rate=0.0, friction=0.0)
     while True:
         point = yield from _rupture(scene, fast, point, handover, accuracy, meter)
         point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
@@ -103,7 +102,8 @@ class _Handover:
 
     def slow_point(self, spring: float, psi: float) -> Point:
         """The point of the slow manifold with this spring stress and state."""
-        return self.slow.point((spring, psi), (0.0, 0.0))
+        found: Point = self.slow.point((spring, psi), (0.0, 0.0), self.slow.p)
+        return found
 
     def weight_of_mass(self, point: Point) -> float:
         """How much mass matters: 1 where the slow manifold has to be left."""
@@ -158,11 +158,8 @@ def error_of_slow_manifold(scene: Scene) -> float:
 def check_start(scene: Scene) -> None:
     """Refuse a displacement step that leaves no friction of forward slip to integrate."""
     spring = scene.spring_stress_step
-    if 1.0 + scene.cot_phi * spring <= 0.0:
-        raise Halt(
-            Status.NORMAL_STRESS_LOST,
-            f"the step takes normal stress to {1.0 + scene.cot_phi * spring:.3g} sigma_*",
-        )
+    if spring <= scene.parts.normal_stress.weakest(scene):
+        raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     if scene.mu_star + spring <= 0.0:
         raise Halt(
             Status.SHEAR_STRESS_REVERSED,
@@ -221,7 +218,7 @@ def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
     Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
     """
     for step in moving:
-        ratio = 1.0 + scene.cot_phi * step.after.friction
+        ratio = step.after.normal_stress
         if ratio <= LOST:
             raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
         if ratio >= LOCKED:

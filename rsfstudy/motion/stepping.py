@@ -10,7 +10,8 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import LONGEST_STEP, Equations, Point
+from rsfstudy.slider.equations import LONGEST_STEP, Equations
+from rsfstudy.slider.forms import Point
 from rsfstudy.status import Status
 
 Vector = np.ndarray
@@ -95,7 +96,7 @@ class Step:
         """What the slider does at an instant within the step."""
         state = self.state_at(clock).tolist()
         self.meter.charge(self.equations.regime, 1)
-        return self.equations.point(state, self.equations.rate(clock, state))
+        return self.equations.at(state)
 
     def locate(self, what: Callable[[Point], float]) -> float:
         """Clock at which ``what(point)`` changes sign; its sign must differ at the two ends."""
@@ -158,13 +159,14 @@ def steps(
         With `work_budget_spent`, or `integration_failed` when SciPy gives up, a step has no length,
         or a number is not finite.
     """
-    regime = equations.regime
+    regime, rate_of, p = equations.regime, equations.rate, equations.p
     method = meter.method_of(regime)
     tolerance = max(tolerance, _TIGHTEST)
 
-    def rate(clock: float, unknowns: Vector) -> list[float]:
+    def rate(_clock: float, unknowns: Vector) -> list[float]:
         meter.charge(regime, 1)
-        return equations.rate(clock, unknowns.tolist())
+        found: list[float] = rate_of(unknowns.tolist(), p)
+        return found
 
     def started(unknowns: Vector) -> OdeSolver:
         return method(
@@ -180,7 +182,7 @@ def steps(
     # what limits a step must differ between two tolerances whose results are to tell errors
     finer = (tolerance / _TOLERANCE_OF_STRIDES) ** 0.125
     solver, jacobians = started(np.asarray(state, dtype=float)), 0
-    before = equations.point(solver.y.tolist(), _rates(solver, rate))
+    before = equations.point(solver.y.tolist(), _rates(solver, rate), p)
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
         # checked
@@ -200,7 +202,7 @@ def steps(
             raise Halt(
                 Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}"
             )
-        after = equations.point(unknowns, _rates(solver, rate))
+        after = equations.point(unknowns, _rates(solver, rate), p)
         yield Step(
             equations,
             float(solver.t_old),

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rsfstudy.motion.stepping import Step
-from rsfstudy.slider.equations import Point
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
 #: What is observed along a motion, in this order.
@@ -59,8 +59,8 @@ def observed(scene: Scene, point: Point, time: float, origin: float) -> tuple[fl
         point.log_rate / math.log(10.0),
         scene.mu_star + point.spring,
         scene.mu_star + point.friction,
-        1.0 + scene.cot_phi * point.friction,
-        point.imbalance - scene.b * point.log_rate,
+        point.normal_stress,
+        point.state,
     )
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots import Panel
-from rsfstudy.plots._phase_plane import LN10, constant_state_line, cot_phi, label_axes, steady_line
+from rsfstudy.plots._phase_plane import LN10, constant_state_line, coupling, label_axes, steady_line
 from rsfstudy.vocabulary import quantity
 
 #: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
@@ -38,12 +38,12 @@ def _phase_plane(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
         )
     reach, height = np.array(axes.get_xlim(), dtype=float), axes.get_ylim()
     rates = np.linspace(reach[0], reach[1], 200)
-    drawn: set[float] = set()
+    drawn: set[tuple[str, float]] = set()
     top = height[0] + 0.96 * (height[1] - height[0])
     for number, (cell, _label) in enumerate(cells):
-        if cot_phi(cell) in drawn:
+        if coupling(cell) in drawn:
             continue
-        drawn.add(cot_phi(cell))
+        drawn.add(coupling(cell))
         axes.plot(rates, steady_line(cell, rates), "--", color=f"C{number}", linewidth=0.8)
         for state in _STATES:
             theta = -state * LN10 * float(cell["a"]) * float(cell["b_over_a"])
@@ -126,7 +126,7 @@ def _cells(dataset: xr.Dataset, law: int) -> list[tuple[xr.Dataset, str]]:
 
 def _counts(cell: xr.Dataset, dimension: str) -> bool:
     """Whether a dimension says anything of a cell: angles do not at constant normal stress."""
-    return not (dimension in ("phi", "alpha") and cot_phi(cell) == 0.0)
+    return not (dimension in ("phi", "alpha") and coupling(cell)[0] == "constant")
 
 
 def _place(cell: xr.Dataset, dimension: str) -> str:

@@ -1,22 +1,128 @@
-"""The Scene: which slider. Law, effects, parameters and loading, checked when it is made."""
+"""The Scene: which slider. Four parts and the numbers every slider has, checked when made."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
-from numbers import Real
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import FrozenInstanceError, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, get_type_hints
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import laws, loading, steady_state
-from rsfstudy.slider.effects.inertia import inertial_time
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
+from rsfstudy.slider.loading.step import Step
+from rsfstudy.slider.parts import Numbers, Part, checked, names_of, number, quantities_of
 
-NORMAL_STRESSES = ("constant", "variable")
-_DEFAULT_ALPHA = 0.56
-_DEFAULT_PHI = 60.0
+_POSITIVE = "must be greater than 0"
 
 
 @dataclass(frozen=True, kw_only=True)
+class Slider(Part):
+    """The numbers that every slider has."""
+
+    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=_POSITIVE)
+    mu_star: float = number(
+        0.76,
+        r"$\mu_*$",
+        "1",
+        "steady-state friction coefficient at the reference rate",
+        rule=_POSITIVE,
+    )
+    stiffness_ratio: float = number(
+        1.0, r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star", rule=_POSITIVE
+    )
+    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=_POSITIVE)
+    reference_rate: float = number(
+        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=_POSITIVE
+    )
+    instability_norm: float = number(
+        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
+    )
+
+    name = "slider"
+
+
+@dataclass(frozen=True)
+class _Slot:
+    """What a scene has one of: the choices by name, and the one that is meant where none is
+    named.
+    """
+
+    name: str
+    choices: Mapping[str, type[Part]]
+    default: str
+    long_name: str
+
+    @property
+    def is_named(self) -> bool:
+        """Whether a field of a scene names the choice; else a field of a part calls for it."""
+        return not any(part.called_by for part in self.choices.values())
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """The field that names the choice, if one does."""
+        return (self.name,) if self.is_named else ()
+
+
+SLOTS: tuple[_Slot, ...] = (
+    _Slot("law", laws.PARTS, "slip", "state evolution law"),
+    _Slot("normal_stress", normal_stress.PARTS, "variable", "normal stress condition"),
+    _Slot("dynamics", dynamics.PARTS, "quasi_static", "what balances the spring besides friction"),
+    _Slot("loading", loading.PARTS, "step", "what the load point does"),
+)
+#: Slots of which there is a choice to be named.
+_NAMED = tuple(slot for slot in SLOTS if slot.is_named and len(slot.choices) > 1)
+_EVERY_PART: tuple[type[Part], ...] = (
+    Slider,
+    *(part for slot in SLOTS for part in slot.choices.values()),
+)
+_OWNERS: Mapping[str, type[Part]] = {
+    name: part for part in reversed(_EVERY_PART) for name in names_of(part)
+}
+#: Names of all fields of a scene.
+FIELDS: tuple[str, ...] = tuple(
+    dict.fromkeys(
+        [*(slot.name for slot in _NAMED), *(n for part in _EVERY_PART for n in names_of(part))]
+    )
+)
+#: What they mean.
+QUANTITIES: tuple[Quantity, ...] = (
+    *(Quantity(slot.name, "", "", slot.long_name) for slot in _NAMED),
+    *(q for part in _EVERY_PART for q in quantities_of(part)),
+)
+
+
+def _kind(name: str) -> Any:
+    """What a field of a scene holds; None where the part that owns it was not chosen."""
+    part = _OWNERS[name]
+    kind = get_type_hints(part)[name]
+    chosen = (
+        part is Slider
+        or part.called_by
+        or all(
+            name in names_of(choice)
+            for slot in SLOTS
+            for choice in slot.choices.values()
+            if part in slot.choices.values()
+        )
+    )
+    return kind if chosen else kind | None
+
+
+#: What the fields hold.
+KINDS: Mapping[str, Any] = {slot.name: str for slot in _NAMED} | {n: _kind(n) for n in _OWNERS}
+
+
+class Parts(NamedTuple):
+    """What fills the slots of a scene."""
+
+    law: laws.Law
+    normal_stress: normal_stress.NormalStress
+    dynamics: dynamics.Dynamics
+    loading: Step
+
+
 class Scene:
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
@@ -27,7 +133,7 @@ class Scene:
     Parameters
     ----------
     law : {"slip", "slowness"}
-        State evolution law; any module of `rsfstudy.slider.laws`.
+        State evolution law; any file of `rsfstudy.slider.laws`.
     normal_stress : {"constant", "variable"}
         Constant, or coupled to shear stress by a driving stress inclined at `phi`.
     alpha : float, optional
@@ -60,146 +166,84 @@ class Scene:
     instability_norm : float
         A motion counts as unstable once V T/(2 pi D_c) reaches this norm.
 
+    Attributes
+    ----------
+    parts : Parts
+        What fills the slots: ``law``, ``normal_stress``, ``dynamics`` and ``loading``.
+
     Raises
     ------
     InvalidValue
         For a value that is wrong or means nothing, with the rule it breaks and the remedy.
     """
 
-    law: str = "slip"
-    normal_stress: str = "variable"
-    alpha: float | None = None
-    phi: float | None = None
-    a: float = 0.0145
-    b_over_a: float = 2.0
-    mu_star: float = 0.76
-    stiffness_ratio: float = 1.0
-    load_velocity_ratio: float | None = None
-    displacement_step: float = 0.0
-    inertia: bool = False
-    radiation_damping: float = 0.0
-    period: float = 5.0
-    reference_rate: float = 1.17e-8
-    instability_norm: float = 5e-4
+    parts: Parts
+    if TYPE_CHECKING:
+        a: float
+        mu_star: float
+        stiffness_ratio: float
+        period: float
+        reference_rate: float
+        instability_norm: float
 
-    def __new__(cls, **fields: Any) -> Scene:
-        """A scene to be filled in, unless a name is no field of one."""
-        for name in fields:
-            if name not in cls.__dataclass_fields__:
+        def __getattr__(self, name: str) -> Any: ...
+
+    def __init__(self, **given: Any) -> None:
+        for name in given:
+            if name not in FIELDS:
                 raise unknown_field(name)
-        return super().__new__(cls)
+        chosen = {slot.name: _chosen(slot, given) for slot in SLOTS}
+        values = dict.fromkeys(FIELDS)
+        values |= {slot.name: chosen[slot.name].name for slot in _NAMED}
+        slider = Slider(**_values(Slider, given))
+        parts = Parts(**{name: part(**_values(part, given)) for name, part in chosen.items()})  # type: ignore[arg-type]
+        for slot in SLOTS:
+            _refuse_others(slot, chosen[slot.name], given, values)
+        for part in (slider, *parts):
+            values |= {name: getattr(part, name) for name in names_of(type(part))}
+        self.__dict__.update(values, parts=parts)
+        for part in parts:
+            part.check(self)
 
-    def __post_init__(self) -> None:
-        _check_choice("law", self.law, laws.NAMES)
-        _check_choice("normal_stress", self.normal_stress, NORMAL_STRESSES)
-        if not _is_flag(self.inertia):
-            raise InvalidValue("inertia", self.inertia, "must be true or false")
-        object.__setattr__(self, "inertia", bool(self.inertia))
-        for name in ("a", "b_over_a", "mu_star", "stiffness_ratio", "period", "reference_rate"):
-            self._set_number(name, positive=True)
-        self._set_number("instability_norm", positive=True)
-        self._set_number("displacement_step")
-        self._set_number("radiation_damping")
-        if self.load_velocity_ratio is not None:
-            self._set_number("load_velocity_ratio")
-        self._check_effects()
-        self._check_meaning()
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}")
 
-    def _set_number(self, name: str, *, positive: bool = False) -> None:
-        value = getattr(self, name)
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise InvalidValue(name, value, "must be a number")
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        if not math.isfinite(number):
-            raise InvalidValue(name, number, "must be finite")
-        if positive and number <= 0.0:
-            raise InvalidValue(name, number, "must be greater than 0")
-        object.__setattr__(self, name, number)
+    def __delattr__(self, name: str) -> NoReturn:
+        raise FrozenInstanceError(f"cannot delete field {name!r}")
 
-    def _check_effects(self) -> None:
-        if self.normal_stress == "constant":
-            for name in ("alpha", "phi"):
-                value = getattr(self, name)
-                if value is not None:
-                    raise InvalidValue(
-                        name,
-                        value,
-                        "has no meaning while normal stress is constant",
-                        remedy=f"Leave {name} out, or set normal_stress='variable'.",
-                    )
-            return
-        if self.alpha is None:
-            object.__setattr__(self, "alpha", _DEFAULT_ALPHA)
-        if self.phi is None:
-            object.__setattr__(self, "phi", _DEFAULT_PHI)
-        self._set_number("alpha")
-        self._set_number("phi", positive=True)
-        assert self.alpha is not None
-        assert self.phi is not None
-        if self.alpha < 0.0:
-            raise InvalidValue("alpha", self.alpha, "must be 0 or greater")
-        if self.phi >= 90.0:
-            raise InvalidValue(
-                "phi",
-                self.phi,
-                "must lie between 0 and 90 degrees",
-                remedy="At 90 degrees it no longer varies: set normal_stress='constant'.",
-            )
-        lowest = math.degrees(math.atan(self.mu_star))
-        if self.phi <= lowest:
-            raise InvalidValue(
-                "phi",
-                self.phi,
-                f"must exceed atan(mu_star) = {lowest:.6g} degrees: sigma_3 is negative below",
-                remedy="Raise phi or lower mu_star.",
-            )
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.as_dict() == other.as_dict()
 
-    def _check_meaning(self) -> None:
-        if self.radiation_damping < 0.0:
-            raise InvalidValue("radiation_damping", self.radiation_damping, "must be 0 or greater")
-        if self.radiation_damping > 0.0 and self.inertia:
-            raise InvalidValue(
-                "radiation_damping",
-                self.radiation_damping,
-                "stands in for mass, and this scene has mass",
-                remedy="Leave one of them out.",
-            )
-        if self.b_over_a <= 1.0:
-            raise InvalidValue(
-                "b_over_a",
-                self.b_over_a,
-                "must exceed 1: without rate weakening there is no critical stiffness",
-                remedy="Steady sliding is then stable at every stiffness.",
-            )
-        if self.load_velocity_ratio is not None and self.load_velocity_ratio < 0.0:
-            raise InvalidValue(
-                "load_velocity_ratio",
-                self.load_velocity_ratio,
-                "must be 0 or greater",
-                remedy="0 holds the load point.",
-            )
+    def __hash__(self) -> int:
+        return hash(tuple(self.as_dict().values()))
+
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made, (self.as_dict(),)
 
     # ---- what follows from the parameters -------------------------------------------------------
 
     @property
+    def dynamics(self) -> dynamics.Dynamics:
+        """What balances the spring besides friction."""
+        return self.parts.dynamics
+
+    @property
     def b(self) -> float:
         """Evolution effect parameter."""
-        return self.a * self.b_over_a
+        return float(self.a * self.b_over_a)
 
-    @property
-    def cot_phi(self) -> float:
-        """d sigma/d tau: cot(phi), and 0 at constant normal stress."""
-        return 0.0 if self.phi is None else 1.0 / math.tan(math.radians(self.phi))
-
-    @property
+    @cached_property
     def critical_stiffness(self) -> float:
-        """k_cr(V_*) D_c/sigma_* (see `steady_state.critical_stiffness`)."""
-        return steady_state.critical_stiffness(
-            0.0, self.mu_star, self.a, self.b, self.cot_phi, self.alpha or 0.0
-        )
+        """k_cr(V_*) D_c/sigma_*, without mass or damping (see `steady.critical_stiffness`)."""
+        return steady.critical_stiffness(self, 0.0, quasi_static=True)
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        """All numbers, as the functions of the equations read them (see `assembly`)."""
+        return assembly.numbers(self)
 
     @property
     def stiffness(self) -> float:
@@ -209,7 +253,7 @@ class Scene:
     @property
     def load_velocity(self) -> float:
         """V_0/V_* after the step."""
-        return loading.load_velocity(self.load_velocity_ratio, self.displacement_step)
+        return self.parts.loading.load_velocity
 
     @property
     def log_load_rate(self) -> float:
@@ -219,12 +263,15 @@ class Scene:
     @property
     def spring_stress_step(self) -> float:
         """Change of spring stress over sigma_* by the displacement step."""
-        return loading.spring_stress_step(self.displacement_step, self.stiffness)
+        return self.parts.loading.spring_stress(self.stiffness)
 
     @property
     def inertial_time(self) -> float:
-        """T V_*/(2 pi D_c)."""
-        return inertial_time(self.period, self.reference_rate)
+        """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
+
+        Slip rate in V_* times this number is what the instability norm is compared with.
+        """
+        return self.period * self.reference_rate / (2.0 * math.pi)
 
     @property
     def log_norm_rate(self) -> float:
@@ -234,43 +281,70 @@ class Scene:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that act in this scene."""
-        present = {
-            "inclined_driving": self.normal_stress == "variable",
-            "linker_dieterich": bool(self.alpha),
-            "inertia": self.inertia,
-            "radiation_damping": self.radiation_damping > 0.0,
-        }
-        return tuple(name for name, acts in present.items() if acts)
+        return tuple(effect for part in self.parts for effect in part.effects)
 
     def with_(self, **changes: Any) -> Scene:
         """A copy with some fields changed, checked anew.
 
-        Changing to constant normal stress drops `alpha` and `phi`.
+        Changing what fills a slot drops the fields that have no meaning any more.
         """
-        unknown = set(changes) - set(FIELDS)
-        if unknown:
-            raise unknown_field(sorted(unknown)[0])
-        if changes.get("normal_stress") == "constant":
-            changes = {"alpha": None, "phi": None} | changes
-        return replace(self, **changes)
+        for name in sorted(changes):
+            if name not in FIELDS:
+                raise unknown_field(name)
+        kept = self.as_dict()
+        for slot in _NAMED:
+            part = slot.choices.get(changes.get(slot.name, kept[slot.name]))
+            if part is not None:
+                others = {n for other in slot.choices.values() for n in names_of(other)}
+                kept |= dict.fromkeys(others - set(names_of(part)))
+        return Scene(**kept | changes)
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
-        return {name: getattr(self, name) for name in FIELDS}
+        return {name: self.__dict__[name] for name in FIELDS}
 
 
-FIELDS: tuple[str, ...] = tuple(field.name for field in fields(Scene))
+def _made(values: dict[str, Any]) -> Scene:
+    return Scene(**values)
+
+
+def _chosen(slot: _Slot, given: Mapping[str, Any]) -> type[Part]:
+    """The part that is asked for in a slot."""
+    if slot.is_named:
+        name = given.get(slot.name, slot.default)
+        if not isinstance(name, str) or name not in slot.choices:
+            raise InvalidValue(slot.name, name, "is unknown", choices=slot.choices)
+        return slot.choices[name]
+    for part in slot.choices.values():
+        value = given.get(part.called_by)
+        if value is not None and checked(part, part.called_by, value):
+            return part
+    return slot.choices[slot.default]
+
+
+def _values(part: type[Part], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What is given for the fields of a part, checked; what is not stays as it is by default."""
+    names = (name for name in names_of(part) if given.get(name) is not None)
+    return {name: checked(part, name, given[name]) for name in names}
+
+
+def _refuse_others(
+    slot: _Slot, chosen: type[Part], given: Mapping[str, Any], values: dict[str, Any]
+) -> None:
+    """Refuse values for the fields of parts that were not chosen, but for what calls none of them:
+    a field that calls for a part is there in every scene, with the value that does not.
+    """
+    for part in slot.choices.values():
+        for name in set(names_of(part)) - set(names_of(chosen)):
+            value = given.get(name)
+            if name == part.called_by:
+                values[name] = part.__dataclass_fields__[name].default
+                if value is None or not checked(part, name, value):
+                    continue
+            if value is not None:
+                raise chosen.refuse(name, value)
 
 
 def unknown_field(name: str) -> InvalidValue:
     """The error for a name that is no field of a scene."""
     return InvalidValue("field", name, "is not a field of a scene", choices=FIELDS)
-
-
-def _is_flag(value: object) -> bool:
-    return isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
-
-
-def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
-    if not isinstance(value, str) or value not in choices:
-        raise InvalidValue(name, value, "is unknown", choices=choices)

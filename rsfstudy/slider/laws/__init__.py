@@ -1,25 +1,58 @@
-"""State evolution laws, one file each, found by file name.
+"""State evolution laws, one file each.
 
-A law is a module with ``evolution(log_rate, state, b)``: the change of the state variable per unit
-of slip at constant normal stress. The state variable is written so that every law shares
+The state variable is written so that every law shares
 
-    tau = sigma * (mu_* + a ln(V/V_*) + Theta),
+    tau = sigma (mu_* + a ln(V/V_*) + Theta),
 
 which for the slowness law means Theta = b ln(theta/theta_*).
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
-Evolution = Callable[[float, float, float], float]
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
 
-NAMES: tuple[str, ...] = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__)))
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 
-def evolution_of(law: str) -> Evolution:
-    """The evolution function of the law of this name."""
-    evolution: Evolution = importlib.import_module(f"{__name__}.{law}").evolution
-    return evolution
+@dataclass(frozen=True, kw_only=True)
+class Law(Part):
+    """Base of the laws.
+
+    A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
+    slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*).
+    """
+
+    b_over_a: float = number(
+        2.0,
+        "$b/a$",
+        "1",
+        "ratio of evolution effect to direct effect",
+        rule="must be greater than 0",
+    )
+
+    evolution: ClassVar[Function]
+    #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
+    #: state variable, and its derivative with respect to friction; none for most laws.
+    state_effect: ClassVar[Function | None] = None
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """b."""
+        return (scene.a * self.b_over_a,)
+
+    def check(self, scene: Scene) -> None:
+        """Rate weakening."""
+        if self.b_over_a <= 1.0:
+            raise InvalidValue(
+                "b_over_a",
+                self.b_over_a,
+                "must exceed 1: without rate weakening there is no critical stiffness",
+                remedy="Steady sliding is then stable at every stiffness.",
+            )
+
+
+PARTS = found_in(__name__, __path__)

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 
-def evolution(log_rate: float, state: float, b: float) -> float:
+from rsfstudy.slider.laws import Law
+from rsfstudy.slider.parts import Numbers
+
+OWN = 0
+
+
+def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``D_c dTheta/d(delta) = -(Theta + b ln(V/V_*))``
@@ -14,8 +21,8 @@ def evolution(log_rate: float, state: float, b: float) -> float:
         ln(V/V_*).
     state : float
         State variable Theta.
-    b : float
-        Evolution effect parameter.
+    p : tuple of float
+        Evolution effect parameter b, at OWN.
 
     Returns
     -------
@@ -27,4 +34,12 @@ def evolution(log_rate: float, state: float, b: float) -> float:
     Ruina (1983), J. Geophys. Res. 88; Linker and Dieterich (1992), J. Geophys. Res. 97 (first term
     of their evolution law).
     """
-    return -(state + b * log_rate)
+    return -(state + p[OWN] * log_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlipLaw(Law):
+    """The slip law."""
+
+    name = "slip"
+    evolution = staticmethod(evolution)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
+from rsfstudy.slider.laws import Law
+from rsfstudy.slider.parts import Numbers
+
+OWN = 0
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
 #: motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
 
 
-def evolution(log_rate: float, state: float, b: float) -> float:
+def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``dtheta/dt = 1 - theta V/D_c`` with ``Theta = b ln(theta V_*/D_c)`` reads, per unit slip,
@@ -22,8 +27,8 @@ def evolution(log_rate: float, state: float, b: float) -> float:
         ln(V/V_*).
     state : float
         State variable Theta = b ln(theta/theta_*).
-    b : float
-        Evolution effect parameter.
+    p : tuple of float
+        Evolution effect parameter b, at OWN.
 
     Returns
     -------
@@ -34,4 +39,13 @@ def evolution(log_rate: float, state: float, b: float) -> float:
     ----------
     Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
     """
+    b = p[OWN]
     return b * math.expm1(min(-(state / b + log_rate), LARGEST_EXPONENT))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlownessLaw(Law):
+    """The slowness law."""
+
+    name = "slowness"
+    evolution = staticmethod(evolution)

@@ -1,0 +1,151 @@
+"""Inertia: the mass of the slider, through its period of free oscillation T.
+
+Where mass hardly acts, the motion follows the slow manifold of the full equations; where it does,
+the full equations themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.dynamics import Dynamics
+from rsfstudy.slider.parts import Numbers, flag
+from rsfstudy.slider.slots import (
+    LARGEST_EXPONENT,
+    LOAD_VELOCITY,
+    LOG_LOAD_RATE,
+    STIFFNESS,
+    A,
+    evolution,
+    evolving,
+    point_at,
+    strength,
+)
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+#: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
+#: manifold long before its slip rate relaxes that fast.
+LARGEST_RATE = 1e30
+
+
+def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]:
+    """Slip rate on the slow manifold, frictional stress, and the state lost to normal stress.
+
+    Friction has the stress of the spring less what accelerates the mass, to first order in inertia:
+    ``K w (w + w_0) dx`` with dx the quasi-static growth of ln V per unit of combined displacement
+    (slip and load point), w = V T/(2 pi D_c) and w_0 the same of the load point velocity. The error
+    is of order w**4.
+
+    Parameters
+    ----------
+    spring : float
+        Deviation f of spring stress from tau_*, over sigma_*.
+    psi : float
+        State freed of normal stress.
+    p : tuple of float
+        T V_*/(2 pi D_c) at OWN, and its logarithm.
+    """
+    a = p[A]
+    x, change = without_mass(spring, psi, p)
+    norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
+    resistance = p[STIFFNESS] * norm * (norm + p[LOAD_VELOCITY] * p[OWN]) * change
+    # the bound is far more than the motion meets before it leaves the slow manifold, so that trial
+    # steps beyond keep their sense of direction
+    friction = spring - max(-a, min(resistance, a))
+    value, _slope, shift, _shift_slope = strength(friction, p)
+    return (value - psi) / a, friction, shift
+
+
+def without_mass(spring: float, psi: float, p: Numbers) -> tuple[float, float]:
+    """ln(V/V_*) and its growth, both quasi-static."""
+    a = p[A]
+    value, slope, shift, _shift_slope = strength(spring, p)
+    x = (value - psi) / a
+    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
+    return x, (slope * loading - evolving(x, psi - shift, p)) / a
+
+
+def growth(
+    spring: float,
+    psi: float,
+    log_rate: float,
+    friction: float,
+    rates: tuple[float, float],
+    p: Numbers,
+) -> float:
+    """The quasi-static one: mass does not act where ln V is at rest."""
+    return without_mass(spring, psi, p)[1]
+
+
+def rupture_rate(state: Numbers, p: Numbers) -> list[float]:
+    """The full equations: three unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi).
+
+        df = K (w_0 - w),   dx = (f - g)/(K w),   strength'(g) dg = a dx + w dPsi/d(delta),
+
+    with w = V T/(2 pi D_c), from m d2(delta)/dt2 = k (delta_0 - delta) - tau and m/k = (T/2 pi)**2.
+    Keeping g as an unknown needs no inverse of `strength`.
+    """
+    spring, x, friction = state[0], state[1], state[2]
+    a, stiffness = p[A], p[STIFFNESS]
+    norm = math.exp(max(min(x + p[OWN + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
+    value, slope, shift, _shift_slope = strength(friction, p)
+    faster = bounded((spring - friction) / (stiffness * norm))
+    weakening = norm * evolution(x, value - shift - a * x, p)
+    return [
+        bounded(stiffness * (p[LOAD_VELOCITY] * p[OWN] - norm)),
+        faster,
+        bounded((a * faster + weakening) / slope),
+    ]
+
+
+def bounded(rate: float) -> float:
+    """A rate that a motion meets, or the largest."""
+    return max(min(rate, LARGEST_RATE), -LARGEST_RATE)
+
+
+def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[float, ...]:
+    """What the slider does where mass acts."""
+    spring, x, friction = float(state[0]), float(state[1]), float(state[2])
+    psi = strength(friction, p)[0] - p[A] * x
+    return point_at(x, float(rates[1]), spring, friction, psi, p)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertia(Dynamics):
+    """A slider with mass."""
+
+    inertia: bool = flag(False, "whether the slider has mass")
+
+    name = "inertia"
+    called_by = "inertia"
+    regime = "slow_manifold"
+    balance = staticmethod(balance)
+    growth = staticmethod(growth)
+    rupture_rate = staticmethod(rupture_rate)
+    rupture_point = staticmethod(rupture_point)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return ("inertia",)
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """T V_*/(2 pi D_c) and its logarithm."""
+        return scene.inertial_time, math.log(scene.inertial_time)
+
+    def norm(self, scene: Scene, log_rate: float) -> float:
+        return scene.inertial_time * math.exp(log_rate)
+
+    @classmethod
+    def refuse(cls, name: str, value: Any) -> InvalidValue:
+        return InvalidValue(
+            name,
+            value,
+            "stands in for mass, and this scene has mass",
+            remedy="Leave one of them out.",
+        )

@@ -1,0 +1,136 @@
+"""Radiation damping: waves carry stress away in proportion to slip rate (quasi-dynamic motion)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.dynamics import Dynamics
+from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.slots import LARGEST_EXPONENT, A, strength
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+_MOST_ITERATIONS = 200
+_SETTLED = 1e-15
+#: ln V beyond which only trial steps look for a balance: radiation would be 10^300 eta.
+_FASTEST = 690.0
+
+
+def radiated(log_rate: float, damping: float) -> float:
+    """Stress that waves carry away, over sigma_*: ``eta (V - V_*)``, so that it vanishes at V_*.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    damping : float
+        eta V_*/sigma_*; for an elastic half-space eta = G/(2 c_s).
+
+    References
+    ----------
+    Rice (1993), J. Geophys. Res. 98, 9885-9907.
+    """
+    return damping * math.expm1(log_rate)
+
+
+def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]:
+    """ln(V/V_*) at which friction and radiation together balance the spring, the frictional stress
+    there, and the state lost to normal stress.
+
+    Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
+    V and the right side grows, so there is one root, which bisection keeps in its bracket where
+    Newton's steps would leave it or shrink too slowly.
+
+    Parameters
+    ----------
+    spring : float
+        Deviation f of spring stress from tau_*, over sigma_*.
+    psi : float
+        State freed of normal stress.
+    p : tuple of float
+        eta V_*/sigma_*, at OWN.
+    """
+    a, damping = p[A], p[OWN]
+    # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
+    low, high = -math.inf, min((strength(spring + damping, p)[0] - psi) / a, _FASTEST)
+    # a good guess where radiation takes most of the stress
+    x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
+    before = math.inf
+    for _ in range(_MOST_ITERATIONS):
+        friction = spring - damping * math.expm1(x)
+        value, slope, shift, _shift_slope = strength(friction, p)
+        missing = value - psi - a * x
+        if missing > 0.0:
+            low = x
+        else:
+            high = x
+        change = missing / (a + slope * damping * math.exp(x))
+        if abs(change) <= _SETTLED * (1.0 + abs(x)):
+            return x, friction, shift
+        # where normal stress is nearly lost, slopes are so steep that Newton's steps lead nowhere
+        slow = abs(change) > 0.5 * abs(before)
+        before = change
+        if slow or not low < x + change <= high:
+            before = math.inf
+            x = 0.5 * (max(low, high - 1e3) + high)
+        else:
+            x += change
+    friction = spring - damping * math.expm1(x)
+    return x, friction, strength(friction, p)[2]
+
+
+def growth(
+    spring: float,
+    psi: float,
+    log_rate: float,
+    friction: float,
+    rates: tuple[float, float],
+    p: Numbers,
+) -> float:
+    """``[a + strength'(g) eta V] d ln V = strength'(g) df - dPsi``."""
+    slope = strength(friction, p)[1]
+    resists = p[A] + slope * p[OWN] * math.exp(min(log_rate, LARGEST_EXPONENT))
+    return (slope * rates[0] - rates[1]) / resists
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadiationDamping(Dynamics):
+    """Friction and radiation share the stress of the spring, ``f = g + eta (V - V_*)``."""
+
+    radiation_damping: float = number(
+        0.0,
+        r"$\eta V_*/\sigma_*$",
+        "1",
+        "stress that waves carry away at V_star",
+        rule="must be 0 or greater",
+        scale="sigma_*",
+    )
+
+    name = "radiation_damping"
+    called_by = "radiation_damping"
+    regime = "quasi_dynamic"
+    balance = staticmethod(balance)
+    growth = staticmethod(growth)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return ("radiation_damping",)
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """eta V_*/sigma_*."""
+        return (self.radiation_damping,)
+
+    def radiated(self, log_rate: float) -> float:
+        return radiated(log_rate, self.radiation_damping)
+
+    def damping(self, log_rate: float) -> float:
+        return self.radiation_damping * math.exp(log_rate)
+
+    @classmethod
+    def refuse(cls, name: str, value: Any) -> InvalidValue:
+        return InvalidValue(name, value, "has no meaning where radiation stands in for mass")

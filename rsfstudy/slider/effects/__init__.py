@@ -1,3 +1,0 @@
-"""Optional effects, one file each: plain functions of floats that `equations` assembles for a
-scene.
-"""

@@ -1,0 +1,44 @@
+"""A step at the start: of load point velocity, of load point displacement, or of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rsfstudy.slider.parts import Part, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(Part):
+    """Load point velocity after the step, and displacement in the step."""
+
+    load_velocity_ratio: float | None = number(
+        None,
+        "$V_0/V_*$",
+        "1",
+        "load point velocity after the step",
+        rule="must be 0 or greater",
+        remedy="0 holds the load point.",
+        scale="V_*",
+    )
+    displacement_step: float = number(
+        0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", scale="D_c"
+    )
+
+    name = "step"
+
+    @property
+    def load_velocity(self) -> float:
+        """V_0/V_* after the step.
+
+        A scene that does not say otherwise holds its load point after a displacement step (V_0 = 0)
+        and otherwise goes on at the reference rate (V_0 = V_*).
+        """
+        if self.load_velocity_ratio is None:
+            return 1.0 if self.displacement_step == 0.0 else 0.0
+        return self.load_velocity_ratio
+
+    def spring_stress(self, stiffness: float) -> float:
+        """Instantaneous change of spring stress over sigma_*: ``K d`` for a displacement d in
+        D_c.
+        """
+        return stiffness * self.displacement_step

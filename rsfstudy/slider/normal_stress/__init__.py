@@ -1,0 +1,38 @@
+"""What becomes of normal stress while shear stress changes, one file a case."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from rsfstudy.slider.parts import Function, Part, found_in
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class NormalStress(Part):
+    """Base of the cases of normal stress.
+
+    A case states ``normal_stress(friction, p) -> (excess, change)``: normal stress over its
+    reference value less 1, and its derivative with respect to frictional stress over sigma_*. None
+    where normal stress is constant.
+    """
+
+    normal_stress: ClassVar[Function | None] = None
+
+    @property
+    def state_effect(self) -> Function | None:
+        """``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much normal stress
+        lowers the state variable, and its derivative with respect to friction.
+        """
+        return None
+
+    def weakest(self, scene: Scene) -> float:
+        """Deviation of frictional stress, over sigma_*, at which normal stress vanishes."""
+        return -math.inf
+
+
+PARTS = found_in(__name__, __path__)

@@ -1,0 +1,135 @@
+"""What a part is: one choice of a slot of the slider, with its fields and its functions of floats.
+
+A scene fills four slots: state evolution law, normal stress, dynamics and loading. Each choice is
+one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule, symbol,
+units and description. Its functions are plain functions of floats: they take the numbers of a scene
+as one flat tuple ``p``, in which those of the part begin at ``p[OWN]``. `assembly` puts them
+together.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from numbers import Real
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+Number = float | None
+#: A function of floats, the last argument being the numbers of a scene.
+Function = Callable[..., Any]
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """Base of all parts."""
+
+    #: What the part is called; a part that a field calls for by its value names that field instead.
+    name: ClassVar[str]
+    called_by: ClassVar[str] = ""
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """What the functions of the part read at ``p[OWN]``, ``p[OWN + 1]``, ..."""
+        return ()
+
+    def check(self, scene: Scene) -> None:
+        """Raise InvalidValue where its values do not go with one another or with the scene."""
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that act through this part."""
+        return ()
+
+    @classmethod
+    def refuse(cls, name: str, value: Any) -> InvalidValue:
+        """The error for a value of another part of the slot, which has no meaning here."""
+        return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy="Leave it out.")
+
+
+def number(
+    default: float | None,
+    symbol: str,
+    units: str,
+    long_name: str,
+    *,
+    rule: str = "",
+    remedy: str = "",
+    scale: str = "",
+) -> Any:
+    """A field that holds a number: its default, what it means, and its rule, a key of `RULES`."""
+    about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
+    return field(default=default, metadata={"about": about, "rule": rule, "remedy": remedy})
+
+
+def flag(default: bool, long_name: str) -> Any:
+    """A field that is true or false."""
+    about = {"symbol": "", "units": "", "long_name": long_name}
+    return field(default=default, metadata={"about": about, "rule": _FLAG, "remedy": ""})
+
+
+_FLAG = "must be true or false"
+#: What numbers may have to be.
+RULES: Mapping[str, Callable[[float], bool]] = {
+    "": lambda value: True,
+    "must be greater than 0": lambda value: value > 0.0,
+    "must be 0 or greater": lambda value: value >= 0.0,
+}
+
+
+def names_of(part: type[Part]) -> tuple[str, ...]:
+    """Names of the fields of a part."""
+    return tuple(f.name for f in fields(part))
+
+
+def quantities_of(part: type[Part]) -> list[Quantity]:
+    """What the fields of a part mean."""
+    return [Quantity(f.name, **f.metadata["about"]) for f in fields(part)]
+
+
+def checked(part: type[Part], name: str, value: Any) -> Any:
+    """A value for a field of a part, as Python's own number or flag.
+
+    Raises
+    ------
+    InvalidValue
+        Where it is none, or breaks the rule of the field.
+    """
+    stated = part.__dataclass_fields__[name]
+    rule, remedy = stated.metadata["rule"], stated.metadata["remedy"]
+    if value is None and stated.default is None:
+        return None
+    is_flag = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
+    if rule == _FLAG:
+        if not is_flag:
+            raise InvalidValue(name, value, rule)
+        return bool(value)
+    if is_flag or not isinstance(value, Real):
+        raise InvalidValue(name, value, "must be a number")
+    try:
+        plain = float(value)
+    except OverflowError:
+        plain = math.inf
+    if not math.isfinite(plain):
+        raise InvalidValue(name, plain, "must be finite")
+    if not RULES[rule](plain):
+        raise InvalidValue(name, plain, rule, remedy=remedy)
+    return plain
+
+
+def found_in(package: str, path: Iterable[str]) -> dict[str, type[Part]]:
+    """The parts of a folder, by name: one in each of its files."""
+    parts: dict[str, type[Part]] = {}
+    for file in sorted(module.name for module in pkgutil.iter_modules(path)):
+        module = importlib.import_module(f"{package}.{file}")
+        own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]
+        parts |= {p.name: p for p in own if p.__module__ == module.__name__}
+    return parts

@@ -1,0 +1,168 @@
+"""Steady sliding and its stability, as they follow from the friction relation: against the closed
+forms, the geometry, and the growth of the assembled equations.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import cot_phi
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from rsfstudy import Scene
+from rsfstudy.slider import closed_forms, laws, steady
+from rsfstudy.slider.equations import between_ruptures, in_rupture, normal_stress_at
+
+LAWS = st.sampled_from(sorted(laws.PARTS))
+RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
+
+
+def eq_7(scene: Scene, log_rate: float) -> float:
+    """``(b - a) sigma_ss / [1 - cot(phi) (mu_ss - alpha)]``, with sigma_ss in closed form."""
+    cot = cot_phi(scene)
+    mu_ss = scene.mu_star - (scene.b - scene.a) * log_rate
+    assume(mu_ss * cot < 0.99)
+    sigma_ss = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
+    return (scene.b - scene.a) * sigma_ss / (1.0 - cot * (mu_ss - (scene.alpha or 0.0)))
+
+
+@given(RATES, ANGLES, ALPHAS, LAWS)
+def test_critical_stiffness_is_eq_7_and_eq_8(log_rate, phi, alpha, law):
+    scene = Scene(law=law, phi=phi, alpha=alpha)
+    closed = eq_7(scene, log_rate)
+    explicit = closed_forms.critical_stiffness(
+        log_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
+    )
+    assert explicit == pytest.approx(closed, rel=1e-12)
+    # digits are lost where normal stress grows or vanishes, and in the arguments of the law
+    ours = steady.critical_stiffness(scene, log_rate)
+    assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_rate)))
+
+
+@pytest.mark.parametrize("law", sorted(laws.PARTS))
+def test_constant_normal_stress_has_b_minus_a(law):
+    scene = Scene(law=law, normal_stress="constant")
+    for log_rate in (-20.0, 0.0, 5.0):
+        critical = steady.critical_stiffness(scene, log_rate)
+        assert critical == pytest.approx(scene.b - scene.a, rel=1e-12)
+
+
+@given(st.floats(-6, -0.2), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
+def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_rate, phi, alpha, law):
+    """E M p**3 + (D M + a sigma) p**2 + [E K - (b-a) sigma] p + D K = 0 with M = K w**2 has purely
+    imaginary roots at K = K_cr/(1 - q), q = K_cr D w**2/(a sigma).
+    """
+    rate = math.exp(log_rate)
+    period = 2.0 * math.pi * 10.0**log_norm / (rate * 1.17e-8)
+    scene = Scene(law=law, phi=phi, alpha=alpha, inertia=True, period=period)
+    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
+    sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
+    q = eq_7(scene, log_rate) * (1.0 - mu_ss * cot) * 10.0 ** (2.0 * log_norm) / (scene.a * sigma)
+    ours = steady.critical_stiffness(scene, log_rate)
+    if q < 0.99:
+        assert ours == pytest.approx(eq_7(scene, log_rate) / (1.0 - q), rel=1e-11 / (1.0 - q))
+    elif q > 1.01:
+        assert ours == math.inf
+
+
+@given(st.floats(-25, -4), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
+def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_rate, phi, alpha, law):
+    """(a sigma + eta V E) p**2 + [E K + eta V D - (b-a) sigma] p + D K = 0 is neutral at K = K_cr -
+    eta V D/E.
+    """
+    damping = math.exp(log_damping)
+    scene = Scene(law=law, phi=phi, alpha=alpha, radiation_damping=damping)
+    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
+    share = (1.0 - mu_ss * cot) / (1.0 - mu_ss * cot + alpha * cot)
+    undamped = eq_7(scene, log_rate)
+    damped = undamped - damping * math.exp(log_rate) * share
+    ours = steady.critical_stiffness(scene, log_rate)
+    assert ours == pytest.approx(max(damped, 0.0), abs=1e-11 * undamped)
+
+
+@given(RATES, ANGLES)
+def test_steady_stresses_satisfy_the_inclined_geometry(log_rate, phi):
+    scene = Scene(phi=phi)
+    mu_ss = scene.mu_star - (scene.b - scene.a) * log_rate
+    assume(mu_ss * cot_phi(scene) < 0.99)
+    found = steady.steady_sliding(scene, log_rate)
+    ratio = normal_stress_at(scene, found.friction)
+    assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.friction, rel=1e-13)
+    assert scene.mu_star + found.friction == pytest.approx(mu_ss * ratio, rel=1e-11)
+
+
+def test_no_steady_state_below_the_slowest_rate():
+    scene = Scene()
+    slowest = steady.slowest_steady(scene)
+    mu_ss = scene.mu_star - (scene.b - scene.a) * slowest
+    assert mu_ss * cot_phi(scene) == pytest.approx(1.0, rel=1e-9)
+    assert steady.steady_sliding(scene, slowest + 1e-6) is not None
+    assert steady.steady_sliding(scene, slowest - 1e-6) is None
+    assert math.isnan(steady.critical_stiffness(scene, slowest - 1.0))
+    with pytest.raises(ValueError, match="no steady sliding"):
+        steady.growth_rates(scene, slowest - 1.0)
+    assert steady.slowest_steady(Scene(normal_stress="constant")) == -math.inf
+
+
+def test_faster_sliding_stabilises():
+    """C2: a stiffness that is critical at V_* is above critical at any larger V."""
+    scene = Scene()
+    for log_rate in (0.5, 2.0, 8.0):
+        assert steady.critical_stiffness(scene, log_rate) < scene.critical_stiffness
+
+
+def eigenvalues(equations, state) -> np.ndarray:
+    """Of the assembled equations around a steady state, the fastest growing first."""
+    state, columns = np.array(state), []
+    for unit, scale in zip(np.eye(len(state)), equations.scales, strict=True):
+        step = 1e-5 * scale * unit  # rounding and truncation balance
+        ahead, behind = (equations.rates((state + s).tolist()) for s in (step, -step))
+        columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
+    found = np.linalg.eigvals(np.array(columns).T)
+    return found[np.argsort(-found.real)]
+
+
+@pytest.mark.parametrize("law", sorted(laws.PARTS))
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"normal_stress": "constant"},
+        {"alpha": 0.0},
+        {"alpha": 0.56},
+        {"alpha": 0.9},
+        {"radiation_damping": 0.003},
+    ],
+)
+@pytest.mark.parametrize("log_rate", [-3.0, 0.0, 5.0])
+@pytest.mark.parametrize("ratio", [0.7, 1.3])
+def test_growth_rates_are_those_of_the_assembled_equations(law, effects, log_rate, ratio):
+    """Their clock is slip and load point displacement: twice as fast as slip."""
+    scene = Scene(law=law, load_velocity_ratio=math.exp(log_rate), **effects)
+    scene = scene.with_(stiffness_ratio=ratio)
+    found = steady.steady_sliding(scene, log_rate)
+    equations = between_ruptures(scene, clock=False)
+    assert np.abs(equations.rates((found.spring, found.psi))).max() < 1e-13
+    theirs = eigenvalues(equations, (found.spring, found.psi))
+    ours = 0.5 * steady.growth_rates(scene, log_rate)
+    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-7)
+
+
+def test_growth_rates_with_mass_are_those_of_the_full_equations():
+    """In inertial time: w times as much. At T = 1e8 s double precision sees mass in all three."""
+    scene = Scene(inertia=True, period=1e8, stiffness_ratio=0.9)
+    found = steady.steady_sliding(scene, 0.0)
+    theirs = eigenvalues(in_rupture(scene), (found.spring, 0.0, found.friction))
+    ours = scene.inertial_time * steady.growth_rates(scene, 0.0)
+    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
+
+
+@pytest.mark.parametrize("effects", [{}, {"inertia": True}, {"radiation_damping": 0.003}])
+def test_growth_vanishes_at_critical_stiffness(effects):
+    scene = Scene(load_velocity_ratio=2.0, period=1e6, **effects)
+    log_rate = scene.log_load_rate
+    critical = steady.critical_stiffness(scene, log_rate) / scene.critical_stiffness
+    for off, grows in ((-1e-6, True), (1e-6, False)):
+        rates = steady.growth_rates(scene.with_(stiffness_ratio=critical * (1.0 + off)), log_rate)
+        assert bool(rates[0].real > 0.0) is grows
+        assert abs(rates[0].real) < 1e-5
