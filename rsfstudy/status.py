@@ -29,7 +29,7 @@ class Status(IntEnum):
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
     UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
-    STABLE_AT_ANY_STIFFNESS = 12, "radiation damps every perturbation however soft the spring"
+    STABLE_AT_ANY_STIFFNESS = 12, "every perturbation decays however soft the spring"
     NO_STEP = 13, "the scene has no step to respond to"
     NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
     ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"

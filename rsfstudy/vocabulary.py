@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.scene import QUANTITIES as SCENE
+from rsfstudy.slider.fields import QUANTITIES as SCENE
 
 _QUANTITIES = (
     # the scene
@@ -389,7 +389,10 @@ DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
         "load_velocity_ratio",
         lambda ratio: -math.inf if ratio == 0.0 else math.log(ratio),
     ),
-    "a_over_b_minus_a": ("b_over_a", lambda b_over_a: 1.0 / (b_over_a - 1.0)),
+    "a_over_b_minus_a": (
+        "b_over_a",
+        lambda b_over_a: math.inf if b_over_a == 1.0 else 1.0 / (b_over_a - 1.0),
+    ),
 }
 
 

@@ -262,7 +262,8 @@ class DisplacementSteps(Steps):
         def after(step: float) -> float:
             return math.exp(log_rate_at(self.scene, self.scene.stiffness * step, 0.0))
 
-        closed_form = after(self.sign / (self.scene.b_over_a - 1.0))
+        weakens = self.scene.b_over_a > 1.0
+        closed_form = after(self.sign / (self.scene.b_over_a - 1.0)) if weakens else math.nan
         critical = math.nan if math.isnan(size) else after(self.value(size))
         return dict(zip(self.beside, (critical, closed_form), strict=True))
 

@@ -7,22 +7,20 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator
-from operator import attrgetter
 
 import numpy as np
 
 from rsfstudy.declare.study import Cell, Study
 from rsfstudy.measures import Measure
-from rsfstudy.slider.scene import FIELDS, Scene
+from rsfstudy.slider.scene import Scene
 
-_values = attrgetter(*FIELDS)
 _KEY = np.dtype("V16")
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 def cell_key(scene: Scene, measure: Measure) -> bytes:
     """Name of a cell: a digest of the exact values of its scene and of its measure's fields."""
-    values = f"{_values(scene)!r} {measure.plain_fields!r}"
+    values = f"{tuple(scene.as_dict().values())!r} {measure.plain_fields!r}"
     return hashlib.sha256(values.encode()).digest()[: _KEY.itemsize]
 
 

@@ -19,10 +19,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure, is_name
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Reduction
-from rsfstudy.slider.scene import FIELDS, Scene
+from rsfstudy.slider.fields import FIELDS, SLOT_FIELDS, without_meaning
+from rsfstudy.slider.scene import Scene
 
-#: Fields that only scenes with variable normal stress have.
-_OF_VARIABLE_NORMAL_STRESS = ("alpha", "phi")
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
 
@@ -205,7 +204,7 @@ class Study:
         used: set[str] = set()
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             cell = self._cell(rows)
-            used |= {name for name in FIELDS if getattr(cell.scene, name) is not None}
+            used |= {name for name in FIELDS if cell.scene.as_dict()[name] is not None}
             yield cell
         for axis in self.axes:
             for name in axis.fields:
@@ -243,15 +242,12 @@ class Study:
 
     def _cell(self, rows: Sequence[Row]) -> Cell:
         of_scene, changes = self._split(rows)
-        fields = {**self.base.as_dict(), **of_scene}
-        if fields["normal_stress"] == "constant":
-            # one row that states both is contradictory, and Scene says so
-            stated = next((row for row in rows if "normal_stress" in row), {})
-            for name in _OF_VARIABLE_NORMAL_STRESS:
-                if stated.get(name) is None:
-                    fields[name] = None
+        # one row that states both a choice and what has no meaning then is contradictory
+        stated = {name for row in rows if set(row) & SLOT_FIELDS for name in row}
+        meaningless = without_meaning(self.base.as_dict() | of_scene) - stated
+        of_scene = {name: value for name, value in of_scene.items() if name not in meaningless}
         try:
-            return Cell(Scene(**fields), changes)
+            return Cell(self.base.with_(**of_scene), changes)
         except InvalidValue as error:
             place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
             raise error.at(f"cell {place}") from error

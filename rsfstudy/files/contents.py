@@ -19,7 +19,8 @@ import xarray as xr
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.scene import KINDS, Scene
+from rsfstudy.slider.fields import KINDS
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.study import Study
 from rsfstudy.files.journal import Columns, Layout
-from rsfstudy.slider.scene import FIELDS
+from rsfstudy.slider.fields import FIELDS
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
 
@@ -103,7 +103,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             varied = [point[name] for point in points]
             coords[name] = (axis.dimension, _array(varied), _about(name, varied[0]))
     for name in FIELDS:
-        present = {getattr(scene, name) for scene in sample} - {None}
+        present = {scene.as_dict()[name] for scene in sample} - {None}
         if name not in coords and len(present) == 1:
             fixed = present.pop()
             coords[name] = ((), _array([fixed])[0], _about(name, fixed))

@@ -27,7 +27,8 @@ from rsfstudy.motion.accuracy import (
     relative_work,
 )
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider.scene import FIELDS, Scene
+from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
 

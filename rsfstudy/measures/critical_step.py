@@ -116,6 +116,9 @@ class CriticalStep(Measure):
                 Status.UNVERIFIED,
                 message="stiffness is critical to within the accuracy: ask for a smaller rtol",
             )
+        if not scene.critical_stiffness:
+            # nothing grows: only the step itself can reach the norm
+            return self._surveyed(steps, accuracy, meter)
         if not mass_acts(scene, accuracy):
             # a cycle attracts no path, and takes more care
             careful = replace(accuracy, rtol=min(accuracy.rtol, _CAREFUL))
@@ -314,7 +317,7 @@ def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
     """Size of the critical step for a norm low enough to leave mass out: close by, and cheap."""
     norm = min(steps.scene.instability_norm, _LIGHT_NORM)
     massless = type(steps)(steps.scene.with_(inertia=False, instability_norm=norm), steps.sign)
-    if massless.largest <= massless.smallest:
+    if massless.largest <= massless.smallest or not massless.scene.critical_stiffness:
         return None
     sizes = massless.sizes_on_path((1e-6,), meter)
     return None if sizes is None else sizes[0]

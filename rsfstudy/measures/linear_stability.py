@@ -90,7 +90,9 @@ class LinearStability(Measure):
             return Outcome(
                 Status.STABLE_AT_ANY_STIFFNESS,
                 values,
-                f"at eta V = {scene.dynamics.damping(load):.3g} sigma_* radiation damps every "
+                "without rate weakening every perturbation decays"
+                if massless <= 0.0
+                else f"at eta V = {scene.dynamics.damping(load):.3g} sigma_* radiation damps every "
                 "perturbation",
             )
         rise = critical / massless - 1.0

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.slider.scene import FIELDS, Scene
+from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import stress_at
 from rsfstudy.vocabulary import quantity
 

@@ -87,7 +87,12 @@ RULES: Mapping[str, Callable[[float], bool]] = {
 
 def names_of(part: type[Part]) -> tuple[str, ...]:
     """Names of the fields of a part."""
-    return tuple(f.name for f in fields(part))
+    if part not in _NAMES:
+        _NAMES[part] = tuple(f.name for f in fields(part))
+    return _NAMES[part]
+
+
+_NAMES: dict[type[Part], tuple[str, ...]] = {}
 
 
 def quantities_of(part: type[Part]) -> list[Quantity]:

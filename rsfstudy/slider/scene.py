@@ -3,115 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import FrozenInstanceError, dataclass
+from dataclasses import FrozenInstanceError
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
+from rsfstudy.slider import assembly, dynamics, laws, normal_stress, steady
+from rsfstudy.slider.fields import (
+    FIELDS,
+    SLOT_FIELDS,
+    SLOTS,
+    chosen,
+    layout_of,
+    refuse_unless_idle,
+    unknown_field,
+    without_meaning,
+)
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.parts import Numbers, Part, checked, names_of, number, quantities_of
-
-_POSITIVE = "must be greater than 0"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Slider(Part):
-    """The numbers that every slider has."""
-
-    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=_POSITIVE)
-    mu_star: float = number(
-        0.76,
-        r"$\mu_*$",
-        "1",
-        "steady-state friction coefficient at the reference rate",
-        rule=_POSITIVE,
-    )
-    stiffness_ratio: float = number(
-        1.0, r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star", rule=_POSITIVE
-    )
-    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=_POSITIVE)
-    reference_rate: float = number(
-        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=_POSITIVE
-    )
-    instability_norm: float = number(
-        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
-    )
-
-    name = "slider"
-
-
-@dataclass(frozen=True)
-class _Slot:
-    """What a scene has one of: the choices by name, and the one that is meant where none is
-    named.
-    """
-
-    name: str
-    choices: Mapping[str, type[Part]]
-    default: str
-    long_name: str
-
-    @property
-    def is_named(self) -> bool:
-        """Whether a field of a scene names the choice; else a field of a part calls for it."""
-        return not any(part.called_by for part in self.choices.values())
-
-    @property
-    def own(self) -> tuple[str, ...]:
-        """The field that names the choice, if one does."""
-        return (self.name,) if self.is_named else ()
-
-
-SLOTS: tuple[_Slot, ...] = (
-    _Slot("law", laws.PARTS, "slip", "state evolution law"),
-    _Slot("normal_stress", normal_stress.PARTS, "variable", "normal stress condition"),
-    _Slot("dynamics", dynamics.PARTS, "quasi_static", "what balances the spring besides friction"),
-    _Slot("loading", loading.PARTS, "step", "what the load point does"),
-)
-#: Slots of which there is a choice to be named.
-_NAMED = tuple(slot for slot in SLOTS if slot.is_named and len(slot.choices) > 1)
-_EVERY_PART: tuple[type[Part], ...] = (
-    Slider,
-    *(part for slot in SLOTS for part in slot.choices.values()),
-)
-_OWNERS: Mapping[str, type[Part]] = {
-    name: part for part in reversed(_EVERY_PART) for name in names_of(part)
-}
-#: Names of all fields of a scene.
-FIELDS: tuple[str, ...] = tuple(
-    dict.fromkeys(
-        [*(slot.name for slot in _NAMED), *(n for part in _EVERY_PART for n in names_of(part))]
-    )
-)
-#: What they mean.
-QUANTITIES: tuple[Quantity, ...] = (
-    *(Quantity(slot.name, "", "", slot.long_name) for slot in _NAMED),
-    *(q for part in _EVERY_PART for q in quantities_of(part)),
-)
-
-
-def _kind(name: str) -> Any:
-    """What a field of a scene holds; None where the part that owns it was not chosen."""
-    part = _OWNERS[name]
-    kind = get_type_hints(part)[name]
-    chosen = (
-        part is Slider
-        or part.called_by
-        or all(
-            name in names_of(choice)
-            for slot in SLOTS
-            for choice in slot.choices.values()
-            if part in slot.choices.values()
-        )
-    )
-    return kind if chosen else kind | None
-
-
-#: What the fields hold.
-KINDS: Mapping[str, Any] = {slot.name: str for slot in _NAMED} | {n: _kind(n) for n in _OWNERS}
+from rsfstudy.slider.parts import Numbers, checked
 
 
 class Parts(NamedTuple):
@@ -143,11 +52,14 @@ class Scene:
         Angle in degrees between the driving stress and the fault normal (variable normal stress
         only; 60).
     a, b_over_a : float
-        Direct effect, and evolution effect over direct effect; b > a, rate weakening.
+        Direct effect, and evolution effect over direct effect. Rate weakening is b > a; without it
+        there is no critical stiffness, and `stiffness` must be given.
     mu_star : float
         Steady-state friction coefficient at V_*.
-    stiffness_ratio : float
-        Stiffness over the critical stiffness at V_*.
+    stiffness_ratio : float, optional
+        Stiffness over the critical stiffness at V_*. Default: 1.
+    stiffness : float, optional
+        Stiffness itself, k D_c/sigma_*, instead of its ratio.
     load_velocity_ratio : float, optional
         Load point velocity over V_* after the step. Default: 1, or 0 after a displacement step.
     displacement_step : float
@@ -181,7 +93,6 @@ class Scene:
     if TYPE_CHECKING:
         a: float
         mu_star: float
-        stiffness_ratio: float
         period: float
         reference_rate: float
         instability_norm: float
@@ -192,16 +103,23 @@ class Scene:
         for name in given:
             if name not in FIELDS:
                 raise unknown_field(name)
-        chosen = {slot.name: _chosen(slot, given) for slot in SLOTS}
-        values = dict.fromkeys(FIELDS)
-        values |= {slot.name: chosen[slot.name].name for slot in _NAMED}
-        slider = Slider(**_values(Slider, given))
-        parts = Parts(**{name: part(**_values(part, given)) for name, part in chosen.items()})  # type: ignore[arg-type]
-        for slot in SLOTS:
-            _refuse_others(slot, chosen[slot.name], given, values)
+        layout = layout_of(tuple(chosen(slot, given) for slot in SLOTS))
+        own: tuple[dict[str, Any], ...] = tuple({} for _part in layout.parts)
+        for name, value in given.items():
+            if value is None or name in SLOT_FIELDS:
+                continue
+            place = layout.places.get(name)
+            if place is None:
+                refuse_unless_idle(name, value, layout.refusing[name])
+            else:
+                own[place][name] = checked(layout.parts[place], name, value)
+        slider, *parts = (
+            part(**values)
+            for part, values in zip(layout.parts, (_spring(own[0]), *own[1:]), strict=True)
+        )
+        self.__dict__.update(layout.elsewhere, parts=Parts(*parts))  # type: ignore[arg-type]
         for part in (slider, *parts):
-            values |= {name: getattr(part, name) for name in names_of(type(part))}
-        self.__dict__.update(values, parts=parts)
+            self.__dict__.update(part.__dict__)
         for part in parts:
             part.check(self)
 
@@ -248,7 +166,18 @@ class Scene:
     @property
     def stiffness(self) -> float:
         """K = k D_c/sigma_*."""
-        return self.stiffness_ratio * self.critical_stiffness
+        given = self.__dict__["stiffness"]
+        return float(
+            self.__dict__["stiffness_ratio"] * self.critical_stiffness if given is None else given
+        )
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough."""
+        given = self.__dict__["stiffness_ratio"]
+        if given is not None:
+            return float(given)
+        return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
 
     @property
     def load_velocity(self) -> float:
@@ -286,17 +215,16 @@ class Scene:
     def with_(self, **changes: Any) -> Scene:
         """A copy with some fields changed, checked anew.
 
-        Changing what fills a slot drops the fields that have no meaning any more.
+        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
+        the place of its ratio, and the other way round.
         """
         for name in sorted(changes):
             if name not in FIELDS:
                 raise unknown_field(name)
         kept = self.as_dict()
-        for slot in _NAMED:
-            part = slot.choices.get(changes.get(slot.name, kept[slot.name]))
-            if part is not None:
-                others = {n for other in slot.choices.values() for n in names_of(other)}
-                kept |= dict.fromkeys(others - set(names_of(part)))
+        kept |= dict.fromkeys(without_meaning(kept | changes))
+        if any(changes.get(name) is not None for name in _SPRING):
+            kept |= dict.fromkeys(_SPRING)
         return Scene(**kept | changes)
 
     def as_dict(self) -> dict[str, Any]:
@@ -304,47 +232,18 @@ class Scene:
         return {name: self.__dict__[name] for name in FIELDS}
 
 
+#: The fields of which one sets the spring.
+_SPRING = ("stiffness_ratio", "stiffness")
+
+
+def _spring(values: dict[str, Any]) -> dict[str, Any]:
+    """The numbers of a slider with one field for its spring."""
+    given = [name for name in _SPRING if name in values]
+    if len(given) == 2:
+        rule = f"and stiffness_ratio = {values['stiffness_ratio']:g} both set the spring"
+        raise InvalidValue("stiffness", values["stiffness"], rule, remedy="Give one of them.")
+    return values if given else {**values, "stiffness_ratio": 1.0}
+
+
 def _made(values: dict[str, Any]) -> Scene:
     return Scene(**values)
-
-
-def _chosen(slot: _Slot, given: Mapping[str, Any]) -> type[Part]:
-    """The part that is asked for in a slot."""
-    if slot.is_named:
-        name = given.get(slot.name, slot.default)
-        if not isinstance(name, str) or name not in slot.choices:
-            raise InvalidValue(slot.name, name, "is unknown", choices=slot.choices)
-        return slot.choices[name]
-    for part in slot.choices.values():
-        value = given.get(part.called_by)
-        if value is not None and checked(part, part.called_by, value):
-            return part
-    return slot.choices[slot.default]
-
-
-def _values(part: type[Part], given: Mapping[str, Any]) -> dict[str, Any]:
-    """What is given for the fields of a part, checked; what is not stays as it is by default."""
-    names = (name for name in names_of(part) if given.get(name) is not None)
-    return {name: checked(part, name, given[name]) for name in names}
-
-
-def _refuse_others(
-    slot: _Slot, chosen: type[Part], given: Mapping[str, Any], values: dict[str, Any]
-) -> None:
-    """Refuse values for the fields of parts that were not chosen, but for what calls none of them:
-    a field that calls for a part is there in every scene, with the value that does not.
-    """
-    for part in slot.choices.values():
-        for name in set(names_of(part)) - set(names_of(chosen)):
-            value = given.get(name)
-            if name == part.called_by:
-                values[name] = part.__dataclass_fields__[name].default
-                if value is None or not checked(part, name, value):
-                    continue
-            if value is not None:
-                raise chosen.refuse(name, value)
-
-
-def unknown_field(name: str) -> InvalidValue:
-    """The error for a name that is no field of a scene."""
-    return InvalidValue("field", name, "is not a field of a scene", choices=FIELDS)

@@ -122,7 +122,7 @@ def slowest_steady(scene: Scene) -> float:
     there is none.
     """
     value, _slope, shift, _shift_slope = relation_of(scene)(_STRONGEST)
-    if value - shift > 1e6:
+    if value - shift > 1e6 or scene.b <= scene.a:
         return -math.inf
     return (value - shift) / (scene.a - scene.b)
 

@@ -45,13 +45,13 @@ class Law(Part):
         return (scene.a * self.b_over_a,)
 
     def check(self, scene: Scene) -> None:
-        """Rate weakening."""
-        if self.b_over_a <= 1.0:
+        """Rate weakening, where the spring is given by its ratio to the critical stiffness."""
+        if self.b_over_a <= 1.0 and scene.as_dict()["stiffness"] is None:
             raise InvalidValue(
                 "b_over_a",
                 self.b_over_a,
                 "must exceed 1: without rate weakening there is no critical stiffness",
-                remedy="Steady sliding is then stable at every stiffness.",
+                remedy="Steady sliding is then stable at every stiffness: give stiffness itself.",
             )
 
 

@@ -1,0 +1,92 @@
+"""The spring, by its stiffness or by its ratio to the critical one; and sliders without rate
+weakening, which have no critical stiffness.
+"""
+
+import math
+
+import pytest
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import steady
+from rsfstudy.status import Status
+
+STRENGTHENING = {"b_over_a": 0.8, "stiffness": 0.05}
+
+
+def test_stiffness_is_its_ratio_times_the_critical_one():
+    relative = Scene(stiffness_ratio=1.2)
+    absolute = Scene(stiffness=relative.stiffness)
+    assert absolute.stiffness_ratio == pytest.approx(1.2, rel=1e-15)
+    assert absolute.as_dict()["stiffness_ratio"] is None
+    assert relative.as_dict()["stiffness"] is None
+    assert absolute.numbers == relative.numbers
+    first, second = (CriticalStep()(scene, Accuracy(1e-5)) for scene in (relative, absolute))
+    assert first.values == pytest.approx(second.values, rel=1e-12)
+
+
+def test_one_of_them_sets_the_spring():
+    with pytest.raises(InvalidValue, match=r"stiffness = 0.1: and stiffness_ratio = 2 both set"):
+        Scene(stiffness=0.1, stiffness_ratio=2.0)
+    assert Scene().stiffness_ratio == 1.0
+    soft = Scene().with_(stiffness=0.01)
+    assert (soft.stiffness, soft.as_dict()["stiffness_ratio"]) == (0.01, None)
+    assert soft.with_(a=0.02).stiffness == 0.01
+    assert soft.with_(stiffness_ratio=1.5).as_dict()["stiffness"] is None
+    with pytest.raises(InvalidValue, match="must be greater than 0"):
+        Scene(stiffness=0.0)
+
+
+def test_stiffness_is_an_axis(tmp_path):
+    study = Study(
+        name="springs",
+        title="Boundary against stiffness",
+        base=Scene(),
+        axes=[Axis("stiffness", [0.018, 0.02])],
+        measure=CriticalStep(),
+        accuracy=Accuracy(1e-4),
+    )
+    dataset = rsfstudy.run(study, workers=0, output=tmp_path, progress=False)
+    assert dataset.critical_velocity_ratio.dims == ("stiffness",)
+    assert dataset.stiffness.attrs["units"] == "1"
+    assert "stiffness_ratio" not in dataset.coords
+    again = rsfstudy.rerun(tmp_path / "springs.nc", workers=0, progress=False)
+    assert (again.identical == again["values"]).all()
+
+
+def test_without_rate_weakening_stiffness_is_given_by_itself():
+    with pytest.raises(InvalidValue, match="must exceed 1.*give stiffness itself"):
+        Scene(b_over_a=0.8)
+    scene = Scene(**STRENGTHENING)
+    assert scene.critical_stiffness == 0.0
+    assert scene.stiffness_ratio == math.inf
+    assert steady.slowest_steady(scene) == -math.inf
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("b_over_a", [0.5, 1.0])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
+def test_without_rate_weakening_nothing_grows(law, b_over_a, effects):
+    scene = Scene(law=law, b_over_a=b_over_a, stiffness=0.05, load_velocity_ratio=3.0, **effects)
+    assert steady.growth_rates(scene, scene.log_load_rate)[0].real < 0.0
+    found = LinearStability()(scene, Accuracy())
+    assert found.status is Status.STABLE_AT_ANY_STIFFNESS
+    assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
+    step = CriticalStep(direction="down")(scene, Accuracy(1e-4))
+    assert step.status is Status.STABLE_FOR_ALL_STEPS
+
+
+def test_a_soft_spring_overshoots_all_the_same():
+    """Without rate weakening too: a fault that has healed at V_* weakens while a much faster load
+    point drags it, and the spring gives way. Hardly any weakening holds every step below the norm.
+    """
+    soft = CriticalStep()(Scene(b_over_a=0.8, stiffness=0.01), Accuracy(1e-4))
+    assert soft.status is Status.OK
+    assert soft.values["critical_velocity_ratio"] > 100.0
+    little = CriticalStep()(Scene(b_over_a=0.05, stiffness=0.01), Accuracy(1e-4))
+    assert little.status is Status.STABLE_FOR_ALL_STEPS
