@@ -135,7 +135,7 @@ def test_a_time_limit_is_one_of_cpu_time():
     """Whatever the clock says, before and after."""
     script = """
 import collections, itertools, time
-from rsfstudy import cells
+from rsfstudy.compute import cells
 cells.WAITING = 1e6
 with cells._limits.within(0.1):
     time.sleep(1.5)

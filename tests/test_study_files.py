@@ -74,7 +74,7 @@ def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
 
 
 CLAIM = """
-from rsfstudy.claims import Claim
+from rsfstudy.declare.claims import Claim
 
 study = dataclasses.replace(study, claims=[Claim(
     id="M1", statement="", source="", published=1.0, tolerance=0.1, reason="", {}

@@ -396,7 +396,9 @@ class _Watch:
         if self._rested is None or point.log_rate < self._rested.log_rate:
             self._rested = point
         balanced = abs(point.spring - point.friction) < 1e-3 * self._scene.a
-        if self._landed is None and balanced and point.log_rate < self._scene.log_load_rate:
+        # a cycle begins at V_0, give or take a last bit: what counts comes after the rupture
+        slower = self._fallen and point.log_rate < self._scene.log_load_rate
+        if self._landed is None and balanced and slower:
             self._landed = point
         if self._fastest is None or point.log_rate > self._fastest.log_rate:
             self._fastest = point

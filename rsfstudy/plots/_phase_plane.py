@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.fields import FIELDS, KINDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import stress_at
 from rsfstudy.vocabulary import quantity
@@ -26,8 +26,15 @@ def coupling(cell: xr.Dataset) -> tuple[str, float]:
 
 def scene_of(cell: xr.Dataset) -> Scene:
     """The scene of one cell, from its coordinates."""
-    values = {name: cell[name].item() for name in FIELDS if name in cell.coords}
-    return Scene(**{name: value for name, value in values.items() if value == value})  # no NaN
+    own = (name for name in FIELDS if name in cell.coords and cell[name].ndim == 0)
+    values = {name: cell[name].item() for name in own}
+    return Scene(
+        **{
+            name: bool(value) if KINDS[name] is bool else value
+            for name, value in values.items()
+            if value == value  # no NaN
+        }
+    )
 
 
 def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
