@@ -20,7 +20,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Seconds of timing that are enough.
-_ENOUGH = 0.15
+_ENOUGH = 0.05
 
 #: What run times are relative to: the same problem, solved by default as loosely as in the study.
 _YARDSTICK = Accuracy(1e-3)
@@ -81,8 +81,8 @@ class WorkPrecision(Measure):
     problems: tuple[Problem, ...] = ()
     integrator: str = "DOP853"
     requested_digits: float = 6.0
-    repeats: int = 9
-    budget: int = 45_000
+    repeats: int = 5
+    budget: int = 41_000
     name: ClassVar[str] = "work_precision"
 
     def __post_init__(self) -> None:

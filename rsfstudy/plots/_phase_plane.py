@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.slider.fields import FIELDS, KINDS
+from rsfstudy.slider.fields import FIELDS, KINDS, without_meaning
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import stress_at
 from rsfstudy.vocabulary import quantity
@@ -28,13 +28,11 @@ def scene_of(cell: xr.Dataset) -> Scene:
     """The scene of one cell, from its coordinates."""
     own = (name for name in FIELDS if name in cell.coords and cell[name].ndim == 0)
     values = {name: cell[name].item() for name in own}
-    return Scene(
-        **{
-            name: bool(value) if KINDS[name] is bool else value
-            for name, value in values.items()
-            if value == value  # no NaN
-        }
-    )
+    values = {name: value for name, value in values.items() if value == value}  # no NaN
+    values |= {name: bool(value) for name, value in values.items() if KINDS[name] is bool}
+    for name in without_meaning(Scene().as_dict() | values):
+        values.pop(name, None)
+    return Scene(**values)
 
 
 def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:

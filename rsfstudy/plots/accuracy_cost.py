@@ -63,7 +63,7 @@ def _diagram(dataset: xr.Dataset, axes: Axes, problem: int, work: str) -> Axes:
 
 
 def draw_digits(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """For 3, 6 and 9 digits you pay this much: right-hand sides of the default."""
+    """For so many digits you pay this much: right-hand sides of the default."""
     if "cheapest_default_work" not in dataset:
         axes.set_axis_off()
         return axes
