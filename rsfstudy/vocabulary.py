@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fields import QUANTITIES as SCENE
@@ -405,16 +406,24 @@ def coverage(name: str) -> str:
     return "modelResult"
 
 
-def quantity(name: str) -> Quantity:
+def quantity(name: str, own: Mapping[str, Quantity] = MappingProxyType({})) -> Quantity:
     """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
 
-    Names the vocabulary does not hold (a user's own) describe themselves.
+    Names that neither `own` nor the vocabulary holds describe themselves.
+
+    Parameters
+    ----------
+    name : str
+    own : mapping of str to Quantity
+        What a measure says of its own numbers.
     """
+    if name in own:
+        return own[name]
     if name in QUANTITIES:
         return QUANTITIES[name]
     match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIXES)})", name)
     if match:
-        of = quantity(match[1])
+        of = quantity(match[1], own)
         units = "1" if match[2] in _COUNTS else of.units
         scale = "" if match[2] in _COUNTS else of.scale
         return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", scale)

@@ -12,6 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.study import Study
 from rsfstudy.files.journal import Columns, Layout
+from rsfstudy.measures import Measure
 from rsfstudy.slider.fields import FIELDS
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
@@ -61,7 +62,7 @@ def variables(
     found = {}
     for name, inner in study.measure.variables.items():
         values = columns.numbers[:, layout.places[name]].reshape(shape + layout.shapes[name])
-        found[name] = ((*dims, *inner), values, _about(name))
+        found[name] = ((*dims, *inner), values, _about(name, measure=study.measure))
     kept = {
         "status": columns.status,
         "rhs_evaluations": columns.work,
@@ -113,7 +114,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             derived = [formula(value) for value in np.ravel(values).tolist()]
             coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name))
     for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, np.asarray(values), _about(name))
+        coords[name] = (name, np.asarray(values), _about(name, measure=study.measure))
     return coords
 
 
@@ -128,9 +129,11 @@ def _array(values: list[Any]) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _about(name: str, value: Any = None) -> dict[str, Any]:
-    """Attributes of a quantity; of a coordinate whose values are like this one."""
-    about = quantity(name)
+def _about(name: str, value: Any = None, measure: Measure | None = None) -> dict[str, Any]:
+    """Attributes of a quantity; of a coordinate whose values are like this one; of a number or
+    inner dimension of a measure.
+    """
+    about = quantity(name, {q.name: q for q in measure.quantities} if measure else {})
     attrs: dict[str, Any] = {"long_name": about.long_name}
     if about.units and not isinstance(value, str | bool):
         attrs["units"] = about.units

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
@@ -27,6 +27,7 @@ from rsfstudy.motion.accuracy import (
     relative_work,
 )
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fields import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -90,6 +91,13 @@ class Measure:
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of the inner dimensions."""
         return {}
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """What its numbers and inner dimensions mean, with their units: those that the vocabulary
+        does not hold.
+        """
+        return ()
 
     @property
     def sought(self) -> tuple[str, ...]:
@@ -181,6 +189,12 @@ class Measure:
             for dim in dims:
                 if dim not in self.inner_coordinates:
                     raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+        for about in self.quantities:
+            if not isinstance(about, Quantity) or about.name not in names:
+                stated = about.name if isinstance(about, Quantity) else about
+                raise InvalidValue(
+                    "quantities", stated, "describes nothing measured", choices=names
+                )
         for name in self.sought:
             if name not in FIELDS:
                 raise InvalidValue("sought", name, "is not a field of a scene", choices=FIELDS)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import quantity
 
 
@@ -24,8 +25,9 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
             places = zip(map(str, values.dims[:-1]), points, strict=True)
             label = ", ".join(f"{dimension} = {point}" for dimension, point in places)
         axes.plot(row[along].values, row.values, marker="o", markersize=3, label=label or None)
-    axes.set_xlabel(textwrap.fill(quantity(along).axis_label, 60))
-    axes.set_ylabel(textwrap.fill(quantity(name).axis_label, 45))
+    own = stated_by(dataset)
+    axes.set_xlabel(textwrap.fill(quantity(along, own).axis_label, 60))
+    axes.set_ylabel(textwrap.fill(quantity(name, own).axis_label, 45))
     axes.set_title(textwrap.fill(dataset.attrs.get("title", ""), 70), fontsize="medium")
     if 1 < rows.sizes["line"] <= 12:
         axes.legend(fontsize="small")

@@ -10,7 +10,8 @@ from __future__ import annotations
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Reduction, failed, known, without_failures, worst
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.covered import Covered
@@ -62,7 +63,7 @@ def reduced(
             drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
             if bool(failed(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
-            values.attrs = {**_about(str(name), values), **despite}
+            values.attrs = {**_about(quantity(str(name), stated_by(dataset)), values), **despite}
             dataset = dataset.assign({name: values})
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:
@@ -71,12 +72,11 @@ def reduced(
     return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})
 
 
-def _about(name: str, values: xr.DataArray) -> dict[str, str]:
-    """Attributes of a result: what the vocabulary says of it, and what its reduction does."""
-    about = quantity(name)
+def _about(about: Quantity, values: xr.DataArray) -> dict[str, str]:
+    """Attributes of a result: what is known of its quantity, and what its reduction says."""
     own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
     scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
-    kind = {"coverage_content_type": coverage(name)}
+    kind = {"coverage_content_type": coverage(about.name)}
     return {"long_name": about.long_name, "units": about.units, **scale, **kind, **own}
 
 

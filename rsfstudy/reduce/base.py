@@ -10,7 +10,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import QUANTITIES
 
 Data = TypeVar("Data", xr.Dataset, xr.DataArray)
 
@@ -114,3 +116,18 @@ def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
         values <= highest + ROUNDING * abs(highest)
     )
     return dataset.isel({dimension_of(dataset, on): np.flatnonzero(inside)})
+
+
+def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
+    """What a dataset says of those of its variables that the vocabulary does not hold."""
+    return {
+        str(name): Quantity(
+            str(name),
+            "",
+            str(values.attrs.get("units", "1")),
+            str(values.attrs["long_name"]),
+            str(values.attrs.get("scale", "")),
+        )
+        for name, values in dataset.variables.items()
+        if name not in QUANTITIES and values.attrs.get("long_name")
+    }
