@@ -34,13 +34,13 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True)
 class Stiffness(Measure):
-    name: ClassVar[str] = "stiffness"
-    headline = "stiffness"
-    variables = {"stiffness": (), "stiffness_error": ()}
+    name: ClassVar[str] = "spring"
+    headline = "spring"
+    variables = {"spring": (), "spring_error": ()}
     typical_work = 1
 
     def find(self, scene, accuracy, meter):
-        return Outcome(Status.OK, {"stiffness": scene.stiffness, "stiffness_error": 0.0})
+        return Outcome(Status.OK, {"spring": scene.stiffness, "spring_error": 0.0})
 
 
 study = Study(
@@ -69,7 +69,7 @@ def test_a_file_runs_by_its_path_on_workers(tmp_path):
 def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
     dataset = rsfstudy.run(written(tmp_path, OWN_MEASURE), output=tmp_path, progress=False)
     assert (dataset.status == 0).all(), dataset.message.values
-    assert float(dataset.stiffness[0]) == rsfstudy.Scene(phi=55).stiffness
+    assert float(dataset.spring[0]) == rsfstudy.Scene(phi=55).stiffness
     assert "study_file_mine" not in sys.modules
 
 
@@ -136,11 +136,11 @@ def test_a_file_that_is_not_there(tmp_path):
 def test_a_measure_that_was_edited_does_not_reuse_its_old_cells(tmp_path):
     run = {"output": tmp_path, "progress": False, "workers": 0}
     rsfstudy.run(written(tmp_path, OWN_MEASURE), **run)
-    edited = OWN_MEASURE.replace('"stiffness": scene.stiffness', '"stiffness": 2 * scene.stiffness')
+    edited = OWN_MEASURE.replace('"spring": scene.stiffness', '"spring": 2 * scene.stiffness')
     with pytest.raises(DataError, match="own_code"):
         rsfstudy.run(written(tmp_path, edited), **run)
     dataset = rsfstudy.run(written(tmp_path, edited), fresh=True, **run)
-    assert float(dataset.stiffness[0]) == 2.0 * rsfstudy.Scene(phi=55).stiffness
+    assert float(dataset.spring[0]) == 2.0 * rsfstudy.Scene(phi=55).stiffness
 
 
 def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):
