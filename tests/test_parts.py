@@ -1,0 +1,122 @@
+"""A part is one file: what a law of another kind takes, and that everything follows from it."""
+
+import math
+from dataclasses import dataclass
+
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import fields, laws, steady
+from rsfstudy.slider.equations import evolution_of, relation_of
+from rsfstudy.slider.laws.slowness import SlownessLaw
+from rsfstudy.slider.slots import FIRST_OWN
+from rsfstudy.status import Status
+
+OWN = 0
+C = 0.5
+
+
+def weakened(friction, ratio, change, p):
+    """The state loses c dtau/sigma_* where shear stress rises (Nagata et al. 2012)."""
+    return C * friction, C
+
+
+def perrin_rice_zheng(log_rate, state, p):
+    """Perrin, Rice and Zheng (1995): dtheta/dt = 1 - (theta V/2 D_c)**2 is -b sinh per slip."""
+    return -p[OWN] * math.sinh(max(min(state / p[OWN] + log_rate, 300.0), -300.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressWeakened(SlownessLaw):
+    name = "stress_weakened"
+    state_effect = staticmethod(weakened)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerrinRiceZheng(laws.Law):
+    name = "perrin_rice_zheng"
+    evolution = staticmethod(perrin_rice_zheng)
+
+
+@pytest.fixture(autouse=True)
+def two_more_laws(monkeypatch):
+    for law in (StressWeakened, PerrinRiceZheng):
+        monkeypatch.setitem(laws.PARTS, law.name, law)
+
+
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.0}, {}])
+def test_a_state_effect_is_part_of_the_friction_relation(effects):
+    """With shear stress alone, k_cr is that of the slowness law over 1 + c; the shifts of several
+    effects add up.
+    """
+    scene = Scene(law="stress_weakened", **effects)
+    usual = relation_of(scene.with_(law="slowness"))(0.1)
+    value, slope, shift, shift_slope = relation_of(scene)(0.1)
+    assert value == pytest.approx(usual[0] + C * 0.1, rel=1e-14)
+    assert (slope, shift_slope) == pytest.approx((usual[1] + C, usual[3] + C), rel=1e-14)
+    assert shift == pytest.approx(usual[2] + C * 0.1, rel=1e-14)
+    if effects.get("normal_stress") == "constant":
+        ratio = scene.critical_stiffness / scene.with_(law="slowness").critical_stiffness
+        assert ratio == pytest.approx(1.0 / (1.0 + C), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["stress_weakened", "perrin_rice_zheng"])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
+def test_everything_follows_from_a_law(law, effects):
+    """The critical stiffness is that of the assembled equations, and steps are critical."""
+    scene = Scene(law=law, load_velocity_ratio=1.5, **effects)
+    found = LinearStability()(scene, Accuracy())
+    assert found.status is Status.OK
+    values = found.values
+    assert values["critical_stiffness_from_growth"] == pytest.approx(
+        values["critical_stiffness"], rel=1e-6
+    )
+    step = CriticalStep()(scene.with_(load_velocity_ratio=None), Accuracy(1e-5))
+    assert step.status is Status.OK
+
+
+def test_the_faster_a_state_falls_above_steady_sliding_the_smaller_the_critical_step():
+    """Per slip as -b sinh z, -b z and -b (1 - exp(-z)), z = Theta/b + ln V: in this order."""
+    prz, slip, slowness = (
+        CriticalStep()(Scene(law=law, stiffness_ratio=1.1), Accuracy(1e-5)).values[
+            "critical_velocity_ratio"
+        ]
+        for law in ("perrin_rice_zheng", "slip", "slowness")
+    )
+    assert prz < slip
+    assert math.isnan(slowness) or slip < slowness
+
+
+def test_slopes_of_a_law_at_steady_sliding():
+    """Of order eight: 1e-14 where the law is smooth over a twentieth of ln V."""
+    for law in ("slip", "slowness", "perrin_rice_zheng"):
+        scene = Scene(law=law)
+        for log_rate in (-5.0, 0.0, 3.0):
+            assert evolution_of(scene)(log_rate, -scene.b * log_rate) == pytest.approx(0, abs=1e-15)
+            slopes = steady.slopes_of_law(scene, log_rate)
+            assert slopes == pytest.approx((-scene.b, -1.0), rel=1e-12)
+
+
+def test_numbers_stand_where_their_parts_look_for_them():
+    scene = Scene(alpha=0.3, phi=70.0, inertia=True, stiffness=0.02, load_velocity_ratio=2.0)
+    common, own = scene.numbers[:FIRST_OWN], scene.numbers[FIRST_OWN:]
+    assert common == (scene.a, scene.b, scene.mu_star, 0.02, 2.0, math.log(2.0))
+    cot_phi = 1.0 / math.tan(math.radians(70.0))
+    of_mass = scene.inertial_time, math.log(scene.inertial_time)
+    assert own == (scene.b, cot_phi, 0.3, *of_mass)
+
+
+def test_a_part_owns_its_fields():
+    """Each is described once, by the part; and refused, in its words, where it has no meaning."""
+    described = {quantity.name for quantity in fields.QUANTITIES}
+    assert described == set(fields.FIELDS)
+    with pytest.raises(InvalidValue, match="has no meaning while normal stress is constant"):
+        Scene(normal_stress="constant", phi=60.0)
+    with pytest.raises(InvalidValue, match="stands in for mass, and this scene has mass"):
+        Scene(inertia=True, radiation_damping=0.1)
+    assert Scene(inertia=True, radiation_damping=0.0).inertia is True
+    assert Scene(normal_stress="constant", alpha=None).alpha is None
