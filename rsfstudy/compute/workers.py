@@ -291,7 +291,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         ),
     }
     with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
-        worker_log.start_tracker(log)  # later, it would lift what `_interrupts_held` blocks
+        worker_log.start_tracker(log)  # first: it unblocks signals that `_interrupts_held` blocks
         started = stack.enter_context(contextlib.ExitStack())
         started.enter_context(_interrupts_held())
         try:

@@ -201,14 +201,14 @@ class Study:
         InvalidValue
             For a cell that makes no meaningful scene, naming its place on the axes.
         """
-        used: set[str] = set()
+        unused = {name for axis in self.axes for name in axis.fields if name in FIELDS}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             cell = self._cell(rows)
-            used |= {name for name in FIELDS if cell.scene.as_dict()[name] is not None}
+            unused = {name for name in unused if cell.scene.as_dict()[name] is None}
             yield cell
         for axis in self.axes:
             for name in axis.fields:
-                if name in FIELDS and name not in used:
+                if name in unused:
                     raise InvalidValue(axis.dimension, name, "has no effect in any cell")
 
     def cell(self, number: int) -> Cell:

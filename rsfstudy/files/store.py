@@ -24,7 +24,7 @@ from rsfstudy.files import contents
 
 #: Root attributes that a verdict or a rerun turns on.
 _SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
-#: What no results are without; a user may add variables, which have no digests.
+#: Variables that every results file has. Those that a user added have no digests.
 _OF_EVERY_LATTICE = ("status", "message", "rhs_evaluations", "wall_time")
 _DIGESTS = "digests"
 #: How Zarr stores are opened: lazily, and none of an older format.

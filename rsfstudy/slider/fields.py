@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple, get_type_hints
 
 from rsfstudy.errors import InvalidValue
@@ -89,6 +89,12 @@ FIELDS: tuple[str, ...] = tuple(
 )
 #: Those that name what fills a slot.
 SLOT_FIELDS: frozenset[str] = frozenset(slot.name for slot in NAMED)
+#: Those that decide neither what fills a slot nor which of two fields sets the spring.
+PLAIN_FIELDS: frozenset[str] = frozenset(FIELDS) - {
+    *SLOT_FIELDS,
+    *(name for slot in SLOTS for name in slot.callers),
+    *("stiffness_ratio", "stiffness"),
+}
 #: What they mean.
 QUANTITIES: tuple[Quantity, ...] = (
     *(Quantity(slot.name, "", "", slot.long_name) for slot in NAMED),
@@ -117,15 +123,20 @@ def _kind(name: str) -> Any:
 KINDS: Mapping[str, Any] = {slot.name: str for slot in NAMED} | {n: _kind(n) for n in _OWNERS}
 
 
-def without_meaning(values: Mapping[str, Any]) -> set[str]:
+def without_meaning(values: Mapping[str, Any]) -> frozenset[str]:
     """Fields that belong to other parts than those that values name."""
+    named = tuple(values[slot.name] for slot in NAMED)
+    return _without_meaning(named) if all(isinstance(n, str) for n in named) else frozenset()
+
+
+@cache
+def _without_meaning(named: tuple[str, ...]) -> frozenset[str]:
     names: set[str] = set()
-    for slot in NAMED:
-        part = slot.choices.get(values[slot.name]) if isinstance(values[slot.name], str) else None
-        if part is not None:
-            others = {name for other in slot.choices.values() for name in names_of(other)}
-            names |= others - set(names_of(part))
-    return names
+    for slot, name in zip(NAMED, named, strict=True):
+        if name in slot.choices:
+            others = {n for other in slot.choices.values() for n in names_of(other)}
+            names |= others - set(names_of(slot.choices[name]))
+    return frozenset(names)
 
 
 def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:

@@ -112,6 +112,8 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
     rule, remedy = stated.metadata["rule"], stated.metadata["remedy"]
     if value is None and stated.default is None:
         return None
+    if type(value) is float and math.isfinite(value) and rule in RULES and RULES[rule](value):
+        return value  # as most are
     is_flag = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
     if rule == _FLAG:
         if not is_flag:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError
+from collections.abc import Mapping, Sequence
+from dataclasses import FrozenInstanceError, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
@@ -11,8 +12,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import assembly, dynamics, laws, normal_stress, steady
 from rsfstudy.slider.fields import (
     FIELDS,
+    PLAIN_FIELDS,
     SLOT_FIELDS,
     SLOTS,
+    Layout,
     chosen,
     layout_of,
     refuse_unless_idle,
@@ -20,7 +23,7 @@ from rsfstudy.slider.fields import (
     without_meaning,
 )
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.parts import Numbers, checked
+from rsfstudy.slider.parts import Numbers, Part, checked
 
 
 class Parts(NamedTuple):
@@ -90,6 +93,7 @@ class Scene:
     """
 
     parts: Parts
+    _slider: Part
     if TYPE_CHECKING:
         a: float
         mu_star: float
@@ -113,11 +117,14 @@ class Scene:
                 refuse_unless_idle(name, value, layout.refusing[name])
             else:
                 own[place][name] = checked(layout.parts[place], name, value)
-        slider, *parts = (
-            part(**values)
-            for part, values in zip(layout.parts, (_spring(own[0]), *own[1:]), strict=True)
-        )
-        self.__dict__.update(layout.elsewhere, parts=Parts(*parts))  # type: ignore[arg-type]
+        own[0].update(_spring(own[0]))
+        made = [part(**values) for part, values in zip(layout.parts, own, strict=True)]
+        self._fill(layout, made)
+
+    def _fill(self, layout: Layout, made: Sequence[Part]) -> None:
+        """Take the fields from the parts, and let the parts say whether they go together."""
+        slider, *parts = made
+        self.__dict__.update(layout.elsewhere, _slider=slider, parts=Parts(*parts))  # type: ignore[arg-type]
         for part in (slider, *parts):
             self.__dict__.update(part.__dict__)
         for part in parts:
@@ -221,11 +228,26 @@ class Scene:
         for name in sorted(changes):
             if name not in FIELDS:
                 raise unknown_field(name)
+        if all(name in PLAIN_FIELDS and value is not None for name, value in changes.items()):
+            return self._with_numbers(changes)
         kept = self.as_dict()
         kept |= dict.fromkeys(without_meaning(kept | changes))
         if any(changes.get(name) is not None for name in _SPRING):
             kept |= dict.fromkeys(_SPRING)
         return Scene(**kept | changes)
+
+    def _with_numbers(self, changes: Mapping[str, Any]) -> Scene:
+        """A copy with the same parts, of which those that change are made and checked anew."""
+        layout = layout_of(tuple(type(part) for part in self.parts))
+        made: list[Part] = [self._slider, *self.parts]
+        for name, value in changes.items():
+            place = layout.places.get(name)
+            if place is None:
+                raise layout.refusing[name].refuse(name, value)
+            made[place] = replace(made[place], **{name: checked(layout.parts[place], name, value)})
+        scene = Scene.__new__(Scene)
+        scene._fill(layout, made)
+        return scene
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
