@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.slots import LARGEST_EXPONENT, A, strength
@@ -130,7 +129,3 @@ class RadiationDamping(Dynamics):
 
     def damping(self, log_rate: float) -> float:
         return self.radiation_damping * math.exp(log_rate)
-
-    @classmethod
-    def refuse(cls, name: str, value: Any) -> InvalidValue:
-        return InvalidValue(name, value, "has no meaning where radiation stands in for mass")
