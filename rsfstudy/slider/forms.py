@@ -124,7 +124,8 @@ def point(state: State, rates: State, p: Numbers) -> Point:
     """What the slider does between ruptures."""
     spring, psi = float(state[0]), float(state[1])
     x, friction, _shift = balance(spring, psi, p)
-    change = growth(spring, psi, x, friction, (float(rates[0]), float(rates[1])), p)
+    moving = float(rates[0]), float(rates[1])
+    change = growth((spring, psi), moving, x, friction, p)
     return point_at(x, change, spring, friction, psi, p)
 
 

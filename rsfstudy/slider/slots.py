@@ -61,16 +61,9 @@ def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]
     _open(spring, psi, p)
 
 
-def growth(
-    spring: float,
-    psi: float,
-    log_rate: float,
-    friction: float,
-    rates: tuple[float, float],
-    p: Numbers,
-) -> float:
+def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """Derivative of ln V along the motion (see `dynamics`)."""
-    _open(spring, psi, log_rate, friction, rates, p)
+    _open(x, friction, state, rates, p)
 
 
 def point_at(

@@ -5,7 +5,8 @@ A case states how slip rate follows from spring stress and state, as plain funct
 
 - ``balance(spring, psi, p) -> (log_rate, friction, shift)``: ln(V/V_*), the frictional stress, and
   the state lost to normal stress;
-- ``growth(spring, psi, log_rate, friction, rates, p)``: derivative of ln V along the motion;
+- ``growth(state, rates, x, friction, p)``: derivative of x = ln(V/V_*) along the motion, where the
+  state (spring, psi) changes by `rates`;
 - ``rupture_rate(state, p)`` and ``rupture_point(state, rates, p)``: the full equations where the
   others do not serve.
 """

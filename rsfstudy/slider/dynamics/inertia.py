@@ -71,16 +71,9 @@ def without_mass(spring: float, psi: float, p: Numbers) -> tuple[float, float]:
     return x, (slope * loading - evolving(x, psi - shift, p)) / a
 
 
-def growth(
-    spring: float,
-    psi: float,
-    log_rate: float,
-    friction: float,
-    rates: tuple[float, float],
-    p: Numbers,
-) -> float:
+def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """The quasi-static one: mass does not act where ln V is at rest."""
-    return without_mass(spring, psi, p)[1]
+    return without_mass(state[0], state[1], p)[1]
 
 
 def rupture_rate(state: Numbers, p: Numbers) -> list[float]:

@@ -15,14 +15,7 @@ def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]
     return (value - psi) / p[A], spring, shift
 
 
-def growth(
-    spring: float,
-    psi: float,
-    log_rate: float,
-    friction: float,
-    rates: tuple[float, float],
-    p: Numbers,
-) -> float:
+def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """``a d ln V = strength'(f) df - dPsi``."""
     return (strength(friction, p)[1] * rates[0] - rates[1]) / p[A]
 

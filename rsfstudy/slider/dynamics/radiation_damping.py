@@ -83,17 +83,10 @@ def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]
     return x, friction, strength(friction, p)[2]
 
 
-def growth(
-    spring: float,
-    psi: float,
-    log_rate: float,
-    friction: float,
-    rates: tuple[float, float],
-    p: Numbers,
-) -> float:
+def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """``[a + strength'(g) eta V] d ln V = strength'(g) df - dPsi``."""
     slope = strength(friction, p)[1]
-    resists = p[A] + slope * p[OWN] * math.exp(min(log_rate, LARGEST_EXPONENT))
+    resists = p[A] + slope * p[OWN] * math.exp(min(x, LARGEST_EXPONENT))
     return (slope * rates[0] - rates[1]) / resists
 
 
