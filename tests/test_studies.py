@@ -29,7 +29,7 @@ FLAGS = {"status", "regime", "inertia"}
 #: in that of error estimates, a scene of each kind.
 ENOUGH = {
     "accuracy_cost": {
-        "integrator": ["DOP853", "RK45", "Radau (mass always)"],
+        "integrator": ["DOP853", "RK45", "DOP853 + Radau", "Radau (mass always)"],
         "requested_digits": [4, 6, 8, 9],
         "repeats": 1,
     },
