@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 import rsfstudy
 from rsfstudy import Scene
+from rsfstudy.boundaries.cycles import cycles
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.measures.hard_case import HardCase
-from rsfstudy.measures.limit_cycle import LimitCycle, cycles
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
