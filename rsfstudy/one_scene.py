@@ -122,8 +122,9 @@ def _measured(measure: Measure, scene: Scene, rtol: float) -> xr.Dataset:
     outcome = measure(scene, Accuracy(rtol))
     dataset = xr.Dataset(coords=dict(measure.inner_coordinates))
     dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
+    own = {about.name: about for about in measure.quantities}
     for name, dims in measure.variables.items():
-        about = quantity(name)
+        about = quantity(name, own)
         attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
         missing = np.full([dataset.sizes[d] for d in dims], np.nan)
         values = outcome.values.get(name, missing)

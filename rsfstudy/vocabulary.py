@@ -284,25 +284,6 @@ _QUANTITIES = (
     ),
     Quantity("dynamic_slope_scaled", "", "1", "slope of dynamic stress drop over (a-b) sigma_star"),
     # what effects cost
-    Quantity("unknowns", "", "1", "unknowns of the equations between ruptures"),
-    Quantity("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
-    Quantity("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
-    Quantity(
-        "evaluation_cost",
-        "",
-        "1",
-        "time of a right-hand side between ruptures over one in the plainest scene",
-    ),
-    Quantity(
-        "evaluation_cost_in_rupture",
-        "",
-        "1",
-        "time of a right-hand side where mass acts over one in the plainest scene",
-    ),
-    Quantity("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
-    Quantity(
-        "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
-    ),
     Quantity("drop_lost_without_mass", "", "1", "fraction of the static drop lost, against mass"),
     Quantity(
         "drop_lost_without_coupling",
@@ -336,10 +317,6 @@ _QUANTITIES = (
     # whether error estimates cover
     Quantity("question", "", "", "what is measured in a random scene"),
     Quantity("sample", "", "1", "number of the random scene"),
-    Quantity("number", "", "", "name of the number"),
-    Quantity("status_kept", "", "1", "whether a tighter run ends with the same status"),
-    Quantity("error_over_estimate", "", "1", "error over its own estimate"),
-    Quantity("error_over_request", "", "1", "relative error over the accuracy asked for"),
     *(
         Quantity(f"{name}_{what}", "", "1", f"{text}{among}")
         for name, among in (("covered", ""), ("covered_by_question", ", by question"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -17,6 +17,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -38,6 +39,15 @@ _ESTIMATED = tuple(
 _TIGHTER = 0.01
 #: Work the tighter run may cost, over that of the run it judges.
 _PATIENCE = 6
+
+
+#: What its numbers are.
+_QUANTITIES = (
+    Quantity("number", "", "", "name of the number"),
+    Quantity("status_kept", "", "1", "whether a tighter run ends with the same status"),
+    Quantity("error_over_estimate", "", "1", "error over its own estimate"),
+    Quantity("error_over_request", "", "1", "relative error over the accuracy asked for"),
+)
 
 
 @dataclass(frozen=True)
@@ -86,6 +96,10 @@ class Coverage(Measure):
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"number": np.array(_ESTIMATED, dtype=object)}
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
 
     @property
     def typical_work(self) -> int:

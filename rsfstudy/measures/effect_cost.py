@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.scene import Scene
 
@@ -33,6 +34,30 @@ _KEPT = (
     "min_log10_slip_rate",
     "max_log10_slip_rate",
     "work_per_cycle",
+)
+
+
+#: What its numbers are.
+_QUANTITIES = (
+    Quantity("unknowns", "", "1", "unknowns of the equations between ruptures"),
+    Quantity("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
+    Quantity("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
+    Quantity(
+        "evaluation_cost",
+        "",
+        "1",
+        "time of a right-hand side between ruptures over one in the plainest scene",
+    ),
+    Quantity(
+        "evaluation_cost_in_rupture",
+        "",
+        "1",
+        "time of a right-hand side where mass acts over one in the plainest scene",
+    ),
+    Quantity("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
+    Quantity(
+        "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
+    ),
 )
 
 
@@ -56,6 +81,10 @@ class EffectCost(Measure):
         times = ("time_per_evaluation", "time_per_evaluation_in_rupture")
         relative = ("evaluation_cost", "evaluation_cost_in_rupture")
         return dict.fromkeys((*_KEPT, *costs, *relative, *times), ())
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
 
     @property
     def typical_work(self) -> int:
