@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,8 +11,12 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._problem import Problem, posed_by
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+
+#: What its numbers are.
+_QUANTITIES = (Quantity("answer", "", "1", "the known answer"),)
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,10 @@ class HardCase(Measure):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         names = ("measured_error", "measured_error_error", "error_estimate", "answer", "ended_as")
         return dict.fromkeys(names, ())
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
 
     @property
     def typical_work(self) -> int:

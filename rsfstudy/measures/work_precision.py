@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._problem import Problem, posed_by
 from rsfstudy.motion.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.stepping import METHODS, Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -54,6 +55,17 @@ _CHOICES = {**_ALONE, **_WITH_MASS}
 
 #: Names of the integrators, and of the ways to combine them.
 INTEGRATORS = tuple(_CHOICES)
+
+
+#: What its numbers are.
+_QUANTITIES = (
+    Quantity("achieved_digits", "", "1", "decimal digits reached: -log10 of the measured error"),
+    Quantity("run_evaluations", "", "1", "right-hand sides, those of numerical Jacobians included"),
+    Quantity("run_steps", "", "1", "steps taken"),
+    Quantity("run_jacobians", "", "1", "Jacobians evaluated"),
+    Quantity("run_time", "", "s", "processor time of the run, median of its repeats"),
+    Quantity("relative_time", "", "1", "time of the run over that of DOP853 for 3 digits"),
+)
 
 
 @dataclass(frozen=True)
@@ -113,6 +125,10 @@ class WorkPrecision(Measure):
         errors = ("measured_error", "measured_error_error", "error_estimate", "achieved_digits")
         work = ("run_evaluations", "run_steps", "run_jacobians", "run_time", "relative_time")
         return dict.fromkeys((*errors, *work), ())
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
 
     @property
     def typical_work(self) -> int:
