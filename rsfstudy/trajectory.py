@@ -7,20 +7,18 @@ import math
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import brentq
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
-from rsfstudy.motion.regimes import motion
-from rsfstudy.motion.stepping import Halt, Meter, Step
-from rsfstudy.motion.timeline import OBSERVED, elapsed, observed, timed
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind
+from rsfstudy.motion.recording import OBSERVED, SAMPLES, observed
+from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 REGIMES = ("quasi_static", "slow_manifold", "inertial", "quasi_dynamic")
-#: Points stored per integration step: enough for a smooth curve.
-_POINTS_PER_STEP = 4
 
 
 def simulate(
@@ -61,55 +59,16 @@ def simulate(
     meter = Meter(budget)
     rows: list[tuple[float, ...]] = []
     status, message = Status.OK, ""
+    moving = follow(scene, Accuracy(rtol, budget), meter, samples=SAMPLES, until=duration)
     try:
-        _follow(scene, duration, Accuracy(rtol, budget), meter, rows)
+        for event in moving:
+            if event.kind is not Kind.END:  # the last sample is there
+                rows += [(*observed(scene, event), REGIMES.index(event.regime))]
     except Halt as halt:
         status, message = halt.status, str(halt)
     return _dataset(
         scene, np.array(rows).reshape(-1, len(OBSERVED) + 1), status, message, rtol, meter
     )
-
-
-def _follow(
-    scene: Scene,
-    duration: float,
-    accuracy: Accuracy,
-    meter: Meter,
-    rows: list[tuple[float, ...]],
-) -> None:
-    """Append samples up to `duration`; stretches of one regime have clocks of their own."""
-    equations = None
-    for step, begin in timed(scene, motion(scene, accuracy, meter, clock=True)):
-        if step.equations is not equations:
-            equations = step.equations
-            rows.append(_sample(scene, step, step.start, begin))
-        last = begin + elapsed(scene, step, step.end) >= duration
-        if last:
-            step = _until(scene, step, duration - begin)
-        clocks = np.linspace(step.start, step.end, _POINTS_PER_STEP + 1)[1:].tolist()
-        rows += [_sample(scene, step, clock, begin) for clock in clocks]
-        if last:
-            return
-
-
-def _until(scene: Scene, step: Step, duration: float) -> Step:
-    """The part of a step that ends this long after its regime began."""
-    if elapsed(scene, step, step.end) <= duration:
-        return step
-    # clocks of slip are as short as slip is slow
-    finest = 1e-15 * abs(step.end - step.start)
-    clock = brentq(
-        lambda c: elapsed(scene, step, c) - duration, step.start, step.end, xtol=finest, rtol=1e-15
-    )
-    return step.until(float(clock))
-
-
-def _sample(scene: Scene, step: Step, clock: float, begin: float) -> tuple[float, ...]:
-    point = step.before if clock == step.start else step.point_at(clock)
-    time = begin + elapsed(scene, step, clock)
-    # slip is counted from the start, before which the spring was displaced by the step
-    row = observed(scene, point, time, scene.spring_stress_step)
-    return (*row, REGIMES.index(step.equations.regime))
 
 
 def _dataset(

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 from rsfstudy import Scene
 from rsfstudy.compute import workers
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.regimes import motion, starting
 from rsfstudy.motion.stepping import Meter, Step
 
 settings.register_profile(
@@ -27,7 +27,7 @@ def follow(
 ) -> Meter:
     """Integrate a scene until the callback, which sees every step, says so."""
     meter = Meter(budget)
-    for step in motion(scene, Accuracy(rtol, budget), meter, clock=True):
+    for step in motion(scene, Accuracy(rtol, budget), meter, starting(scene), clock=True):
         if until(step):
             return meter
     raise AssertionError("a motion never ends by itself")

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.regimes import motion, starting
 from rsfstudy.motion.stepping import Halt, Meter, steps
 from rsfstudy.slider.equations import Equations, log_rate_at
 from rsfstudy.slider.forms import Point
@@ -81,7 +81,8 @@ def cycle(scene: Scene, rtol: float, number: int, accuracy: Accuracy | None = No
     def slower(point):
         return point.log_rate - scene.log_load_rate
 
-    for step in motion(scene, accuracy or Accuracy(rtol, 10**7), meter, clock=True):
+    accuracy = accuracy or Accuracy(rtol, 10**7)
+    for step in motion(scene, accuracy, meter, starting(scene), clock=True):
         if step.equations is not equations:
             begin, equations = latest, step.equations
         inertial = equations.regime == "inertial"
@@ -244,7 +245,7 @@ def test_psi_is_continuous_across_a_displacement_step(displacement):
     ln(sigma/sigma_*), eq. 2.
     """
     scene = Scene(displacement_step=displacement)
-    first = next(motion(scene, Accuracy(), Meter(10**4))).before
+    first = next(motion(scene, Accuracy(), Meter(10**4), starting(scene))).before
     assert first.psi == 0.0
     assert first.spring == pytest.approx(scene.stiffness * displacement, rel=1e-15)
     ratio = 1.0 + cot_phi(scene) * first.spring
@@ -259,7 +260,7 @@ def test_mass_follows_a_displacement_step_within_the_inertial_time():
     scene = Scene(normal_stress="constant", displacement_step=20.0, inertia=True)
     fast = scene.inertial_time * math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
     assert fast > 1.0
-    step = next(motion(scene, Accuracy(), Meter(10**5)))
+    step = next(motion(scene, Accuracy(), Meter(10**5), starting(scene)))
     assert step.equations.regime == "inertial"
     assert (step.before.log_rate, step.before.friction) == (0.0, 0.0)
     assert step.before.spring == scene.spring_stress_step
@@ -283,7 +284,7 @@ def test_slip_without_mass_that_runs_away_is_named():
 )
 def test_displacement_steps_that_end_friction_are_named(displacement, status):
     with pytest.raises(Halt) as halted:
-        next(motion(Scene(displacement_step=displacement), Accuracy(), Meter(10**4)))
+        starting(Scene(displacement_step=displacement))
     assert halted.value.status is status
 
 

@@ -81,7 +81,7 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_rate, log_theta, 
 
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
-        return functions(scene)["evolving"](log_rate, b * log_theta, scene.numbers)
+        return functions(scene)["evolving"](log_rate, (b * log_theta,), 0.0, scene.numbers)[0]
 
     # exp(-100) of the slip rate is taken too much where slip is slower than that
     assert evolving("slowness") == pytest.approx(exact, abs=100.0 * rounding + 1e-40)

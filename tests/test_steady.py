@@ -117,7 +117,7 @@ def eigenvalues(equations, state) -> np.ndarray:
     state, columns = np.array(state), []
     for unit, scale in zip(np.eye(len(state)), equations.scales, strict=True):
         step = 1e-5 * scale * unit  # rounding and truncation balance
-        ahead, behind = (equations.rates((state + s).tolist()) for s in (step, -step))
+        ahead, behind = (equations.rates(tuple((state + s).tolist())) for s in (step, -step))
         columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
     found = np.linalg.eigvals(np.array(columns).T)
     return found[np.argsort(-found.real)]
@@ -142,8 +142,8 @@ def test_growth_rates_are_those_of_the_assembled_equations(law, effects, log_rat
     scene = scene.with_(stiffness_ratio=ratio)
     found = steady.steady_sliding(scene, log_rate)
     equations = between_ruptures(scene, clock=False)
-    assert np.abs(equations.rates((found.spring, found.psi))).max() < 1e-13
-    theirs = eigenvalues(equations, (found.spring, found.psi))
+    assert np.abs(equations.rates((found.spring, *found.psis))).max() < 1e-13
+    theirs = eigenvalues(equations, (found.spring, *found.psis))
     ours = 0.5 * steady.growth_rates(scene, log_rate)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-7)
 

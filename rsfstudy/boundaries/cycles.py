@@ -1,4 +1,4 @@
-"""The stick-slip cycles of a motion, one after the other, put together from its steps.
+"""The stick-slip cycles of a motion, one after the other, put together from its events.
 
 A cycle runs from one maximum of spring stress, where V rises through V_0, to the next.
 """
@@ -13,18 +13,20 @@ import numpy as np
 
 from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import motion
-from rsfstudy.motion.stepping import Halt, Meter, Step
-from rsfstudy.motion.timeline import elapsed, sampled, timed
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.recording import SAMPLES, observed
+from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
-from rsfstudy.status import Status
 
 LN10 = math.log(10.0)
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
 #: it.
 _STEADY, _SHRINKING = 1e-3, 30
+#: Part of the farthest distance from steady sliding at which a motion has settled to it.
+_AT_REST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,8 @@ class Cycle:
     landed, rested : Point
         Where friction balances the spring again below V_0 after the rupture, and at the slowest
         slip rate.
-    begin, end : tuple of float
-        Spring stress and state (f, Psi) at the maxima that begin and end the cycle.
+    begin, end : Point
+        The maxima of spring stress that begin and end the cycle.
     """
 
     interval: float
@@ -57,8 +59,8 @@ class Cycle:
     fastest: float
     landed: Point
     rested: Point
-    begin: tuple[float, float]
-    end: tuple[float, float]
+    begin: Point
+    end: Point
 
     @property
     def swing(self) -> float:
@@ -79,26 +81,54 @@ class Cycle:
 
 
 def cycles(
-    scene: Scene, accuracy: Accuracy, meter: Meter, start: tuple[float, float] | None
+    scene: Scene, accuracy: Accuracy, meter: Meter, start: Point | None
 ) -> Iterator[Cycle | None]:
     """The cycles of a motion, one after the other; None once it has settled to steady sliding.
 
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch = _Watch(scene, start)
+    watch = _Watch(start)
     swings: list[float] = []
-    for step, now in timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
-        cycle = watch.see(step, now)
+    for event in follow(scene, accuracy, meter, _asked(scene), start=start, clock=True):
+        cycle = watch.see(event)
         if cycle is not None:
             swings.append(cycle.swing)
             if swings[-1] < _STEADY or (settles(scene) and _dies_down(swings)):
                 yield None
                 return
             yield cycle
-        elif watch.at_rest(step):
+        elif event.kind is Kind.SETTLED:
             yield None
             return
+
+
+def recorded(
+    scene: Scene, start: Point, accuracy: Accuracy, meter: Meter
+) -> tuple[Cycle | None, list[tuple[float, ...]]]:
+    """One cycle, and what is observed along it; no cycle where the motion settles instead."""
+    watch, rows = _Watch(start), list[tuple[float, ...]]()
+    asked = _asked(scene)
+    motion = follow(scene, accuracy, meter, asked, start=start, clock=True, samples=SAMPLES)
+    for event in motion:
+        cycle = watch.see(event)
+        if event.watch is None or cycle is not None:
+            rows.append(observed(scene, event))
+        if cycle is not None or event.kind is Kind.SETTLED:
+            return cycle, rows
+    raise AssertionError("a motion never ends by itself")
+
+
+def _asked(scene: Scene) -> tuple[Watch, ...]:
+    """What a motion has to tell for its cycles to be seen."""
+    load = scene.log_load_rate
+    return (
+        maximum("log_rate"),
+        minimum("log_rate"),
+        rise("log_rate", load),
+        fall("log_rate", load),
+        settling(_AT_REST),
+    )
 
 
 def _dies_down(swings: list[float]) -> bool:
@@ -115,97 +145,46 @@ def _dies_down(swings: list[float]) -> bool:
 
 
 class _Watch:
-    """Sees steps go by and puts cycles together."""
+    """Sees events go by and puts cycles together."""
 
-    def __init__(self, scene: Scene, start: tuple[float, float] | None) -> None:
-        self._scene = scene
-        started = start is not None
-        self._started = started
-        self._fallen = not started
-        self._begun = 0.0
-        self._begin = start
-        self._clear()
-        self._farthest = 0.0
+    def __init__(self, start: Point | None) -> None:
+        self._begin, self._begun = start, 0.0
+        self._fallen = start is None
+        self._seen: list[Event] = []
 
-    def _clear(self) -> None:
-        self._arrested: Point | None = None
-        self._landed: Point | None = None
-        self._rested: Point | None = None
-        self._fastest: Point | None = None
-
-    def see(self, step: Step, begin: float) -> Cycle | None:
-        """Take one step in; returns a cycle that ends within it."""
-        for point in (step.before, step.after):
-            self._extremes(point)
-        if step.before.growth * step.after.growth < 0.0:
-            self._extremes(step.point_at(step.locate(lambda point: point.growth)))
-        load = self._scene.log_load_rate
-        self._fallen = self._fallen or step.after.log_rate < load
-        if (step.before.log_rate - load) * (step.after.log_rate - load) >= 0.0:
+    def see(self, event: Event) -> Cycle | None:
+        """Take one event in; returns a cycle that ends with it."""
+        self._fallen = self._fallen or event.kind is Kind.FALL
+        self._seen.append(event)
+        if event.kind is not Kind.RISE or not self._fallen:
             return None
-        clock = step.locate(lambda point: point.log_rate - load)
-        turning = step.point_at(clock)
-        if step.after.log_rate < load or not self._fallen:
-            self._extremes(turning)
-            return None
-        now = begin + elapsed(self._scene, step, clock)
-        cycle = self._complete(turning, now) if self._started else None
-        self._started, self._begun, self._fallen = True, now, False
-        self._begin = (turning.spring, turning.psi)
-        self._clear()
-        self._extremes(step.after)
+        cycle = None if self._begin is None else self._complete(self._begin, event)
+        self._begin, self._begun, self._fallen = event.point, event.time, False
+        self._seen = []
         return cycle
 
-    def _extremes(self, point: Point) -> None:
-        if self._arrested is None or point.spring < self._arrested.spring:
-            self._arrested = point
-        if self._rested is None or point.log_rate < self._rested.log_rate:
-            self._rested = point
-        balanced = abs(point.spring - point.friction) < 1e-3 * self._scene.a
-        # a cycle begins at V_0, give or take a last bit: what counts comes after the rupture
-        slower = self._fallen and point.log_rate < self._scene.log_load_rate
-        if self._landed is None and balanced and slower:
-            self._landed = point
-        if self._fastest is None or point.log_rate > self._fastest.log_rate:
-            self._fastest = point
-
-    def _complete(self, turning: Point, now: float) -> Cycle:
-        assert self._arrested is not None
-        assert self._rested is not None
-        assert self._fastest is not None
-        assert self._begin is not None
+    def _complete(self, begin: Point, end: Event) -> Cycle:
+        points = [event.point for event in self._seen]
+        fastest = max(points, key=lambda point: point.log_rate)
+        rested = min(points, key=lambda point: point.log_rate)
         return Cycle(
-            interval=now - self._begun,
-            highest=turning.spring,
-            lowest=self._arrested.spring,
-            at_peak=self._fastest.spring,
-            sliding=self._fastest.coefficient,
-            slowest=self._rested.log_rate,
-            fastest=self._fastest.log_rate,
-            landed=self._landed or self._rested,
-            rested=self._rested,
-            begin=self._begin,
-            end=(turning.spring, turning.psi),
+            interval=end.time - self._begun,
+            highest=end.point.spring,
+            lowest=min(point.spring for point in points),
+            at_peak=fastest.spring,
+            sliding=fastest.coefficient,
+            slowest=rested.log_rate,
+            fastest=fastest.log_rate,
+            landed=self._landed() or rested,
+            rested=rested,
+            begin=begin,
+            end=end.point,
         )
 
-    def at_rest(self, step: Step) -> bool:
-        """Whether the motion has come to steady sliding without another event."""
-        load = self._scene.log_load_rate
-        away = max(abs(step.after.log_rate - load), abs(step.after.imbalance) / self._scene.b)
-        self._farthest = max(self._farthest, away)
-        return away < 1e-6 * self._farthest
-
-
-def recorded(
-    scene: Scene, start: tuple[float, float], accuracy: Accuracy, meter: Meter
-) -> tuple[Cycle | None, list[tuple[float, ...]]]:
-    """One cycle, and what is observed along it; no cycle where the motion settles instead."""
-    watch, rows = _Watch(scene, start), list[tuple[float, ...]]()
-    for step, begin in timed(scene, motion(scene, accuracy, meter, start=start, clock=True)):
-        cycle = watch.see(step, begin)
-        if cycle is not None:
-            step = step.until(step.locate(lambda point: point.log_rate - scene.log_load_rate))
-        rows += sampled(scene, step, begin, start[0])
-        if cycle is not None or watch.at_rest(step):
-            return cycle, rows
-    raise Halt(Status.INTEGRATION_FAILED, "a motion ended by itself")
+    def _landed(self) -> Point | None:
+        """Where slip is slower than V_0 after the rupture, and friction balances the spring."""
+        for fallen, event in enumerate(self._seen):
+            if event.kind is Kind.FALL:
+                after = self._seen[fallen:]
+                return next((e.point for e in after if e.regime != "inertial"), None)
+        return None

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import check_start, mass_acts, motion
-from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.motion.course import along, follow
+from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
+from rsfstudy.motion.regimes import check_start, mass_acts, on_slow_manifold
+from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import without_mass
+from rsfstudy.slider.forms import Point
+from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -23,7 +27,10 @@ _LINEAR = 0.05
 #: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
 _LEAP, _SHORTEST_LEAP = 1.3, 1.002
 
-State = tuple[float, float]
+#: Part of the farthest distance from steady sliding at which a motion has come to it.
+_CLOSE = 1e-3
+
+_TOP = maximum("log_rate")
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,7 @@ class _Steady:
 
     log_rate: float
     spring: float
-    psi: float
+    psis: Numbers
     margin: float
 
     @property
@@ -71,7 +78,7 @@ class _Orbit:
 
     peaks: tuple[float, ...]
     reached: bool
-    slow_growth_at: State | None = None
+    slow_growth_at: Point | None = None
     top_at_start: float = -math.inf
 
 
@@ -131,28 +138,14 @@ def stability_margin(scene: Scene) -> float:
 def _held(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     """With the load point at rest: up to the only peak."""
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    for step, top in _tops(motion(scene, accuracy, meter), from_start=True):
-        highest = step.after.log_rate if top is None else top
-        if top is not None or (highest >= norm and not heavy):
+    watches = (_TOP,) if heavy else (_TOP, rise("log_rate", norm))
+    highest = -math.inf
+    for event in follow(scene, accuracy, meter, watches):
+        highest = norm if event.kind is Kind.RISE else event.point.log_rate
+        slows_from_start = event.kind is Kind.START and event.point.growth <= 0.0
+        if event.watch is not None or slows_from_start or (highest >= norm and not heavy):
             break
     return Swing(highest >= norm, highest - norm if heavy else math.copysign(1.0, highest - norm))
-
-
-def _tops(moving: Iterator[Step], *, from_start: bool) -> Iterator[tuple[Step, float | None]]:
-    """Steps of a motion, each with the maximum of ln V that it passes or begins at.
-
-    A motion may peak between two regimes; and where it slows down from its start, it peaked there:
-    with mass, slip rate rises to that within the inertial time.
-    """
-    rising, latest = from_start, -math.inf
-    for step in moving:
-        top = None
-        if step.before.growth > 0.0 >= step.after.growth:
-            top = step.point_at(step.locate(lambda point: point.growth)).log_rate
-        elif rising and step.before.growth <= 0.0:
-            top = max(latest, step.before.log_rate)
-        yield step, top
-        rising, latest = step.after.growth > 0.0, step.after.log_rate
 
 
 def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
@@ -164,18 +157,14 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     """
     check_start(scene)
     equations, start = without_mass(scene, clock=False), (scene.spring_stress_step, 0.0)
-    rising = equations.at(start).growth > 0.0
-    path = steps(equations, start, accuracy.solver, meter, backward=not rising)
-    return _first_peak(path, scene.log_norm_rate)
-
-
-def _first_peak(path: Iterable[Step], enough: float) -> float:
-    for step in path:
-        if step.before.growth * step.after.growth <= 0.0:
-            return step.point_at(step.locate(lambda point: point.growth)).log_rate
-        if step.after.log_rate >= enough:
-            return step.after.log_rate
-    raise AssertionError("steps() never ends by itself")
+    rising, norm = equations.at(start).growth > 0.0, scene.log_norm_rate
+    watches = (_TOP, minimum("log_rate"), rise("log_rate", norm))
+    for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):
+        if event.kind is Kind.RISE:
+            return norm
+        if event.watch is not None or event.point.log_rate >= norm or event.point.growth == 0.0:
+            return event.point.log_rate
+    raise AssertionError("a motion never ends by itself")
 
 
 def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
@@ -187,7 +176,7 @@ def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool
 
 
 def _grows_to_the_norm(
-    scene: Scene, steady: _Steady, at: State, accuracy: Accuracy, meter: Meter
+    scene: Scene, steady: _Steady, at: Point, accuracy: Accuracy, meter: Meter
 ) -> bool:
     """Leap from a slowly growing orbit to larger ones, until one shrinks or grows up to the norm.
 
@@ -197,10 +186,11 @@ def _grows_to_the_norm(
         return False
     leap = _LEAP
     while True:
-        beyond = (
-            steady.spring + leap * (at[0] - steady.spring),
-            steady.psi + leap * (at[1] - steady.psi),
+        spring, *psis = (
+            rest + leap * (now - rest)
+            for rest, now in zip((steady.spring, *steady.psis), (at.spring, *at.psis), strict=True)
         )
+        beyond = on_slow_manifold(scene, spring, tuple(psis))
         orbit = _orbit(scene, steady, beyond, accuracy, meter)
         if orbit.reached and len(orbit.peaks) == 1 and leap > _SHORTEST_LEAP:
             leap = math.sqrt(leap)
@@ -211,41 +201,49 @@ def _grows_to_the_norm(
 
 
 def _orbit(
-    scene: Scene, steady: _Steady, start: State | None, accuracy: Accuracy, meter: Meter
+    scene: Scene, steady: _Steady, start: Point | None, accuracy: Accuracy, meter: Meter
 ) -> _Orbit:
     """Follow one orbit until it is certain how it goes on, or found to grow too slowly to
     follow.
     """
-    norm, slack = scene.log_norm_rate, 100.0 * accuracy.solver
-    heavy = mass_acts(scene, accuracy)
+    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
+    watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
+    watches += [settling(_CLOSE)] if steady.stable else []
     peaks: list[float] = []
-    farthest, at_start = 0.0, -math.inf
-    for step, top in _tops(motion(scene, accuracy, meter, start=start), from_start=start is None):
-        if top is not None and step.before.growth <= 0.0 and not peaks and farthest == 0.0:
-            # no peak of an orbit to compare others with
-            at_start = top
-            if top >= norm:
-                return _Orbit((), reached=True, top_at_start=top)
-        elif top is not None:
-            peaks.append(top)
-            if peaks[-1] >= norm:
-                return _Orbit(tuple(peaks), reached=True)
-            if len(peaks) > 1:
-                growth = peaks[-1] - peaks[-2]
-                # too small to be measured, growth has the sign that linear theory gives it
-                linear = peaks[-1] - steady.log_rate < _LINEAR and not steady.stable
-                if growth <= (-slack if linear else slack):
-                    return _Orbit(tuple(peaks), reached=False)
-                slow = growth < 0.2 * (norm - peaks[-1])
-                if slow and not steady.stable and step.equations.regime != "inertial":
-                    return _Orbit(tuple(peaks), False, (step.after.spring, step.after.psi))
-        elif step.after.log_rate >= norm and not heavy:
-            return _Orbit((*peaks, step.after.log_rate), reached=True)
-        away = max(abs(step.after.log_rate - steady.log_rate), abs(step.after.imbalance) / scene.b)
-        farthest = max(farthest, away)
-        if steady.stable and away < 1e-3 * farthest:
+    at_start = -math.inf
+    for event in follow(scene, accuracy, meter, watches, start=start):
+        top = event.point.log_rate
+        if event.kind is Kind.START:
+            if start is None and event.point.growth <= 0.0:
+                # no peak of an orbit to compare others with
+                at_start = top
+                if top >= norm:
+                    return _Orbit((), reached=True, top_at_start=top)
+            elif top >= norm and not heavy:
+                return _Orbit((top,), reached=True)
+        elif event.kind is Kind.RISE:
+            return _Orbit((*peaks, norm), reached=True)
+        elif event.kind is Kind.SETTLED:
             return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
+        elif event.kind is Kind.MAXIMUM:
+            peaks.append(top)
+            if top >= norm:
+                return _Orbit(tuple(peaks), reached=True)
+            if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
+                return _Orbit(tuple(peaks), reached=False)
+            slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
+            if slow and not steady.stable and event.regime != "inertial":
+                return _Orbit(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
+
+
+def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) -> bool:
+    """Whether the last peak is no higher than the one before, as far as numbers tell. Too small to
+    be measured, growth has the sign that linear theory gives it.
+    """
+    slack = 100.0 * accuracy.solver
+    linear = peaks[-1] - steady.log_rate < _LINEAR and not steady.stable
+    return peaks[-1] - peaks[-2] <= (-slack if linear else slack)
 
 
 def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
@@ -269,4 +267,4 @@ def _steady(scene: Scene) -> _Steady:
         )
     critical = steady.critical_stiffness(scene, load)
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    return _Steady(load, found.spring, found.psi, margin)
+    return _Steady(load, found.spring, found.psis, margin)

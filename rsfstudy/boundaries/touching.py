@@ -12,12 +12,15 @@ at all where ln V is stationary.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 from scipy.optimize import brentq
 
-from rsfstudy.motion.stepping import Halt, Meter, Step, steps
-from rsfstudy.slider.equations import between_ruptures, evolution_of, log_rate_at, relation_of
+from rsfstudy.motion.course import along
+from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
+from rsfstudy.motion.regimes import on_slow_manifold
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
@@ -25,14 +28,18 @@ from rsfstudy.slider.scene import Scene
 #: given up.
 _PATH_BUDGET = 1_500
 _SLOWEST = -230.0  # ln(V/V_*): 10^-100
+#: How far above the norm in ln V a path is that touches it from there.
+_ABOVE = 1e-6
 
 
 def touching_point(scene: Scene) -> tuple[float, float] | None:
     """Spring stress and state (f, Psi) at which ln V rests at the instability norm; None where it
-    never can.
+    never can, or where the law has several states and the path is none in a plane.
 
     There, strength'(f) K (V_0/V - 1) equals the evolution of the state per unit slip.
     """
+    if scene.parts.law.states > 1:
+        return None
     relation, evolution = relation_of(scene), evolution_of(scene)
     a, x = scene.a, scene.log_norm_rate
     pull = scene.stiffness * math.expm1(scene.log_load_rate - x)
@@ -53,10 +60,10 @@ def start_of_path(
     scene: Scene,
     tolerance: float,
     meter: Meter,
-    crosses: Callable[[Point], float],
+    crossing: tuple[str, float],
     accepts: Callable[[Point], bool],
 ) -> Point | None:
-    """Follow the critical path back to where ``crosses`` vanishes.
+    """Follow the critical path back to a start.
 
     Parameters
     ----------
@@ -65,50 +72,44 @@ def start_of_path(
         Local error per step.
     meter : Meter
         Charged with the work.
-    crosses : callable
-        Function of the point that vanishes at the start.
+    crossing : tuple of str and float
+        Quantity and level that a start is at.
     accepts : callable
-        Whether a point where it vanishes is a start of the kind sought.
+        Whether a point there is a start of the kind sought.
 
     Returns
     -------
     Point or None
         None where the path touches the norm from above or never comes by.
     """
+    above = rise("log_rate", scene.log_norm_rate + _ABOVE, ends=True)
+    lost = fall("log_rate", _SLOWEST, ends=True)
+    watches = (above, lost, rise(*crossing), fall(*crossing))
+    for event in _path(scene, tolerance, meter, watches, backward=True):
+        if event.watch in watches[2:] and accepts(event.point):
+            return event.point
+    return None
+
+
+def _path(
+    scene: Scene, tolerance: float, meter: Meter, watches: Sequence[Watch], *, backward: bool
+) -> Iterator[Event]:
+    """The path from where it touches the norm, as far as there is one; by a method of order eight,
+    which gets no more than what is left.
+    """
     start = touching_point(scene)
     if start is None:
-        return None
-    path = _path_meter(tolerance, meter)
+        return
+    enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
+    path = Meter(min(enough, meter.budget - meter.spent), meter.methods)
+    equations = between_ruptures(scene, clock=False)
     try:
-        backward = steps(
-            between_ruptures(scene, clock=False), start, tolerance, path, backward=True
-        )
-        for number, step in enumerate(backward):
-            if number == 0 and step.after.log_rate > step.before.log_rate:
-                return None
-            if step.after.log_rate < _SLOWEST:
-                return None
-            found = _crossing(step, crosses)
-            if found is not None and accepts(found):
-                return found
+        yield from along(equations, start, tolerance, path, watches, backward=backward)
     except Halt:
-        return None
+        return
     finally:
         for regime, spent in path.by_regime.items():
             meter.charge(regime, spent)
-    raise AssertionError("steps() never ends by itself")
-
-
-def _path_meter(tolerance: float, meter: Meter) -> Meter:
-    """A meter for one path by a method of order eight, which gets no more than what is left."""
-    enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
-    return Meter(min(enough, meter.budget - meter.spent), meter.methods)
-
-
-def _crossing(step: Step, crosses: Callable[[Point], float]) -> Point | None:
-    if crosses(step.before) * crosses(step.after) > 0.0:
-        return None
-    return step.point_at(step.locate(crosses))
 
 
 def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
@@ -117,20 +118,17 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
 
     None where the path never passes that slip rate as the motion of this scene would.
     """
-    spring = scene.spring_stress_step
-    begin = log_rate_at(scene, spring, 0.0)
-    rates = between_ruptures(scene, clock=False)
-    growth = rates.at((spring, 0.0)).growth
-    if growth == 0.0:
+    begin = on_slow_manifold(scene, scene.spring_stress_step, (0.0,))
+    if begin.growth == 0.0:
         return None
-    found = start_of_path(
+    start = start_of_path(
         scene,
         tolerance,
         meter,
-        lambda point: log_rate_at(scene, point.spring, point.psi) - begin,
-        lambda point: point.growth * growth > 0.0,
+        ("log_rate", begin.log_rate),
+        lambda point: point.growth * begin.growth > 0.0,
     )
-    return None if found is None else found.psi / scene.a
+    return None if start is None else start.psi / scene.a
 
 
 def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
@@ -139,23 +137,12 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
 
     None where the motion does not come back.
     """
-    start = touching_point(scene)
-    if start is None:
-        return None
-    path = _path_meter(tolerance, meter)
-    fallen = False
-    try:
-        for step in steps(between_ruptures(scene, clock=False), start, tolerance, path):
-            if fallen and step.before.growth > 0.0 >= step.after.growth:
-                top = step.point_at(step.locate(lambda point: point.growth))
-                return top.log_rate - scene.log_norm_rate
-            fallen = fallen or step.after.log_rate < scene.log_load_rate
-    except Halt:
-        return None
-    finally:
-        for regime, spent in path.by_regime.items():
-            meter.charge(regime, spent)
-    raise AssertionError("steps() never ends by itself")
+    fallen, watches = False, (maximum("log_rate"), fall("log_rate", scene.log_load_rate))
+    for event in _path(scene, tolerance, meter, watches, backward=False):
+        if fallen and event.kind is Kind.MAXIMUM:
+            return event.point.log_rate - scene.log_norm_rate
+        fallen = fallen or event.kind is Kind.FALL
+    return None
 
 
 def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int) -> float | None:
@@ -164,11 +151,7 @@ def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int
     A displacement step leaves Psi = 0 and moves the spring stress alone, so the path's point with
     Psi = 0 is its start.
     """
-    found = start_of_path(
-        scene,
-        tolerance,
-        meter,
-        lambda point: point.psi,
-        lambda point: sign * point.spring > 0.0,
+    start = start_of_path(
+        scene, tolerance, meter, ("psi", 0.0), lambda point: sign * point.spring > 0.0
     )
-    return None if found is None else found.spring / scene.stiffness
+    return None if start is None else start.spring / scene.stiffness

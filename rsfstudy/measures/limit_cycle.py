@@ -21,8 +21,10 @@ from rsfstudy.boundaries.cycles import LN10, Cycle, cycles, recorded
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.recording import OBSERVED, along_path
+from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.motion.timeline import OBSERVED, along_path
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -185,28 +187,29 @@ class Approach:
         """Numbers of the limit cycle that a cycle close to it implies."""
         return cycle.numbers() + self._slopes * self._ahead(cycle)
 
-    def fixed_point(self) -> tuple[float, float]:
-        """Where the limit cycle begins, as the last cycle implies: spring stress and state."""
+    def fixed_point(self) -> Point:
+        """Where the limit cycle begins, as the last cycle implies."""
         cycle = self.seen[-1]
-        moves = cycle.end[0] - cycle.begin[0]
+        begin, end = ((point.spring, *point.psis) for point in (cycle.begin, cycle.end))
+        moves = end[0] - begin[0]
         stride = self._ahead(cycle) / moves if moves else 0.0
-        spring, psi = (x + stride * (y - x) for x, y in zip(cycle.begin, cycle.end, strict=True))
-        return spring, psi
+        spring, *psis = (x + stride * (y - x) for x, y in zip(begin, end, strict=True))
+        return on_slow_manifold(self._scene, spring, tuple(psis))
 
     def _ahead(self, cycle: Cycle) -> float:
         """Stress from the beginning of a cycle to that of the limit cycle."""
-        return (cycle.end[0] - cycle.begin[0]) / (1.0 - min(self._return, _DIVERGES))
+        return (cycle.end.spring - cycle.begin.spring) / (1.0 - min(self._return, _DIVERGES))
 
     def _learn(self) -> None:
         """Take the derivatives from the last two cycles, as long as numerical errors allow."""
         if len(self.seen) < 2:
             return
         before, now = self.seen[-2:]
-        apart = now.begin[0] - before.begin[0]
+        apart = now.begin.spring - before.begin.spring
         noise = self._accuracy.solver * self._scene.a
         if abs(apart) > (1000.0 if self._known else 1.0) * noise:
             self._known = True
-            self._return = (now.end[0] - before.end[0]) / apart
+            self._return = (now.end.spring - before.end.spring) / apart
             self._slopes = (now.numbers() - before.numbers()) / apart
 
     def _repeats(self) -> bool:
@@ -231,7 +234,7 @@ class Approach:
         """
         cycle = self.seen[-1]
         noise = self._accuracy.solver * self._scene.a
-        still = abs(cycle.end[0] - cycle.begin[0]) < 10.0 * noise
+        still = abs(cycle.end.spring - cycle.begin.spring) < 10.0 * noise
         if still or not _SLOW_APPROACH < self._return < _DIVERGES:
             return False
         slowest, fastest = (self._slopes * self._ahead(cycle))[-2:] * LN10

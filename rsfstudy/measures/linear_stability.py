@@ -18,7 +18,7 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import Steady, critical_stiffness, steady_sliding
+from rsfstudy.slider.steady import Steady, critical_stiffness, resolvent, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
@@ -133,44 +133,41 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
     def growth_at(ratio: float) -> float:
         changed = scene.with_(stiffness_ratio=ratio)
         if with_mass:
-            meter.charge("inertial", 6)
-            return growth_with_mass(changed, steady.spring)
-        meter.charge("quasi_static", 4)
-        return growth(changed, steady.spring, steady.psi)
+            equations = in_rupture(changed)
+            state = (steady.spring, steady.log_rate, steady.spring, *steady.psis[1:])
+        else:
+            equations = between_ruptures(changed, clock=False)
+            state = (steady.spring, *steady.psis)
+        meter.charge(equations.regime, 2 * len(state))
+        return growth(jacobian(equations, state))
 
-    found = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
-    return found * scene.critical_stiffness
+    ratio = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
+    return ratio * scene.critical_stiffness
 
 
-def growth(scene: Scene, spring: float, psi: float) -> float:
-    """Twice the growth rate of small oscillations about a steady state: the trace of the Jacobian.
-
-    Its determinant is positive for every stiffness, so the trace alone decides.
+def growth(jacobian: np.ndarray) -> float:
+    """What has the sign of the growth of small oscillations: minus the Hurwitz determinant of the
+    characteristic polynomial that vanishes where two roots are imaginary. Of two unknowns it is the
+    trace.
     """
-    jacobian = _jacobian(between_ruptures(scene, clock=False), (spring, psi))
-    return math.fsum(jacobian[i][i] for i in range(2))
+    size = len(jacobian)
+    coefficients = resolvent(jacobian)[0][::-1]
+    table = np.zeros((size - 1, size - 1))
+    for row in range(size - 1):
+        for column in range(size - 1):
+            place = 2 * column + 1 - row
+            table[row, column] = coefficients[place] if 0 <= place <= size else 0.0
+    return -float(np.linalg.det(table))
 
 
-def growth_with_mass(scene: Scene, spring: float) -> float:
-    """What has the sign of the growth of small oscillations by the full equations: with the
-    characteristic polynomial p**3 + c2 p**2 + c1 p + c0, it is c0 - c1 c2 (Routh).
-    """
-    state = (spring, scene.log_load_rate, spring)
-    j = np.array(_jacobian(in_rupture(scene), state))
-    c2 = -float(np.trace(j))
-    c1 = 0.5 * (float(np.trace(j)) ** 2 - float(np.trace(j @ j)))
-    c0 = -float(np.linalg.det(j))
-    return c0 - c1 * c2
-
-
-def _jacobian(equations: Equations, state: tuple[float, ...]) -> list[list[float]]:
+def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
     """Derivatives of the rates (rows) by the unknowns (columns), by central differences."""
     columns = []
     for number, scale in enumerate(equations.scales):
         step = _DIFFERENCE * scale
         ahead, behind = (
-            equations.rates([x + sign * step * (i == number) for i, x in enumerate(state)])
+            equations.rates(tuple(x + sign * step * (i == number) for i, x in enumerate(state)))
             for sign in (1.0, -1.0)
         )
         columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])
-    return [list(row) for row in zip(*columns, strict=True)]
+    return np.array(columns).T

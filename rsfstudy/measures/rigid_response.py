@@ -14,7 +14,9 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Halt, Meter, steps
+from rsfstudy.motion.course import along
+from rsfstudy.motion.events import Kind, fall, rise
+from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import rigid
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_sliding, stress_after_jump
@@ -113,19 +115,23 @@ class RigidResponse(Measure):
         at = self.inner_coordinates["slip"]
         rows: list[tuple[float, float, float]] = []
         distance = left = math.nan
+        others = steady_sliding(scene, 0.0)
+        assert others is not None
         equations = rigid(scene, scene.log_load_rate)
-        for step in steps(equations, [start], tolerance, meter):
-            passes = (step.before.friction - level) * (step.after.friction - level) <= 0.0
-            if passes and math.isnan(distance):
-                distance = step.locate(lambda point: point.friction - level)
-            if step.start < 1.0 <= step.end:
-                left = step.point_at(1.0).friction
-            while len(rows) < len(at) and at[len(rows)] <= step.end:
-                point = step.point_at(float(at[len(rows)]))
+        moments = np.union1d(at, [1.0])
+        watches = (rise("friction", level), fall("friction", level))
+        state = (start, *others.psis[1:])
+        for event in along(equations, state, tolerance, meter, watches, samples=moments.tolist()):
+            point = event.point
+            if event.watch is not None and math.isnan(distance):
+                distance = event.slip
+            if event.kind is Kind.SAMPLE and event.slip == 1.0:
+                left = point.friction
+            if event.kind is Kind.SAMPLE and event.slip in at:
                 rows.append((point.friction, point.state, point.normal_stress))
             if len(rows) == len(at) and not math.isnan(distance):
                 return distance, left, np.array(rows)
-        raise Halt(Status.INTEGRATION_FAILED, "a response ended by itself")
+        raise AssertionError("a motion never ends by itself")
 
 
 def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> float:

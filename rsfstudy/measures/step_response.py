@@ -12,9 +12,10 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind, maximum, settling
+from rsfstudy.motion.recording import OBSERVED, SAMPLES, along_path, observed
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.motion.timeline import OBSERVED, along_path, sampled, timed
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -103,14 +104,12 @@ class StepResponse(Measure):
         """The peaks of log10(V/V_*), and what is observed on the way."""
         peaks: list[float] = []
         rows: list[tuple[float, ...]] = []
-        load, farthest = scene.log_load_rate, 0.0
-        for step, begin in timed(scene, motion(scene, accuracy, meter, clock=True)):
-            rows += sampled(scene, step, begin, scene.spring_stress_step)
-            if step.before.growth > 0.0 >= step.after.growth:
-                top = step.point_at(step.locate(lambda point: point.growth))
-                peaks.append(top.log_rate / LN10)
-            away = max(abs(step.after.log_rate - load), abs(step.after.imbalance) / scene.b)
-            farthest = max(farthest, away)
-            if len(peaks) == self.peaks or (peaks and away < _OVER * farthest):
+        asked = (maximum("log_rate"), settling(_OVER))
+        for event in follow(scene, accuracy, meter, asked, clock=True, samples=SAMPLES):
+            if event.watch is None:
+                rows.append(observed(scene, event))
+            elif event.kind is Kind.MAXIMUM:
+                peaks.append(event.point.log_rate / LN10)
+            if len(peaks) == self.peaks or (peaks and event.kind is Kind.SETTLED):
                 return np.array(peaks), rows
         raise AssertionError("a motion never ends by itself")

@@ -17,6 +17,7 @@ from rsfstudy.slider.equations import (
     without_mass,
 )
 from rsfstudy.slider.forms import SLOWEST, Point
+from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.slots import LARGEST_EXPONENT
 from rsfstudy.status import Status
@@ -31,11 +32,11 @@ def motion(
     scene: Scene,
     accuracy: Accuracy,
     meter: Meter,
+    start: Point,
     *,
-    start: tuple[float, float] | None = None,
     clock: bool = False,
 ) -> Iterator[Step]:
-    """Integrate a scene from the instant after its step, for as long as the caller asks.
+    """Integrate a scene from a point, step by step, for as long as the caller asks.
 
     A scene without inertia is one quasi-static integration. With inertia, the slow manifold is
     followed up to `Accuracy.switch_norm`, the full equations above it; each stretch has a clock of
@@ -48,8 +49,8 @@ def motion(
     accuracy : Accuracy
     meter : Meter
         Charged with the work, by regime.
-    start : tuple of float, optional
-        Spring stress and state (f, Psi) to start from instead.
+    start : Point
+        Where to start; see `starting` and `on_slow_manifold`.
     clock : bool
         Carry time along in the quasi-static stretches (the inertial clock is time).
 
@@ -63,27 +64,42 @@ def motion(
         With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
         the equations end, or as `steps` does.
     """
-    from_steady_sliding = start is None
-    if start is None:
-        check_start(scene)
-        start = (scene.spring_stress_step, 0.0)
-    if not scene.inertia:
-        equations, state = without_mass(scene, clock=clock), _start(*start, clock)
+    if scene.dynamics.rupture_rate is None:
+        equations, state = without_mass(scene, clock=clock), _unknowns(start, clock)
         yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
         return
     slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene)
     handover = _Handover(scene, slow, accuracy)
-    point = handover.slow_point(*start)
-    rises = from_steady_sliding and handover.slip_of_rise(point) > accuracy.landing
+    point = handover.slow_point(start)
+    rises = handover.slip_of_rise(start, point) > accuracy.landing
     if handover.weight_of_mass(point) < 1.0 and not rises:
         point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
-    elif from_steady_sliding:
-        # a sudden step moves the spring alone; slip rate and friction follow within the inertial
-        # time
-        point = point._replace(log_rate=0.0, friction=0.0)
+    else:
+        point = start
     while True:
         point = yield from _rupture(scene, fast, point, handover, accuracy, meter)
         point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
+
+
+def starting(scene: Scene) -> Point:
+    """Steady sliding at V_* the instant after the step of a scene, which moves the spring alone:
+    slip rate and friction follow within the inertial time.
+
+    Raises
+    ------
+    Halt
+        Where the step leaves no friction of forward slip to integrate.
+    """
+    check_start(scene)
+    stepped = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.parts.law.states)
+    if scene.dynamics.rupture_rate is None:
+        return stepped
+    return stepped._replace(log_rate=0.0, friction=0.0)
+
+
+def on_slow_manifold(scene: Scene, spring: float, psis: Numbers) -> Point:
+    """The point with this spring stress and these states, where mass hardly acts."""
+    return between_ruptures(scene, clock=False).at((spring, *psis))
 
 
 @dataclass(frozen=True)
@@ -100,10 +116,11 @@ class _Handover:
         softness = min(1.0, self.scene.stiffness / self.scene.a)
         return self.accuracy.switch_norm / math.sqrt(softness)
 
-    def slow_point(self, spring: float, psi: float) -> Point:
-        """The point of the slow manifold with this spring stress and state."""
-        found: Point = self.slow.point((spring, psi), (0.0, 0.0), self.slow.p)
-        return found
+    def slow_point(self, point: Point) -> Point:
+        """The point of the slow manifold with the same spring stress and states."""
+        state = (point.spring, *point.psis)
+        below: Point = self.slow.point(state, (0.0,) * len(state), self.slow.p)
+        return below
 
     def weight_of_mass(self, point: Point) -> float:
         """How much mass matters: 1 where the slow manifold has to be left."""
@@ -111,11 +128,11 @@ class _Handover:
         correction = abs(point.spring - point.friction) / self.scene.a
         return max(norm / self.switch_norm, correction / self.accuracy.switch_correction)
 
-    def slip_of_rise(self, point: Point) -> float:
-        """Slip in D_c, times the change of ln V, while slip rate rises to this point after a step;
+    def slip_of_rise(self, start: Point, point: Point) -> float:
+        """Slip in D_c, times the change of ln V, while slip rate rises to a point after a step;
         left out, the state would miss the evolution of that slip.
         """
-        rise = abs(point.log_rate)
+        rise = abs(point.log_rate - start.log_rate)
         return self.scene.stiffness / self.scene.a * self._norm(point) ** 2 * rise
 
     def _norm(self, point: Point) -> float:
@@ -128,7 +145,7 @@ class _Handover:
         (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
         unnoticed. And the slow manifold must not hand straight back.
         """
-        below = self.slow_point(point.spring, point.psi)
+        below = self.slow_point(point)
         if point.growth > 0.0 and point.log_rate > below.log_rate + 1.0:
             return False
         norm = max(self._norm(point), self._norm(below))
@@ -167,8 +184,8 @@ def check_start(scene: Scene) -> None:
         )
 
 
-def _start(spring: float, psi: float, clock: bool) -> tuple[float, ...]:
-    return (spring, psi, 0.0) if clock else (spring, psi)
+def _unknowns(start: Point, clock: bool) -> Numbers:
+    return (start.spring, *start.psis, 0.0) if clock else (start.spring, *start.psis)
 
 
 def _climb(
@@ -185,7 +202,7 @@ def _climb(
     def excess(point: Point) -> float:
         return handover.weight_of_mass(point) - 1.0
 
-    state = _start(start.spring, start.psi, clock)
+    state = _unknowns(start, clock)
     for step in _guarded(scene, steps(slow, state, accuracy.solver, meter)):
         if excess(step.after) >= 0.0 > excess(step.before):
             step = step.until(step.locate(excess))
@@ -204,7 +221,7 @@ def _rupture(
     meter: Meter,
 ) -> Generator[Step, None, Point]:
     """The full equations, until mass no longer matters; returns the last point."""
-    state = (start.spring, start.log_rate, start.friction)
+    state = (start.spring, start.log_rate, start.friction, *start.psis[1:])
     for step in _guarded(scene, steps(fast, state, accuracy.solver, meter)):
         yield step
         if handover.landed(step.after):

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.forms import Point
+from rsfstudy.slider.parts import Numbers
 from rsfstudy.status import Status
 
 Vector = np.ndarray
@@ -94,9 +95,8 @@ class Step:
 
     def point_at(self, clock: float) -> Point:
         """What the slider does at an instant within the step."""
-        state = self.state_at(clock).tolist()
         self.meter.charge(self.equations.regime, 1)
-        return self.equations.at(state)
+        return self.equations.at(tuple(self.state_at(clock).tolist()))
 
     def locate(self, what: Callable[[Point], float]) -> float:
         """Clock at which ``what(point)`` changes sign; its sign must differ at the two ends."""
@@ -163,10 +163,10 @@ def steps(
     method = meter.method_of(regime)
     tolerance = max(tolerance, _TIGHTEST)
 
-    def rate(_clock: float, unknowns: Vector) -> list[float]:
+    def rate(_clock: float, unknowns: Vector) -> Numbers:
         meter.charge(regime, 1)
-        found: list[float] = rate_of(unknowns.tolist(), p)
-        return found
+        changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+        return changes
 
     def started(unknowns: Vector) -> OdeSolver:
         return method(
@@ -182,7 +182,7 @@ def steps(
     # what limits a step must differ between two tolerances whose results are to tell errors
     finer = (tolerance / _TOLERANCE_OF_STRIDES) ** 0.125
     solver, jacobians = started(np.asarray(state, dtype=float)), 0
-    before = equations.point(solver.y.tolist(), _rates(solver, rate), p)
+    before = equations.point(tuple(solver.y.tolist()), _rates(solver, rate), p)
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
         # checked
@@ -197,7 +197,7 @@ def steps(
                 raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
             solver, jacobians = started(solver.y), 0
             continue
-        unknowns = solver.y.tolist()
+        unknowns = tuple(solver.y.tolist())
         if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
             raise Halt(
                 Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}"
@@ -216,10 +216,10 @@ def steps(
         before = after
 
 
-def _rates(solver: OdeSolver, rate: Callable[[float, Vector], list[float]]) -> list[float]:
+def _rates(solver: OdeSolver, rate: Callable[[float, Vector], Numbers]) -> Numbers:
     """Rates of the unknowns where the solver stands; most have just computed them."""
     known = getattr(solver, "f", None)
-    return rate(solver.t, solver.y) if known is None else known.tolist()
+    return rate(solver.t, solver.y) if known is None else tuple(known.tolist())
 
 
 def _dense(solver: OdeSolver) -> Callable[[], Callable[[float], Vector]]:

@@ -55,12 +55,13 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> Functions:
         starts.append(begin)
         begin += len(part.numbers(scene))
     return _assembled(
-        (law.evolution, law.state_effect, starts[0]),
+        (law.states, tuple(getattr(law, name) for name in _OF_LAW), law.state_effect, starts[0]),
         (stress.normal_stress, stress.state_effect, starts[1]),
         (*(getattr(acting, name) for name in _OF_DYNAMICS), starts[2]),
     )
 
 
+_OF_LAW = ("evolution", "evolutions", "resting")
 _OF_DYNAMICS = ("balance", "growth", "rupture_rate", "rupture_point")
 
 
@@ -73,9 +74,14 @@ def _assembled(
     law: tuple[Any, ...], stress: tuple[Any, ...], dynamics: tuple[Any, ...]
 ) -> Functions:
     """The functions of a combination of parts; the same ones whenever it is asked for."""
-    evolution, law_effect, law_own = law
+    states, of_law, law_effect, law_own = law
     normal_stress, stress_effect, stress_own = stress
-    filled: dict[str, Any] = {"evolution": of_part(evolution, law_own)}
+    filled: dict[str, Any] = {"STATES": states, "BEYOND": 1 + states}
+    for name, function in zip(_OF_LAW, of_law, strict=True):
+        if function is not None:
+            filled[name] = of_part(function, law_own)
+    for name, usual in (("evolutions", "evolutions_of_one"), ("resting", "resting_of_one")):
+        filled.setdefault(name, bound(getattr(forms, usual), **filled))
     if normal_stress is not None:
         filled["normal_stress"] = of_part(normal_stress, stress_own)
     effects = [

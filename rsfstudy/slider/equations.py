@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rsfstudy.slider.assembly import functions, numbers_of_friction
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.forms import Point, State
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Function, Numbers
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Equations:
     scales : tuple of float
         The change of each unknown that weighs as much as a change of 1 in ln V.
     rate : callable
-        ``rate(state, p) -> list``: derivatives of the unknowns.
+        ``rate(state, p) -> tuple``: derivatives of the unknowns.
     point : callable
         ``point(state, derivatives, p) -> Point``.
     p : tuple of float
@@ -59,58 +59,64 @@ class Equations:
     p: Numbers
     longest: Callable[[Point], float] = _any_step
 
-    def rates(self, state: State) -> list[float]:
+    def rates(self, state: Numbers) -> Numbers:
         """Derivatives of the unknowns."""
-        found: list[float] = self.rate(state, self.p)
-        return found
+        changes: Numbers = self.rate(state, self.p)
+        return changes
 
-    def at(self, state: State) -> Point:
+    def at(self, state: Numbers) -> Point:
         """What the slider does."""
-        found: Point = self.point(state, self.rate(state, self.p), self.p)
-        return found
+        now: Point = self.point(state, self.rate(state, self.p), self.p)
+        return now
 
 
 def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
-    """The form of a scene where mass, if it has any, hardly acts: two unknowns, f and Psi, and time
-    as a passenger where a `clock` is wanted.
+    """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
+    of a law that has several), and time as a passenger where a `clock` is wanted.
     """
-    return _planar(scene, scene.dynamics, clock=clock)
+    return _slow(scene, scene.dynamics, clock=clock)
 
 
 def without_mass(scene: Scene, *, clock: bool) -> Equations:
     """The same, with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
         return between_ruptures(scene, clock=clock)
-    return _planar(scene, QuasiStatic(), clock=clock)
+    return _slow(scene, QuasiStatic(), clock=clock)
 
 
-def _planar(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
-    forms, a = functions(scene, dynamics), scene.a
-    p = scene.numbers
+def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
+    forms, count = functions(scene, dynamics), scene.parts.law.states
+    unknowns: tuple[str, ...] = ("spring", *_states(0, count))
+    scales, rate = (scene.a,) * len(unknowns), forms["rate"]
     if clock:
-        unknowns, scales = ("spring", "psi", "time"), (a, a, 1.0)
-        form = forms["rate_with_time"]
-        return Equations(dynamics.regime, unknowns, scales, form, forms["point"], p, stride(scene))
-    form = forms["rate"]
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms["rate_with_time"]
     return Equations(
-        dynamics.regime, ("spring", "psi"), (a, a), form, forms["point"], p, stride(scene)
+        dynamics.regime, unknowns, scales, rate, forms["point"], scene.numbers, stride(scene)
     )
+
+
+def _states(first: int, count: int) -> list[str]:
+    """Names of states from one on."""
+    return ["psi"] if count == 1 > first else [f"psi_{i + 1}" for i in range(first, count)]
 
 
 def in_rupture(scene: Scene) -> Equations:
-    """The full equations of a scene with mass: f, ln(V/V_*) and g, in inertial time T/(2 pi)."""
+    """The full equations of a scene with mass, in inertial time T/(2 pi): f, ln(V/V_*) and g, and
+    the states but the first.
+    """
     forms, a = functions(scene), scene.a
     rate, point = forms["rupture_rate"], forms["rupture_point"]
-    unknowns = ("spring", "log_rate", "friction")
-    return Equations("inertial", unknowns, (a, 1.0, a), rate, point, scene.numbers)
+    others = _states(1, scene.parts.law.states)
+    unknowns, scales = ("spring", "log_rate", "friction", *others), (a, 1.0, a, *[a] * len(others))
+    return Equations("inertial", unknowns, scales, rate, point, scene.numbers)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:
-    """A rigid slider at prescribed ln(V/V_*): one unknown, g, against slip."""
+    """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
     forms, p = functions(scene), (*scene.numbers, log_rate)
-    return Equations(
-        "rigid", ("friction",), (scene.a,), forms["rigid_rate"], forms["rigid_point"], p
-    )
+    unknowns = ("friction", *_states(1, scene.parts.law.states))
+    scales = (scene.a,) * len(unknowns)
+    return Equations("rigid", unknowns, scales, forms["rigid_rate"], forms["rigid_point"], p)
 
 
 def stride(scene: Scene) -> Callable[[Point], float]:
@@ -142,16 +148,33 @@ def normal_stress_at(scene: Scene, friction: float) -> float:
 
 
 def log_rate_at(scene: Scene, spring: float, psi: float) -> float:
-    """ln(V/V_*) for a spring stress and state where mass does not act."""
+    """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act."""
     massless = scene.dynamics if scene.dynamics.rupture_rate is None else QuasiStatic()
-    return float(functions(scene, massless)["balance"](spring, psi, scene.numbers)[0])
+    return float(functions(scene, massless)["balance"](spring, (psi,), scene.numbers)[0])
 
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
-    """The law of a scene: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolution, p = functions(scene)["evolution"], numbers_of_friction(scene)
+    """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
+    evolutions, p = functions(scene)["evolutions"], numbers_of_friction(scene)
 
     def at(log_rate: float, state: float) -> float:
-        return float(evolution(log_rate, state, p))
+        return float(evolutions(log_rate, (state,), 0.0, 1.0, p)[0])
 
     return at
+
+
+def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
+    """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
+    evolutions, p = functions(scene)["evolutions"], numbers_of_friction(scene)
+
+    def at(log_rate: float, psis: Numbers, shift: float) -> Numbers:
+        changes: Numbers = evolutions(log_rate, psis, shift, 1.0, p)
+        return changes
+
+    return at
+
+
+def resting_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
+    """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
+    psis: Numbers = functions(scene)["resting"](log_rate, shift, numbers_of_friction(scene))
+    return psis

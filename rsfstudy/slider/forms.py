@@ -1,19 +1,20 @@
 """Forms of the equations of motion, which share one clock, one friction relation and one point.
 
-Between ruptures two unknowns suffice, spring stress f and state Psi, against slip plus load point
-displacement, ds = (V + V_0) dt, in which every rate is of order one from arrest to rupture:
+Between ruptures spring stress f and the state Psi (or the states of a law that has several) are all
+that changes, against slip plus load point displacement, ds = (V + V_0) dt, in which every rate is
+of order one from arrest to rupture:
 
     df/ds = -K tanh[(x - x_0)/2],   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
 
 with x = ln(V/V_*) and x_0 = ln(V_0/V_*). How x follows from f and Psi is for the dynamics to say.
 
-They are functions of floats in which `assembly` fills in the parts of a scene.
+They are functions of floats in which `assembly` fills in the parts of a scene, and the number of
+states of its law.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from rsfstudy.slider.parts import Numbers
@@ -23,14 +24,16 @@ from rsfstudy.slider.slots import (
     LOG_LOAD_RATE,
     MU_STAR,
     STIFFNESS,
-    A,
     B,
     balance,
     evolution,
+    evolutions,
     growth,
     normal_stress,
+    resting,
     strength,
 )
+from rsfstudy.slider.states import states_at, total
 
 #: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
 SLOWEST = -290.0 * math.log(10.0)
@@ -39,7 +42,8 @@ SLOWEST = -290.0 * math.log(10.0)
 #: less than exp(-100) of itself over all the slip there is.
 STATIONARY = 100.0
 
-State = Sequence[float]
+#: How many states the law has, and where unknowns begin that are none.
+STATES, BEYOND = 1, 2
 
 
 class Point(NamedTuple):
@@ -53,12 +57,16 @@ class Point(NamedTuple):
         Its derivative with respect to the clock of the equations.
     spring, friction : float
         Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
+    psis : tuple of float
+        States freed of stress.
     psi : float
-        State freed of stress.
+        Their sum.
     state : float
-        State variable Theta.
+        State variable Theta (the sum, where a law has several).
     imbalance : float
-        Its distance from steady sliding, Theta + b ln(V/V_*).
+        Its distance from steady sliding at this slip rate, Theta + b ln(V/V_*) for most laws.
+    unrest : float
+        The largest such distance of a state, without sign.
     coefficient : float
         Friction coefficient.
     normal_stress : float
@@ -69,9 +77,11 @@ class Point(NamedTuple):
     growth: float
     spring: float
     friction: float
+    psis: tuple[float, ...]
     psi: float
     state: float
     imbalance: float
+    unrest: float
     coefficient: float
     normal_stress: float
 
@@ -81,13 +91,25 @@ def unchanged_normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+def evolutions_of_one(
+    log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+) -> Numbers:
+    """Evolution of the only state of a law, per unit slip times a share."""
+    return (share * evolution(log_rate, psis[0] - shift, p),)
+
+
+def resting_of_one(log_rate: float, shift: float, p: Numbers) -> Numbers:
+    """Steady sliding of most laws, Theta = -b ln(V/V_*)."""
+    return (shift - p[B] * log_rate,)
+
+
 def combined_rate(log_rate: float, load_velocity: float) -> float:
     """Rate (V + V_0)/V_* of slip and load point displacement together."""
     return math.exp(max(min(log_rate, LARGEST_EXPONENT), SLOWEST)) + load_velocity
 
 
-def evolving(log_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state per unit of slip and load point displacement together:
+def evolving(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
+    """Evolution of the states per unit of slip and load point displacement together:
     ``V/(V + V_0) dTheta/d(delta)``.
 
     Evolution per unit slip may grow like 1/V as slip slows down, so that the product has a limit,
@@ -96,60 +118,70 @@ def evolving(log_rate: float, state: float, p: Numbers) -> float:
     """
     load = p[LOG_LOAD_RATE]
     x = max(log_rate, load - STATIONARY)
-    return evolution(x, state, p) / (1.0 + math.exp(load - x))
+    return evolutions(x, psis, shift, 1.0 / (1.0 + math.exp(load - x)), p)
 
 
-def rate(state: State, p: Numbers) -> list[float]:
+def rate(state: Numbers, p: Numbers) -> Numbers:
     """Derivatives of f and Psi between ruptures."""
-    spring, psi = state[0], state[1]
-    x, _friction, shift = balance(spring, psi, p)
-    return [
-        -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE])),
-        evolving(x, psi - shift, p),
-    ]
+    psis = state[1:BEYOND]
+    x, _friction, shift = balance(state[0], psis, p)
+    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
+    return (loading, *evolving(x, psis, shift, p))
 
 
-def rate_with_time(state: State, p: Numbers) -> list[float]:
+def rate_with_time(state: Numbers, p: Numbers) -> Numbers:
     """The same, and time as a passenger."""
-    spring, psi = state[0], state[1]
-    x, _friction, shift = balance(spring, psi, p)
-    return [
-        -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE])),
-        evolving(x, psi - shift, p),
-        1.0 / combined_rate(x, p[LOAD_VELOCITY]),
-    ]
+    psis = state[1:BEYOND]
+    x, _friction, shift = balance(state[0], psis, p)
+    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
+    lasts = 1.0 / combined_rate(x, p[LOAD_VELOCITY])
+    return (loading, *evolving(x, psis, shift, p), lasts)
 
 
-def point(state: State, rates: State, p: Numbers) -> Point:
+def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
     """What the slider does between ruptures."""
-    spring, psi = float(state[0]), float(state[1])
-    x, friction, _shift = balance(spring, psi, p)
-    moving = float(rates[0]), float(rates[1])
-    change = growth((spring, psi), moving, x, friction, p)
-    return point_at(x, change, spring, friction, psi, p)
+    unknowns = state[:BEYOND]
+    spring, psis = unknowns[0], unknowns[1:]
+    x, friction, _shift = balance(spring, psis, p)
+    change = growth(unknowns, rates[:BEYOND], x, friction, p)
+    return point_at(x, change, spring, friction, psis, p)
 
 
 def point_at(
-    log_rate: float, growth: float, spring: float, friction: float, psi: float, p: Numbers
+    log_rate: float, growth: float, spring: float, friction: float, psis: Numbers, p: Numbers
 ) -> Point:
     """The point, with what friction says of it."""
     value, _slope, shift, _shift_slope = strength(friction, p)
     ratio = 1.0 + normal_stress(friction, p)[0]
-    state, coefficient = psi - shift, p[MU_STAR] + value - shift
-    imbalance = state + p[B] * log_rate
-    return Point(log_rate, growth, spring, friction, psi, state, imbalance, coefficient, ratio)
+    rest = resting(log_rate, shift, p)
+    psi, unrest = total(psis), 0.0
+    for i in range(STATES):
+        unrest = max(unrest, abs(psis[i] - rest[i]))
+    return Point(
+        log_rate,
+        growth,
+        spring,
+        friction,
+        psis,
+        psi,
+        psi - shift,
+        psi - total(rest),
+        unrest,
+        p[MU_STAR] + value - shift,
+        ratio,
+    )
 
 
-def rigid_rate(state: State, p: Numbers) -> list[float]:
+def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
     """A rigid slider at the ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi`` against
-    slip.
+    slip. Unknowns are g, and the states but the first.
     """
     value, slope, shift, _shift_slope = strength(state[0], p)
-    return [evolution(p[-1], value - shift - p[A] * p[-1], p) / slope]
+    changes = evolutions(p[-1], states_at(value, p[-1], state[1:], p), shift, 1.0, p)
+    return (total(changes) / slope, *changes[1:])
 
 
-def rigid_point(state: State, rates: State, p: Numbers) -> Point:
+def rigid_point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
     """What a rigid slider does."""
-    friction = float(state[0])
-    psi = strength(friction, p)[0] - p[A] * p[-1]
-    return point_at(p[-1], 0.0, friction, friction, psi, p)
+    psis = states_at(strength(state[0], p)[0], p[-1], state[1:], p)
+    return point_at(p[-1], 0.0, state[0], state[0], psis, p)

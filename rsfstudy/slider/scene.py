@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import assembly, dynamics, laws, normal_stress, steady
+from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
 from rsfstudy.slider.fields import (
     FIELDS,
     PLAIN_FIELDS,
@@ -32,7 +32,7 @@ class Parts(NamedTuple):
     law: laws.Law
     normal_stress: normal_stress.NormalStress
     dynamics: dynamics.Dynamics
-    loading: Step
+    loading: loading.Loading
 
 
 class Scene:
@@ -188,8 +188,8 @@ class Scene:
 
     @property
     def load_velocity(self) -> float:
-        """V_0/V_* after the step."""
-        return self.parts.loading.load_velocity
+        """V_0/V_* after the last step."""
+        return self.parts.loading.segments[-1].load_velocity
 
     @property
     def log_load_rate(self) -> float:
@@ -198,8 +198,26 @@ class Scene:
 
     @property
     def spring_stress_step(self) -> float:
-        """Change of spring stress over sigma_* by the displacement step."""
-        return self.parts.loading.spring_stress(self.stiffness)
+        """Change of spring stress over sigma_* by the first displacement step, K d."""
+        return self.stiffness * self.parts.loading.segments[0].displacement
+
+    @property
+    def segments(self) -> tuple[tuple[Scene, float], ...]:
+        """The scene as each segment of its loading has it, and for how long, in D_c/V_*."""
+        history = self.parts.loading.segments
+        if len(history) == 1:
+            return ((self, history[0].duration),)
+        return tuple((self._under(segment), segment.duration) for segment in history)
+
+    def _under(self, segment: loading.Segment) -> Scene:
+        """The same slider, loaded by one segment."""
+        step = Step(
+            load_velocity_ratio=segment.load_velocity, displacement_step=segment.displacement
+        )
+        made = [self._slider, *self.parts._replace(loading=step)]
+        scene = Scene.__new__(Scene)
+        scene._fill(layout_of(tuple(type(part) for part in made[1:])), made)
+        return scene
 
     @property
     def inertial_time(self) -> float:

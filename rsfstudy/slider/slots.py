@@ -6,7 +6,7 @@ parts of a scene supply. Called from here, a function says that it has not been 
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rsfstudy.slider.parts import Numbers
 
@@ -47,27 +47,39 @@ def other_state_effect(
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state per unit slip (see `laws`)."""
+    """Evolution of the state per unit slip, for a law of one state (see `laws`)."""
     _open(log_rate, state, p)
 
 
-def evolving(log_rate: float, state: float, p: Numbers) -> float:
-    """The same per unit of slip and load point displacement together (see `equations`)."""
-    _open(log_rate, state, p)
+def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
+    """Evolution of all states per unit slip, times a share (see `laws`)."""
+    _open(log_rate, psis, shift, share, p)
 
 
-def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]:
-    """ln(V/V_*), frictional stress and state lost to normal stress (see `dynamics`)."""
-    _open(spring, psi, p)
+def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
+    """The states of steady sliding (see `laws`)."""
+    _open(log_rate, shift, p)
+
+
+def evolving(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
+    """Evolution of all states per unit of slip and load point displacement together (see
+    `forms`).
+    """
+    _open(log_rate, psis, shift, p)
+
+
+def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    """ln(V/V_*), frictional stress and state lost to stress (see `dynamics`)."""
+    _open(spring, psis, p)
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """Derivative of ln V along the motion (see `dynamics`)."""
-    _open(x, friction, state, rates, p)
+    _open(state, rates, x, friction, p)
 
 
 def point_at(
-    log_rate: float, growth: float, spring: float, friction: float, psi: float, p: Numbers
-) -> tuple[float, ...]:
-    """What the slider does at one instant (see `equations.Point`)."""
-    _open(log_rate, growth, spring, friction, psi, p)
+    log_rate: float, growth: float, spring: float, friction: float, psis: Numbers, p: Numbers
+) -> tuple[Any, ...]:
+    """What the slider does at one instant (see `forms.Point`)."""
+    _open(log_rate, growth, spring, friction, psis, p)

@@ -1,14 +1,15 @@
 """Steady sliding and its linear stability, from the friction relation of a scene alone.
 
-At a steady ln(V/V_*) = x the state is Theta = -b x, so that frictional stress g solves
+At a steady ln(V/V_*) = x the states Psi_i rest where their law says, -b x + shift(g) for most, so
+that frictional stress g solves
 
-    strength(g) - shift(g) = (a - b) x.
+    strength(g) = a x + sum of Psi_i.
 
 A small change of slip that goes as exp(p s), s being slip over D_c, changes frictional stress by
-G(p) times itself, with D = strength', S = shift' and evolution slopes E_x, E_Theta (-b and -1 for
-most laws):
+G(p) times itself. With D = strength', S = shift', and the slopes M, E_x and E_s of the evolution of
+the states with respect to one another, to x and to the shift,
 
-    [D + E_Theta S/(p - E_Theta)] dg = p [a + E_x/(p - E_Theta)] du.
+    [D - S 1.(p - M)^-1 E_s] dg = p [a + 1.(p - M)^-1 E_x] du.
 
 Spring, waves and mass balance it where K (1 + w**2 p**2) + eta V p + G(p) = 0, w being
 V T/(2 pi D_c). The critical stiffness is the K at which p is imaginary. Nothing here depends on
@@ -25,7 +26,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import evolution_of, relation_of
+from rsfstudy.slider.equations import evolutions_of, relation_of, resting_of
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.states import total
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -48,24 +51,25 @@ class Steady:
     log_rate : float
     friction, spring : float
         Deviations of frictional stress and of spring stress from tau_*, over sigma_*.
-    psi : float
-        State freed of stress.
+    psis : tuple of float
+        States freed of stress.
     """
 
     log_rate: float
     friction: float
     spring: float
-    psi: float
+    psis: Numbers
 
 
 def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
     """Steady sliding of a scene at ln(V/V_*); None where no stress is as weak or as strong."""
-    friction = stress_at(scene, (scene.a - scene.b) * log_rate)
+    excess = scene.a * log_rate + total(resting_of(scene, log_rate, 0.0))
+    friction = stress_at(scene, excess)
     if friction is None:
         return None
     spring = friction + scene.dynamics.radiated(log_rate)
-    psi = relation_of(scene)(friction)[0] - scene.a * log_rate
-    return Steady(log_rate, friction, spring, psi)
+    shift = relation_of(scene)(friction)[2]
+    return Steady(log_rate, friction, spring, resting_of(scene, log_rate, shift))
 
 
 def stress_at(scene: Scene, excess: float) -> float | None:
@@ -174,26 +178,48 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     the two polynomials, from the constant one up.
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
-    by_rate, by_state = slopes_of_law(scene, steady.log_rate)
-    above = [by_rate - scene.a * by_state, scene.a]
-    below = [by_state * (shift_slope - slope), slope]
+    by_rate, by_shift, by_state = slopes_of_law(scene, steady)
+    denominator, adjugate = resolvent(by_state)
+    above = [scene.a * x for x in denominator]
+    below = [slope * x for x in denominator]
+    for power, matrix in enumerate(adjugate):
+        above[power] += float((matrix @ by_rate).sum())
+        below[power] -= shift_slope * float((matrix @ by_shift).sum())
     return above, below
 
 
-def slopes_of_law(scene: Scene, log_rate: float) -> tuple[float, float]:
-    """Derivatives of evolution per unit slip with respect to ln V and to the state, at steady
-    sliding.
+def slopes_of_law(scene: Scene, steady: Steady) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
+    ln V, to the shift, and to each state (columns).
     """
-    evolution, b = evolution_of(scene), scene.b
-    state = -b * log_rate
-    by_rate = by_state = 0.0
-    for number, weight in _WEIGHTS:
-        ahead, aside = number * _STEP, number * _STEP * b
-        faster, slower = (evolution(log_rate + x, state) for x in (ahead, -ahead))
-        by_rate += weight * (faster - slower)
-        more, less = (evolution(log_rate, state + y) for y in (aside, -aside))
-        by_state += weight * (more - less)
-    return by_rate / _STEP, by_state / (_STEP * b)
+    evolutions, b = evolutions_of(scene), scene.b
+    shift = relation_of(scene)(steady.friction)[2]
+    count = len(steady.psis)
+    slopes = np.zeros((count, count + 2))
+    for column in range(count + 2):
+        scale = 1.0 if column == 0 else b
+        for number, weight in _WEIGHTS:
+            for sign in (1.0, -1.0):
+                x, stress, *psis = (
+                    value + sign * number * _STEP * scale * (place == column)
+                    for place, value in enumerate((steady.log_rate, shift, *steady.psis))
+                )
+                changes = evolutions(x, tuple(psis), stress)
+                slopes[:, column] += sign * weight / (_STEP * scale) * np.array(changes)
+    return slopes[:, 0], slopes[:, 1], slopes[:, 2:]
+
+
+def resolvent(matrix: np.ndarray) -> tuple[Polynomial, list[np.ndarray]]:
+    """Characteristic polynomial of a matrix M, and the adjugate of p - M, whose quotient is the
+    inverse of p - M: coefficients from the constant one up (Faddeev and LeVerrier).
+    """
+    size = len(matrix)
+    coefficients, terms = [1.0], [np.eye(size)]
+    for order in range(1, size + 1):
+        product = matrix @ terms[0]
+        coefficients.insert(0, -float(np.trace(product)) / order)
+        terms.insert(0, product + coefficients[0] * np.eye(size))
+    return coefficients, terms[1:]
 
 
 def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:

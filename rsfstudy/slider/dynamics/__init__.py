@@ -3,10 +3,10 @@
 A case states how slip rate follows from spring stress and state, as plain functions of floats that
 `assembly` binds to the friction relation:
 
-- ``balance(spring, psi, p) -> (log_rate, friction, shift)``: ln(V/V_*), the frictional stress, and
-  the state lost to normal stress;
+- ``balance(spring, psis, p) -> (log_rate, friction, shift)``: ln(V/V_*), the frictional stress, and
+  the state lost to stress;
 - ``growth(state, rates, x, friction, p)``: derivative of x = ln(V/V_*) along the motion, where the
-  state (spring, psi) changes by `rates`;
+  state (spring, *psis) changes by `rates`;
 - ``rupture_rate(state, p)`` and ``rupture_point(state, rates, p)``: the full equations where the
   others do not serve.
 """

@@ -19,11 +19,12 @@ from rsfstudy.slider.slots import (
     LOG_LOAD_RATE,
     STIFFNESS,
     A,
-    evolution,
+    evolutions,
     evolving,
     point_at,
     strength,
 )
+from rsfstudy.slider.states import states_at, total
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -34,7 +35,7 @@ OWN = 0
 LARGEST_RATE = 1e30
 
 
-def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]:
+def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
     """Slip rate on the slow manifold, frictional stress, and the state lost to normal stress.
 
     Friction has the stress of the spring less what accelerates the mass, to first order in inertia:
@@ -46,38 +47,39 @@ def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]
     ----------
     spring : float
         Deviation f of spring stress from tau_*, over sigma_*.
-    psi : float
-        State freed of normal stress.
+    psis : tuple of float
+        States freed of stress.
     p : tuple of float
         T V_*/(2 pi D_c) at OWN, and its logarithm.
     """
     a = p[A]
-    x, change = without_mass(spring, psi, p)
+    x, change = without_mass(spring, psis, p)
     norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
     resistance = p[STIFFNESS] * norm * (norm + p[LOAD_VELOCITY] * p[OWN]) * change
     # the bound is far more than the motion meets before it leaves the slow manifold, so that trial
     # steps beyond keep their sense of direction
     friction = spring - max(-a, min(resistance, a))
     value, _slope, shift, _shift_slope = strength(friction, p)
-    return (value - psi) / a, friction, shift
+    return (value - total(psis)) / a, friction, shift
 
 
-def without_mass(spring: float, psi: float, p: Numbers) -> tuple[float, float]:
+def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
     """ln(V/V_*) and its growth, both quasi-static."""
     a = p[A]
     value, slope, shift, _shift_slope = strength(spring, p)
-    x = (value - psi) / a
+    x = (value - total(psis)) / a
     loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
-    return x, (slope * loading - evolving(x, psi - shift, p)) / a
+    return x, (slope * loading - total(evolving(x, psis, shift, p))) / a
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """The quasi-static one: mass does not act where ln V is at rest."""
-    return without_mass(state[0], state[1], p)[1]
+    return without_mass(state[0], state[1:], p)[1]
 
 
-def rupture_rate(state: Numbers, p: Numbers) -> list[float]:
-    """The full equations: three unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi).
+def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
+    """The full equations: unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi), and the
+    states but the first.
 
         df = K (w_0 - w),   dx = (f - g)/(K w),   strength'(g) dg = a dx + w dPsi/d(delta),
 
@@ -89,12 +91,13 @@ def rupture_rate(state: Numbers, p: Numbers) -> list[float]:
     norm = math.exp(max(min(x + p[OWN + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
     value, slope, shift, _shift_slope = strength(friction, p)
     faster = bounded((spring - friction) / (stiffness * norm))
-    weakening = norm * evolution(x, value - shift - a * x, p)
-    return [
+    changes = evolutions(x, states_at(value, x, state[3:], p), shift, norm, p)
+    return (
         bounded(stiffness * (p[LOAD_VELOCITY] * p[OWN] - norm)),
         faster,
-        bounded((a * faster + weakening) / slope),
-    ]
+        bounded((a * faster + total(changes)) / slope),
+        *changes[1:],
+    )
 
 
 def bounded(rate: float) -> float:
@@ -102,11 +105,11 @@ def bounded(rate: float) -> float:
     return max(min(rate, LARGEST_RATE), -LARGEST_RATE)
 
 
-def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[float, ...]:
+def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[Any, ...]:
     """What the slider does where mass acts."""
-    spring, x, friction = float(state[0]), float(state[1]), float(state[2])
-    psi = strength(friction, p)[0] - p[A] * x
-    return point_at(x, float(rates[1]), spring, friction, psi, p)
+    spring, x, friction = state[0], state[1], state[2]
+    psis = states_at(strength(friction, p)[0], x, state[3:], p)
+    return point_at(x, rates[1], spring, friction, psis, p)
 
 
 @dataclass(frozen=True, kw_only=True)

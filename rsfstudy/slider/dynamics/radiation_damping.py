@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.slots import LARGEST_EXPONENT, A, strength
+from rsfstudy.slider.states import total
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -37,7 +38,7 @@ def radiated(log_rate: float, damping: float) -> float:
     return damping * math.expm1(log_rate)
 
 
-def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]:
+def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
     """ln(V/V_*) at which friction and radiation together balance the spring, the frictional stress
     there, and the state lost to normal stress.
 
@@ -49,12 +50,12 @@ def balance(spring: float, psi: float, p: Numbers) -> tuple[float, float, float]
     ----------
     spring : float
         Deviation f of spring stress from tau_*, over sigma_*.
-    psi : float
-        State freed of normal stress.
+    psis : tuple of float
+        States freed of stress.
     p : tuple of float
         eta V_*/sigma_*, at OWN.
     """
-    a, damping = p[A], p[OWN]
+    a, damping, psi = p[A], p[OWN], total(psis)
     # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
     low, high = -math.inf, min((strength(spring + damping, p)[0] - psi) / a, _FASTEST)
     # a good guess where radiation takes most of the stress
@@ -87,7 +88,7 @@ def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers
     """``[a + strength'(g) eta V] d ln V = strength'(g) df - dPsi``."""
     slope = strength(friction, p)[1]
     resists = p[A] + slope * p[OWN] * math.exp(min(x, LARGEST_EXPONENT))
-    return (slope * rates[0] - rates[1]) / resists
+    return (slope * rates[0] - total(rates[1:])) / resists
 
 
 @dataclass(frozen=True, kw_only=True)

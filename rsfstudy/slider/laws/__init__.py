@@ -24,7 +24,12 @@ class Law(Part):
     """Base of the laws.
 
     A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
-    slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*).
+    slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
+    states ``resting(log_rate, shift, p)``: the states Psi of steady sliding, of which stress has
+    taken `shift`.
+
+    A law of several states says how many, and states ``evolutions(log_rate, psis, shift, share,
+    p)`` instead, all of them times a share, and `resting`.
     """
 
     b_over_a: float = number(
@@ -35,7 +40,10 @@ class Law(Part):
         rule="must be greater than 0",
     )
 
-    evolution: ClassVar[Function]
+    states: ClassVar[int] = 1
+    evolution: ClassVar[Function | None] = None
+    evolutions: ClassVar[Function | None] = None
+    resting: ClassVar[Function | None] = None
     #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
     #: state variable, and its derivative with respect to friction; none for most laws.
     state_effect: ClassVar[Function | None] = None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.parts import Part, number
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step(Part):
+class Step(Loading):
     """Load point velocity after the step, and displacement in the step."""
 
     load_velocity_ratio: float | None = number(
@@ -37,8 +38,7 @@ class Step(Part):
             return 1.0 if self.displacement_step == 0.0 else 0.0
         return self.load_velocity_ratio
 
-    def spring_stress(self, stiffness: float) -> float:
-        """Instantaneous change of spring stress over sigma_*: ``K d`` for a displacement d in
-        D_c.
-        """
-        return stiffness * self.displacement_step
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The step, and what follows it."""
+        return (Segment(self.load_velocity, self.displacement_step),)

@@ -1,0 +1,19 @@
+"""The states of a law, which act on friction together."""
+
+from __future__ import annotations
+
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.slots import A
+
+
+def total(numbers: Numbers) -> float:
+    """Sum of what several states contribute."""
+    together = 0.0
+    for number in numbers:
+        together += number
+    return together
+
+
+def states_at(value: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
+    """All states, where friction has this strength: the first is what the others leave."""
+    return (value - p[A] * log_rate - total((0.0, *others)), *others)
