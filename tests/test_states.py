@@ -1,0 +1,195 @@
+"""A law may have several states: two of equal length must be one state, in every measure."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene, simulate
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import laws, steady
+from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
+from rsfstudy.slider.laws.slip import SlipLaw
+from rsfstudy.slider.laws.slowness import SlownessLaw
+from rsfstudy.slider.parts import number
+from rsfstudy.status import Status
+
+OWN = 0
+FIRST = 0.3  # share of the first state in b
+CONSTANT = {"normal_stress": "constant"}
+
+
+def resting(log_rate, shift, p):
+    return tuple(part * (shift - p[OWN] * log_rate) for part in (FIRST, 1.0 - FIRST))
+
+
+def two_slip_states(log_rate, psis, shift, share, p):
+    b = p[OWN]
+    return (
+        -share * (psis[0] - FIRST * shift + FIRST * b * log_rate),
+        -share * (psis[1] - (1.0 - FIRST) * shift + (1.0 - FIRST) * b * log_rate),
+    )
+
+
+def two_slowness_states(log_rate, psis, shift, share, p):
+    one, other = FIRST * p[OWN], (1.0 - FIRST) * p[OWN]
+    return (
+        share * one * math.expm1(min(-((psis[0] - FIRST * shift) / one + log_rate), 700.0)),
+        share
+        * other
+        * math.expm1(min(-((psis[1] - (1.0 - FIRST) * shift) / other + log_rate), 700.0)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSlipStates(SlipLaw):
+    name = "two_slip_states"
+    states = 2
+    evolution = None
+    evolutions = staticmethod(two_slip_states)
+    resting = staticmethod(resting)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSlownessStates(SlownessLaw):
+    name = "two_slowness_states"
+    states = 2
+    evolution = None
+    evolutions = staticmethod(two_slowness_states)
+    resting = staticmethod(resting)
+
+
+def of_two_lengths(log_rate, psis, shift, share, p):
+    ratio, second = p[OWN], p[OWN + 1]
+    return (
+        -share * (psis[0] - shift + (p[1] - second) * log_rate),
+        -share * ratio * (psis[1] + second * log_rate),
+    )
+
+
+def resting_at_two_lengths(log_rate, shift, p):
+    second = p[OWN + 1]
+    return (shift - (p[1] - second) * log_rate, -second * log_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoLengths(laws.Law):
+    """The slip law twice, with L_1/L_2 = `length_ratio` and b_2 = `second`; b is that of both."""
+
+    length_ratio: float = number(1.0, "", "1", "first over second slip distance")
+    second: float = number(0.0, "", "1", "evolution effect of the second state")
+
+    name = "two_lengths"
+    states = 2
+    evolutions = staticmethod(of_two_lengths)
+    resting = staticmethod(resting_at_two_lengths)
+
+    def numbers(self, scene):
+        return self.length_ratio, self.second
+
+
+LAWS = {"slip": TwoSlipStates, "slowness": TwoSlownessStates}
+PAIRS = [("slip", CONSTANT), ("slip", {}), ("slowness", CONSTANT), ("slowness", {})]
+
+
+def both(law: str, **fields) -> tuple[Scene, Scene]:
+    """One state and two."""
+    return Scene(law=law, **fields), Scene(law=LAWS[law], **fields)
+
+
+def agree(measure, one, two, rtol=1e-7, budget=2_000_000) -> None:
+    """Headline numbers of both within the sum of their error estimates."""
+    found, again = (measure(scene, Accuracy(rtol, budget)) for scene in (one, two))
+    assert again.status is found.status
+    for name in (n for n in found.values if f"{n}_error" in found.values):
+        value, other = found.values[name], again.values[name]
+        allowed = found.values[f"{name}_error"] + again.values[f"{name}_error"]
+        assert other == pytest.approx(value, abs=allowed + 1e-14 * abs(value)), name
+
+
+@pytest.mark.parametrize(("law", "fields"), PAIRS)
+def test_the_equations_add_up(law, fields):
+    """The states of two add up to the one, in every form; each form has one unknown more."""
+    one, two = both(law, load_velocity_ratio=3.0, inertia=True, **fields)
+    steady_one, steady_two = (steady.steady_sliding(s, 0.4) for s in (one, two))
+    assert sum(steady_two.psis) == pytest.approx(steady_one.psis[0], rel=1e-13)
+    psi = 0.02
+    split = (FIRST * psi, (1.0 - FIRST) * psi)
+    slow, slow_of_two = (between_ruptures(s, clock=False) for s in (one, two))
+    rates, of_two = slow.rates((0.01, psi)), slow_of_two.rates((0.01, *split))
+    assert len(of_two) == len(slow_of_two.unknowns) == 3
+    assert (of_two[0], of_two[1] + of_two[2]) == pytest.approx(rates, rel=1e-11)
+    state = (0.01, 0.3, 0.012)
+    rest = one.a * 0.3  # what the states add to strength: value - a x
+    value = slow.at((0.012, 0.0)).coefficient - one.mu_star
+    assert math.isfinite(rest + value)
+    fast = in_rupture(one).rates(state)
+    psi = in_rupture(one).at(state).psi
+    of_two = in_rupture(two).rates((*state, (1.0 - FIRST) * psi))
+    assert of_two[:3] == pytest.approx(fast, rel=1e-11)
+    assert len(rigid(two, 0.3).unknowns) == 2
+
+
+@pytest.mark.parametrize(("law", "fields"), PAIRS)
+@pytest.mark.parametrize("inertia", [False, True])
+def test_critical_stiffness_and_growth(law, fields, inertia):
+    one, two = both(law, inertia=inertia, stiffness=0.02, load_velocity_ratio=2.0, **fields)
+    assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-11)
+    rates = steady.growth_rates(two, 0.7)
+    for rate in steady.growth_rates(one, 0.7):
+        assert np.abs(rates - rate).min() < 1e-7 * abs(rate)
+    agree(LinearStability(), one.with_(stiffness_ratio=1.0), two.with_(stiffness_ratio=1.0))
+
+
+@pytest.mark.parametrize(("law", "fields"), PAIRS)
+def test_cycles_and_responses(law, fields):
+    one, two = both(law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True, **fields)
+    agree(LimitCycle(phases=50), one, two, rtol=1e-6)
+    agree(StepResponse(peaks=2, phases=50), one.with_(inertia=False, stiffness_ratio=2.0),
+          two.with_(inertia=False, stiffness_ratio=2.0), rtol=1e-6)  # fmt: skip
+    agree(RigidResponse(points=5), one, two)
+
+
+@pytest.mark.parametrize(("law", "fields"), PAIRS)
+def test_critical_steps_by_motions(law, fields):
+    """One state has its touching path, and two go the general way: the boundary is the same."""
+    one, two = both(law, stiffness_ratio=1.3, **fields)
+    for of in ("load_velocity_ratio", "displacement_step"):
+        agree(CriticalStep(of=of), one, two, rtol=1e-4)
+    agree(Triggered(), *(s.with_(load_velocity_ratio=30.0) for s in (one, two)))
+
+
+def test_trajectories():
+    one, two = (simulate(s, duration=20.0) for s in both("slowness", load_velocity_ratio=3.0))
+    assert two["state_variable"][-1] == pytest.approx(float(one["state_variable"][-1]), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "ratio", "expected"),
+    [(1.0, 0.84, 0.048, 0.0802755656), (1.4, -0.6, 0.02, 0.38741)],
+)
+def test_two_lengths(first, second, ratio, expected):
+    """Critical stiffness k L_1/(a sigma) of two states of different lengths, from the roots of the
+    cubic that det [K + a p + sum b_i p/(p + L_1/L_i) ...] = 0 makes; rate strengthening does not
+    exclude instability (the second).
+    """
+    a = 0.01
+    scene = Scene(
+        law=TwoLengths,
+        a=a,
+        b_over_a=first + second,
+        second=second * a,
+        length_ratio=ratio,
+        stiffness=0.01,
+        **CONSTANT,
+    )
+    assert scene.critical_stiffness / a == pytest.approx(expected, rel=2e-5)
+    agree_on = LinearStability()(scene.with_(stiffness=0.9 * scene.critical_stiffness), Accuracy())
+    assert agree_on.status in (Status.OK, Status.STABLE_AT_ANY_STIFFNESS)
