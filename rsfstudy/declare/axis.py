@@ -28,8 +28,9 @@ class Axis:
         Name of the dimension; for a plain axis the field it varies, of the scene or of the measure
         (of the scene where both have one of that name).
     values : sequence, or mapping of str to mapping
-        The values of that field, where a class stands for a part of the user's own; or, for a zipped axis, a label for each point and the fields set
-        there, as in ``{"constant": {"normal_stress": "constant"}, ...}``.
+        The values of that field, where a class stands for a part of the user's own; or, for a
+        zipped axis, a label for each point and the fields set there, as in
+        ``{"constant": {"normal_stress": "constant"}, ...}``.
 
     Raises
     ------

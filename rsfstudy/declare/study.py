@@ -7,9 +7,11 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +21,8 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.reduce import Reduction
 from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.reduce import Reduction
 from rsfstudy.slider.fields import (
     FIELDS,
     SLOT_NAMES,
@@ -34,6 +36,10 @@ from rsfstudy.slider.parts import Part, quantities_of
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import QUANTITIES
 
+#: Names of the figures of rsfstudy.
+_FIGURES = frozenset(
+    module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
+)
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
 
@@ -65,8 +71,9 @@ class Study:
         What the lattice is reduced to.
     claims : sequence of Claim
         Published values the results are held against.
-    plot : str
-        Module of `rsfstudy.plots` that draws the study.
+    plot : str, function or module
+        What draws the study: a module of `rsfstudy.plots` by its name, or a function
+        ``draw(dataset, axes)`` or a module like those of the user's own.
     references : sequence of str
         Sources of the study.
     accuracy : Accuracy
@@ -89,7 +96,7 @@ class Study:
     summary: str = ""
     reductions: Sequence[Reduction] = ()
     claims: Sequence[Claim] = ()
-    plot: str = "lines"
+    plot: Any = "lines"
     references: Sequence[str] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
     version: int = 1
@@ -100,8 +107,9 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
-        for name in ("title", "summary", "plot", "declared_in"):
+        for name in ("title", "summary", "declared_in"):
             check_text(name, getattr(self, name))
+        _check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
@@ -362,10 +370,31 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": self.plot,
+            "plot": figure_name(self.plot),
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }
+
+
+def figure_name(plot: Any) -> str:
+    """What a declaration calls a figure: one of rsfstudy by its name, one of the user's own by that
+    of its function or module.
+    """
+    return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
+
+
+def _check_figure(plot: Any) -> None:
+    """Raise InvalidValue for what draws nothing, and for a name that another figure has."""
+    if isinstance(plot, str):
+        check_text("plot", plot)
+        return
+    if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
+        rule = "must be a name, or a function or module of yours that draws"
+        raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
+    name = figure_name(plot)
+    if not is_name(name) or name in _FIGURES:
+        rule = "needs a name of its own, which no figure of rsfstudy has"
+        raise InvalidValue("plot", name, rule)
 
 
 def _given(measure: Measure) -> str:

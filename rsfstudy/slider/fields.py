@@ -11,7 +11,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import dynamics, laws, loading, normal_stress, own
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.parts import Part, checked, names_of, number, quantities_of
+from rsfstudy.slider.parts import Part, checked, is_flag, names_of, number, quantities_of
 
 _POSITIVE = "must be greater than 0"
 
@@ -237,7 +237,8 @@ def fields_with(parts: Iterable[type[Part]]) -> tuple[str, ...]:
 
 def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
     """What those fields hold."""
-    kinds = dict.fromkeys(SLOT_NAMES, str)
+    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
+    parts = tuple(parts)
     for part in parts:
         kinds |= {n: (bool if is_flag(part, n) else float) | None for n in names_of(part)}
     return {name: KINDS.get(name, kinds.get(name)) for name in fields_with(parts)}
@@ -246,9 +247,7 @@ def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
 # ---- which fields have a meaning -----------------------------------------------------------------
 
 
-def without_meaning(
-    values: Mapping[str, Any], parts: Iterable[type[Part]] = ()
-) -> frozenset[str]:
+def without_meaning(values: Mapping[str, Any], parts: Iterable[type[Part]] = ()) -> frozenset[str]:
     """Fields that belong to other parts than those that values name.
 
     Parameters
@@ -296,9 +295,9 @@ def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
     if value is not None:
         remedy = f"{' and '.join(slot.callers)} call for those of rsfstudy."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.own, remedy=remedy)
-    for field, part in slot.callers.items():
-        value = given.get(field)
-        if value is not None and checked(part, field, value):
+    for caller, part in slot.callers.items():
+        value = given.get(caller)
+        if value is not None and checked(part, caller, value):
             return part
     return slot.choices[slot.default]
 

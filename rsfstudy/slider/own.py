@@ -86,9 +86,7 @@ def _of_every_scene() -> set[str]:
     return {*dir(Scene), *Scene.__annotations__}
 
 
-def _check_field(
-    slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]
-) -> None:
+def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]) -> None:
     stated = part.__dataclass_fields__[name]
     if not has_meaning(stated):
         rule, remedy = "says neither what it is nor its rule", "State it by number() or flag()."
