@@ -128,7 +128,10 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
     wanted, kinds = values.pop("kind"), _kinds(Reduction, reduce)
     if wanted not in kinds:
-        raise InvalidValue("reduction", wanted, "is not part of rsfstudy", choices=kinds)
+        remedy = "If it is your own, name the file that declares it: --study FILE (study=)."
+        raise InvalidValue(
+            "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
+        )
     found: Reduction = fit(values, kinds[wanted], path)
     return found
 

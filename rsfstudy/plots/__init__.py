@@ -68,11 +68,11 @@ def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
 
 
 def _draw(dataset: xr.Dataset, module: Any, axes: Axes, panel: Panel) -> Axes:
-    drawn = panel(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
+    panel(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
     lacking = _lacking(dataset)
     if lacking:
-        drawn.set_title(f"{drawn.get_title()} [{lacking}]".strip(), color="tab:red")
-    return drawn
+        axes.set_title(f"{axes.get_title()} [{lacking}]".strip(), color="tab:red")
+    return axes
 
 
 def _lacking(dataset: xr.Dataset) -> str:

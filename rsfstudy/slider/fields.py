@@ -287,13 +287,14 @@ def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
         return known(slot, value)
     if isinstance(value, str) and value in slot.own:
         return slot.own[value]
-    if slot.is_named:
+    if slot.name in SLOT_FIELDS:
         name = given.get(slot.name, slot.default)
         if not isinstance(name, str) or name not in slot.choices:
             raise InvalidValue(slot.name, name, "is unknown", choices=(*slot.choices, *slot.own))
         return slot.choices[name]
     if value is not None:
-        remedy = f"{' and '.join(slot.callers)} call for those of rsfstudy."
+        others = ", ".join(slot.callers) or "the other fields"
+        remedy = f"Those of rsfstudy are called for by {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.own, remedy=remedy)
     for caller, part in slot.callers.items():
         value = given.get(caller)
