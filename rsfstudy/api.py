@@ -21,7 +21,7 @@ from rsfstudy.compute.workers import on_client, on_local_cluster, threads
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import check_text
 from rsfstudy.declare.claims import verdicts
-from rsfstudy.declare.study import Study
+from rsfstudy.declare.study import Study, figure_name
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.files import contents, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
@@ -194,8 +194,9 @@ def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], x
     InvalidValue
         For whatever is wrong with it.
     """
-    digest = own_code.digest(type(study.measure))
-    task = Task(study.measure, study.accuracy, workers.time_limit, own_code=digest)
+    parts = tuple(study.own_parts.values())
+    digest = own_code.digest(type(study.measure), *parts)
+    task = Task(study.measure, study.accuracy, workers.time_limit, parts=parts, own_code=digest)
     if workers.mapper() is not serial:
         sendable(task)  # told before any work, if it is not
     ready = runner.Run(study, keeping, task, workers.threads())
@@ -345,10 +346,14 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """
     declared = contents.declaration(results)
     if file is None:
-        if contents.provenance(results)["fingerprint"]["own_code"] != "none":
+        about = contents.provenance(results)
+        if about["fingerprint"]["own_code"] != "none":
             rule = "is a user's own, and code is never taken from a results file"
             remedy = "Name the file that declares it: --study FILE (study=)."
-            raise InvalidValue("measure", declared.measure["name"], rule, remedy=remedy)
+            if about["declared_in"]:
+                remedy += f" It was {brief(about['declared_in'])}."
+            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
+            raise InvalidValue(name, value, rule, remedy=remedy)
         study = restore.study(declared)
     else:
         named = catalogue.load(str(file))
@@ -358,6 +363,26 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
         study = restore.study(declared, of_its_own=named)
     _check_lattice(study, results)
     return study
+
+
+def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
+    """What draws a dataset with a figure of the user's own, from the file that declares the study:
+    the one that is given, or the one that the dataset names.
+
+    Raises
+    ------
+    InvalidValue
+        Where there is no such file, or it has no such figure.
+    """
+    name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
+    if not (file or named_in):
+        remedy = "Name the file that declares it: --study FILE."
+        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
+    study = catalogue.load(str(file or named_in))
+    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
+        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
+        raise InvalidValue("study", str(file or named_in), rule)
+    return None if isinstance(study.plot, str) else study.plot
 
 
 def _check_lattice(study: Study, results: xr.Dataset) -> None:

@@ -24,6 +24,7 @@ from rsfstudy.compute.workers import existing_cluster
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, brief
+from rsfstudy.files import contents
 from rsfstudy.terminal import FAILED, OK, Ended
 
 WRONG_USAGE = 2
@@ -78,6 +79,11 @@ _time_limit = click.option(
     default=DEFAULT_TIME_LIMIT,
     show_default=True,
     help="Seconds of CPU time after which a worker gives a cell up.",
+)
+_study = click.option(
+    "--study",
+    type=click.Path(path_type=Path),
+    help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 _quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 
@@ -191,7 +197,8 @@ def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping) -> E
     began = time.monotonic()
     dataset = compute()
     file = keeping.output / f"{study.name}.{_ENDINGS[keeping.format]}"
-    drawn = _drawn(dataset, keeping.output / f"{study.name}.png")
+    own = None if isinstance(study.plot, str) else study.plot
+    drawn = _drawn(dataset, keeping.output / f"{study.name}.png", own)
     terminal.report(dataset, study.name, [file, *drawn])
     return terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
 
@@ -223,11 +230,7 @@ def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: K
     metavar="AXIS=VALUE",
     help="Only this cell, in this process, failing as it fails.",
 )
-@click.option(
-    "--study",
-    type=click.Path(path_type=Path),
-    help="File that declares the study, if its measure is its own.",
-)
+@_study
 @click.option(
     "--output",
     type=click.Path(file_okay=False),
@@ -290,15 +293,18 @@ def check(name: str | None, every: bool, output: Path) -> int:
 @click.argument("name", required=False)
 @_all
 @_output
-def plot(name: str | None, every: bool, output: Path) -> int:
-    """Draw the figure of a named study's results, or of a file, beside it."""
+@_study
+def plot(name: str | None, every: bool, output: Path, study: Path | None) -> int:
+    """Draw the figure of a named study's results, or of a file, beside it. A figure of your own is
+    taken from the file that declares the study, which is run.
+    """
     status = OK
     for what in _results(name, every):
         dataset = api.open(what, output)
         named = Path(what)
         beside = named if named.suffix in RESULTS else output / f"{dataset.attrs['id']}.png"
         path = beside.with_suffix(".png")
-        drawn = _drawn(dataset, path)
+        drawn = _drawn(dataset, path, _own_figure(dataset, study))
         status = status if drawn else FAILED
         for file in drawn:
             terminal.console.print(f"{file}", highlight=False)
@@ -388,12 +394,28 @@ def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
         yield client
 
 
-def _drawn(dataset: xr.Dataset, path: Path) -> list[Path]:
+def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
+    """What draws results whose figure is none of ours: what their study file says, or lines."""
+    from rsfstudy import plots
+    from rsfstudy.plots import lines
+
+    if contents.declaration(dataset).plot in plots.NAMES:
+        if study is not None:
+            catalogue.load(str(study))  # for the parts of its scenes
+        return None
+    try:
+        return api.own_figure(dataset, study)
+    except RsfStudyError as error:
+        _stderr.print(f"note: drawn as lines, because the figure was not found: {error}")
+        return lines
+
+
+def _drawn(dataset: xr.Dataset, path: Path, own: Any = None) -> list[Path]:
     """The figure, if it can be drawn; the results are there already."""
     from rsfstudy import plots
 
     try:
-        plots.save(dataset, path)
+        plots.save(dataset, path, own)
     except (OSError, RsfStudyError) as error:
         _stderr.print(f"no figure: {error}")
         return []

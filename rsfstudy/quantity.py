@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from dataclasses import dataclass
 
 
@@ -38,3 +39,8 @@ class Quantity:
         if self.units not in ("", "1"):
             text += f" ({self.units})"
         return text
+
+
+def is_name(name: object) -> bool:
+    """Whether a text can name a variable: an identifier, as a file gives it back."""
+    return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)

@@ -2,6 +2,7 @@
 ours.
 """
 
+import ast
 import re
 import subprocess
 import sys
@@ -82,6 +83,32 @@ def test_the_table_of_zeta_is_ours():
         assert float(row.zeta) == pytest.approx(float(zeta), abs=0.51 * 10.0**-digits)
         digits = len(error.split(".")[1])
         assert float(row.zeta_stderr) == pytest.approx(float(error), abs=0.51 * 10.0**-digits)
+
+
+def lines_of_code(source: str, nodes: list[ast.stmt]) -> int:
+    """Lines of some statements, without blank ones, comments and docstrings."""
+    lines = source.splitlines()
+    first = [min(d.lineno for d in [*getattr(n, "decorator_list", ()), n]) for n in nodes]
+    spans = [range(a, n.end_lineno + 1) for a, n in zip(first, nodes, strict=True)]
+    kinds = ast.ClassDef, ast.FunctionDef
+    bodies = [n.body for node in nodes for n in ast.walk(node) if isinstance(n, kinds)]
+    inside = [part for body in bodies for part in body]
+    texts = [n for n in inside if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)]
+    words = {n for text in texts for n in range(text.lineno, text.end_lineno + 1)}
+    code = {n for span in spans for n in span} - words
+    return sum(lines[n - 1].strip()[:1] not in ("", "#") for n in code)
+
+
+def test_what_it_takes_to_add_something_is_counted():
+    rows = re.findall(r"^\|.*`(\w+\.py)` \| (\d+) \| (\d+) \|$", README, re.MULTILINE)
+    examples = Path(__file__).parent / "extensions"
+    assert {name for name, _part, _file in rows} == {file.name for file in examples.glob("*.py")}
+    for name, *stated in rows:
+        source = (examples / name).read_text()
+        code = ast.parse(source).body[1:]
+        beside = ast.Import, ast.ImportFrom
+        part = [node for node in code if not isinstance(node, beside) and node is not code[-1]]
+        assert [lines_of_code(source, nodes) for nodes in (part, code)] == [*map(int, stated)], name
 
 
 def test_the_tree_names_every_room_and_no_other():

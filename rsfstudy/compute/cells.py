@@ -25,6 +25,9 @@ from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.files.journal import Finished
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import fields
+from rsfstudy.slider.parts import Part
+from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
@@ -58,8 +61,10 @@ class Task:
         CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
     code : mapping
         Versions of all that decides a number, which every worker must have.
+    parts : tuple of type
+        Parts of the slider that are the user's own.
     own_code : str
-        Digest of the code of the measure, where it is a user's own: the same.
+        Digest of the code of the measure and the parts, where they are a user's own: the same.
     home : str
         The process that made the task.
     """
@@ -68,6 +73,7 @@ class Task:
     accuracy: Accuracy
     time_limit: float = DEFAULT_TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
+    parts: tuple[type[Part], ...] = ()
     own_code: str = "none"
     home: str = _HERE
 
@@ -97,14 +103,20 @@ def sendable(task: Task) -> bytes:
     Raises
     ------
     InvalidValue
-        Where the measure holds what cannot be sent.
+        Where the measure, or a part, holds what cannot be sent.
     """
+    for part in task.parts:
+        _dumped(part, "part", part.name)
+    return _dumped(task, "measure", task.measure.name)
+
+
+def _dumped(value: object, what: str, name: str) -> bytes:
     try:
-        return bytes(cloudpickle.dumps(task))
+        return bytes(cloudpickle.dumps(value))
     except Exception as error:
         rule = f"cannot be sent to a worker ({error})"
         remedy = "Compute in this process: --serial (workers=0)."
-        raise InvalidValue("measure", task.measure.name, rule, remedy=remedy) from error
+        raise InvalidValue(what, name, rule, remedy=remedy) from error
 
 
 @functools.lru_cache(maxsize=4)
@@ -120,8 +132,8 @@ def _received(sent: bytes) -> Task:
         task: Task = cloudpickle.loads(sent)
     except Exception as error:
         raise RunError(
-            f"a worker cannot load the measure ({type(error).__name__}: {error}). Give the workers "
-            "the files it needs, or put them beside the study file"
+            f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
+            "the workers the files it needs, or put them beside the study file"
         ) from error
     ours = provenance.code()
     for name, wanted in task.code.items():
@@ -130,9 +142,11 @@ def _received(sent: bytes) -> Task:
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
                 "mix. Give the workers the same versions"
             )
-    if own_code.digest(type(task.measure)) != task.own_code:
+    classes = type(task.measure), *task.parts
+    if own_code.digest(*classes) != task.own_code:
+        names = " or ".join(kind.__name__ for kind in classes)
         raise RunError(
-            f"a worker has another {type(task.measure).__name__}, or other code it draws on, than "
+            f"a worker has another {names}, or other code it draws on, than "
             "this run: their numbers would mix. Give the workers the same files, and start them "
             "again"
         )
@@ -140,8 +154,16 @@ def _received(sent: bytes) -> Task:
 
 
 def packed(batch: Batch) -> bytes:
-    """A batch as little as can be: Dask's scheduler holds on to what it has passed on."""
-    return zlib.compress(pickle.dumps(batch), level=1)
+    """A batch as little as can be: Dask's scheduler holds on to what it has passed on. Scenes go
+    as what they are made of: a worker has their parts from the task.
+    """
+    cells = [(key, scene.as_dict(), changes) for key, (scene, changes) in batch]
+    return zlib.compress(pickle.dumps(cells), level=1)
+
+
+def _unpacked(batch: bytes) -> Iterator[tuple[bytes, Cell]]:
+    for key, values, changes in pickle.loads(zlib.decompress(batch)):
+        yield key, Cell(Scene(**values), changes)
 
 
 def on_worker(sent: bytes, batch: bytes) -> Found:
@@ -162,7 +184,8 @@ def on_worker(sent: bytes, batch: bytes) -> Found:
     began = time.monotonic()
     ours = task.home == _HERE  # a worker may be a thread of the user's own process
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
-        for key, cell in pickle.loads(zlib.decompress(batch)):
+        fields.know(task.parts)
+        for key, cell in _unpacked(batch):
             found.append((key, computed(task, cell)))
             if time.monotonic() - began > _TELL_DRIVER:
                 break

@@ -1,7 +1,7 @@
-"""The code of a user's own measure: a digest of all it draws on, as it is in memory.
+"""The code of a user's own measure and parts: a digest of all they draw on, as it is in memory.
 
 Files tell no more than what was there when they were last written; here the functions themselves
-are followed, from the class of the measure through every name they use, so that the digest is the
+are followed, from their classes through every name they use, so that the digest is the
 same for the same code, be it a study file, a script, a notebook or a worker, and another as soon as
 a function, a constant or a helper is. Modules that a function imports when it runs are not
 followed. Python, installed packages and rsfstudy itself have versions, and end the search.
@@ -43,13 +43,15 @@ _MADE = {
 _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 
 
-def digest(measure: type) -> str:
-    """Digest of the class of a measure and of all it draws on; "none" for a class of rsfstudy."""
-    if not _is_own(measure.__module__):
+def digest(*classes: type) -> str:
+    """Digest of classes and of all they draw on; "none" where all are of rsfstudy."""
+    own = [kind for kind in classes if _is_own(kind.__module__)]
+    if not own:
         return "none"
-    found = hashlib.sha256()
-    for part in _Walk().parts(measure, ()):
-        found.update(part.encode(errors="surrogatepass") + b"\0")
+    found, walk = hashlib.sha256(), _Walk()
+    for kind in own:
+        for part in walk.parts(kind, ()):
+            found.update(part.encode(errors="surrogatepass") + b"\0")
     return found.hexdigest()[:16]
 
 

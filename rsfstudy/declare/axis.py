@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import is_name
+from rsfstudy.quantity import is_name
+from rsfstudy.slider.fields import named
 
 Row = Mapping[str, Any]
 
@@ -27,8 +28,9 @@ class Axis:
         Name of the dimension; for a plain axis the field it varies, of the scene or of the measure
         (of the scene where both have one of that name).
     values : sequence, or mapping of str to mapping
-        The values of that field; or, for a zipped axis, a label for each point and the fields set
-        there, as in ``{"constant": {"normal_stress": "constant"}, ...}``.
+        The values of that field, where a class stands for a part of the user's own; or, for a
+        zipped axis, a label for each point and the fields set there, as in
+        ``{"constant": {"normal_stress": "constant"}, ...}``.
 
     Raises
     ------
@@ -53,7 +55,7 @@ class Axis:
             listed = [values] if isinstance(values, str) else values
             if not is_list(listed):
                 raise InvalidValue(dimension, values, "must be a list of values")
-            rows = tuple({dimension: plain(value)} for value in listed)
+            rows = tuple({dimension: plain(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
                 raise InvalidValue(dimension, None, "must be a value on an axis")
         object.__setattr__(self, "dimension", dimension)
@@ -107,7 +109,7 @@ def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
             raise InvalidValue(dimension, label, "must be a text that labels a point")
         if not isinstance(row, Mapping) or not row:
             raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
-    return tuple({n: plain(v) for n, v in row.items()} for row in points.values())
+    return tuple({n: plain(n, v) for n, v in row.items()} for row in points.values())
 
 
 def select(axis: Axis, labels: Sequence[str]) -> Axis:
@@ -129,7 +131,7 @@ def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             spread[label] = row
             continue
         for value in values:
-            changed = {**row, name: plain(value)}
+            changed = {**row, name: plain(name, value)}
             if changed in spread.values():
                 continue
             new = f"{name} = {value}"
@@ -157,8 +159,11 @@ def is_list(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
-def plain(value: Any) -> Any:
-    """A value as Python's own number, flag or text; whole numbers as float."""
+def plain(field: str, value: Any) -> Any:
+    """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
+    the user's own by its name.
+    """
+    value = named(field, value)
     value = value.item() if isinstance(value, np.generic) else value
     if not isinstance(value, int) or isinstance(value, bool):
         return value

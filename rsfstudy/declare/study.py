@@ -7,8 +7,11 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,12 +19,27 @@ import numpy as np
 from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select, spread
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import TAKEN, Measure, is_name
+from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
-from rsfstudy.slider.fields import FIELDS, SLOT_FIELDS, without_meaning
+from rsfstudy.slider.fields import (
+    FIELDS,
+    SLOT_NAMES,
+    by_class,
+    fields_with,
+    named,
+    own_named,
+    without_meaning,
+)
+from rsfstudy.slider.parts import Part, quantities_of
 from rsfstudy.slider.scene import Scene
+from rsfstudy.vocabulary import QUANTITIES
 
+#: Names of the figures of rsfstudy.
+_FIGURES = frozenset(
+    module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
+)
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
 
@@ -53,8 +71,9 @@ class Study:
         What the lattice is reduced to.
     claims : sequence of Claim
         Published values the results are held against.
-    plot : str
-        Module of `rsfstudy.plots` that draws the study.
+    plot : str, function or module
+        What draws the study: a module of `rsfstudy.plots` by its name, or a function
+        ``draw(dataset, axes)`` or a module like those of the user's own.
     references : sequence of str
         Sources of the study.
     accuracy : Accuracy
@@ -77,7 +96,7 @@ class Study:
     summary: str = ""
     reductions: Sequence[Reduction] = ()
     claims: Sequence[Claim] = ()
-    plot: str = "lines"
+    plot: Any = "lines"
     references: Sequence[str] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
     version: int = 1
@@ -88,14 +107,16 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
-        for name in ("title", "summary", "plot", "declared_in"):
+        for name in ("title", "summary", "declared_in"):
             check_text(name, getattr(self, name))
+        _check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
         self._check_parts()
+        self._check_own_fields()
         self._check_fields()
         for name, value in self.describe().items():
             try:
@@ -144,13 +165,22 @@ class Study:
                 if name in taken:
                     raise InvalidValue("axis", name, "is the name of something measured")
 
+    def _check_own_fields(self) -> None:
+        """Refuse parts whose fields are called as something that is no field of theirs."""
+        taken = {*self.measure.variables, *self.measure.inner_coordinates}
+        taken |= {*TAKEN, *QUANTITIES, *(reduction.name for reduction in self.reductions)}
+        for name in self.scene_fields[len(FIELDS) :]:
+            if name in taken - SLOT_NAMES:
+                rule, remedy = "is the name of something else", "Rename the field of your part."
+                raise InvalidValue("field", name, rule, remedy=remedy)
+
     def _check_fields(self) -> None:
         """Refuse axes over fields that nothing has, and over those of the measure that decide
         which numbers it gives: all cells of a lattice have the same.
         """
-        known = dict.fromkeys((*FIELDS, *self.measure.plain_fields))
+        known = dict.fromkeys((*self.scene_fields, *self.measure.plain_fields))
         for axis in self.axes:
-            if axis.labels is not None and axis.dimension in (*FIELDS, *axis.fields):
+            if axis.labels is not None and axis.dimension in (*self.scene_fields, *axis.fields):
                 rule = "is a field: a zipped axis needs a name of its own"
                 raise InvalidValue("axis", axis.dimension, rule)
             for name in axis.fields:
@@ -160,7 +190,7 @@ class Study:
                         f"{self.measure.name}"
                     )
                     raise InvalidValue("field", name, rule, choices=known)
-        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= set(FIELDS)]
+        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self._of_scene]
         given = _given(self.measure)
         for rows in itertools.product(*varied):
             measure = self.measure.with_(**self._split(rows)[1])
@@ -175,6 +205,35 @@ class Study:
         for name in fields:
             if name in self.measure.sought:
                 raise InvalidValue(name, "...", "is what the measure looks for, and has no effect")
+
+    # ---- parts of the user's own ------------------------------------------------------------
+
+    @cached_property
+    def own_parts(self) -> Mapping[str, type[Part]]:
+        """Parts of the slider that are the user's own, by name, as they were when the study was
+        declared.
+        """
+        found: dict[str, type[Part]] = {}
+        for axis in self.axes:
+            found |= own_named(axis.fields, axis.rows)
+        found |= {part.name: part for part in self.base.own_parts}
+        return dict(sorted(found.items()))
+
+    @cached_property
+    def scene_fields(self) -> tuple[str, ...]:
+        """Fields that its scenes may have: those of every scene, and those of its own parts."""
+        return fields_with(self.own_parts.values())
+
+    @cached_property
+    def _of_scene(self) -> frozenset[str]:
+        return frozenset(self.scene_fields)
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """What its own parts and its measure say of what the vocabulary does not hold, by name."""
+        of_parts = [q for part in self.own_parts.values() for q in quantities_of(part)]
+        of_measure = list(self.measure.quantities)
+        return {q.name: q for q in (*of_parts, *of_measure) if q.name not in FIELDS}
 
     # ---- the lattice ------------------------------------------------------------------------
 
@@ -201,10 +260,10 @@ class Study:
         InvalidValue
             For a cell that makes no meaningful scene, naming its place on the axes.
         """
-        unused = {name for axis in self.axes for name in axis.fields if name in FIELDS}
+        unused = {name for axis in self.axes for name in axis.fields if name in self._of_scene}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             cell = self._cell(rows)
-            unused = {name for name in unused if cell.scene.as_dict()[name] is None}
+            unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
             yield cell
         for axis in self.axes:
             for name in axis.fields:
@@ -237,14 +296,17 @@ class Study:
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
             for name, value in row.items():
-                split[name not in FIELDS][name] = value
+                split[name not in self._of_scene][name] = value
         return split
 
     def _cell(self, rows: Sequence[Row]) -> Cell:
         of_scene, changes = self._split(rows)
         # one row that states both a choice and what has no meaning then is contradictory
-        stated = {name for row in rows if set(row) & SLOT_FIELDS for name in row}
-        meaningless = without_meaning(self.base.as_dict() | of_scene) - stated
+        stated = {name for row in rows if set(row) & SLOT_NAMES for name in row}
+        if self.own_parts:
+            of_scene = by_class(of_scene, self.own_parts)
+        parts = self.own_parts.values()
+        meaningless = without_meaning(self.base.as_dict() | of_scene, parts) - stated
         of_scene = {name: value for name, value in of_scene.items() if name not in meaningless}
         try:
             return Cell(self.base.with_(**of_scene), changes)
@@ -267,10 +329,11 @@ class Study:
             For a name that is neither an axis nor a field of the scene or of the measure, and for
             values that make no axis.
         """
-        study = self
-        for name, value in overrides.items():
-            study = study._override(name, value)
-        return replace(study, overrides={**self.overrides, **_plain_data(overrides)})
+        study, given = self, _by_name(overrides)
+        # parts of the user's own come first: they bring the fields that others may be
+        for name in sorted(given, key=lambda name: not own_named([name], _rows(name, given[name]))):
+            study = study._override(name, given[name])
+        return replace(study, overrides={**self.overrides, **_plain_data(given)})
 
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
@@ -282,16 +345,17 @@ class Study:
             else:
                 continue
             return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-        known = dict.fromkeys((*self.dimensions, *FIELDS, *self.measure.plain_fields))
-        if name not in known:
+        known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
+        if name not in known and not own_named([name], _rows(name, values)):
             rule = "is neither an axis nor a field of the scene or of the measure"
             raise InvalidValue("override", name, rule, choices=known)
         self._check_sought([name])
         if is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
-        if name in FIELDS:
-            return replace(self, base=self.base.with_(**{name: plain(value)}))
-        return replace(self, measure=self.measure.with_(**{name: plain(value)}))
+        if name in self._of_scene | SLOT_NAMES:
+            changes = by_class({name: plain(name, value)}, self.own_parts)
+            return replace(self, base=self.base.with_(**changes))
+        return replace(self, measure=self.measure.with_(**{name: plain(name, value)}))
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""
@@ -306,10 +370,31 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": self.plot,
+            "plot": figure_name(self.plot),
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }
+
+
+def figure_name(plot: Any) -> str:
+    """What a declaration calls a figure: one of rsfstudy by its name, one of the user's own by that
+    of its function or module.
+    """
+    return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
+
+
+def _check_figure(plot: Any) -> None:
+    """Raise InvalidValue for what draws nothing, and for a name that another figure has."""
+    if isinstance(plot, str):
+        check_text("plot", plot)
+        return
+    if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
+        rule = "must be a name, or a function or module of yours that draws"
+        raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
+    name = figure_name(plot)
+    if not is_name(name) or name in _FIGURES:
+        rule = "needs a name of its own, which no figure of rsfstudy has"
+        raise InvalidValue("plot", name, rule)
 
 
 def _given(measure: Measure) -> str:
@@ -320,9 +405,22 @@ def _given(measure: Measure) -> str:
 
 def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        name: [plain(v) for v in value] if is_list(value) else plain(value)
+        name: [plain(name, v) for v in value] if is_list(value) else plain(name, value)
         for name, value in overrides.items()
     }
+
+
+def _by_name(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Overrides with parts of the user's own by their names."""
+    return {
+        name: [named(name, v) for v in value] if is_list(value) else named(name, value)
+        for name, value in overrides.items()
+    }
+
+
+def _rows(name: str, value: Any) -> list[Row]:
+    """The rows of a field that is given one value or a list of them."""
+    return [{name: v} for v in (value if is_list(value) else [value])]
 
 
 def settings(overrides: Mapping[str, Any]) -> str:

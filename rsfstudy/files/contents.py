@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from types import NoneType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_typeddict
 
 import numpy as np
@@ -19,7 +19,8 @@ import xarray as xr
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.fields import KINDS
+from rsfstudy.slider.fields import SLOTS, by_class, kinds_with
+from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -31,6 +32,10 @@ class Attributes(TypedDict):
     title: str
     completeness: str
     reduced_despite: str
+
+
+#: The fields of a scene, a part of the user's own by its name.
+PlainScene = Mapping[str, float | str | bool | None]
 
 
 class PlainAxis(TypedDict):
@@ -62,7 +67,7 @@ class Declaration:
     title: str
     summary: str
     version: int
-    base: Scene
+    base: PlainScene
     axes: Sequence[PlainAxis]
     measure: PlainMeasure
     accuracy: Accuracy
@@ -132,8 +137,54 @@ def declaration(dataset: xr.Dataset) -> Declaration:
     DataError
         If the dataset carries none, or not as rsfstudy writes it.
     """
-    found: Declaration = fit(_from_json(dataset, "declaration"), Declaration, "declaration")
+    plain = _from_json(dataset, "declaration")
+    found: Declaration = fit(plain, Declaration, "declaration")
+    if provenance(dataset)["fingerprint"]["own_code"] == "none":
+        scene(found.base)
     return found
+
+
+def scene(plain: PlainScene, own: Mapping[str, type[Part]] = MappingProxyType({})) -> Scene:
+    """The scene that all cells share.
+
+    Parameters
+    ----------
+    plain : mapping
+        Its fields.
+    own : mapping of str to type
+        Its parts that are a user's own, by name.
+
+    Raises
+    ------
+    DataError
+        Where the fields make no scene, naming the first that does not.
+    """
+    path, by_slot = "declaration.base", by_class(plain, own)
+    kinds = kinds_with(part for part in by_slot.values() if isinstance(part, type))
+    values = _fitted(plain, kinds, path)
+    for name in plain:
+        if name not in kinds:
+            raise refused(_inside(path, name), "is unknown")
+    try:
+        return Scene(**by_class(values, own))
+    except InvalidValue as error:
+        raise refused(_inside(path, error.name), f"is refused ({error})") from error
+
+
+def own_part(declared: Declaration) -> tuple[str, str] | None:
+    """The slot, and the name, of a part of the user's own that cells have, if there is any."""
+    rows: list[Mapping[str, Any]] = [declared.base]
+    for axis in declared.axes:
+        dimension, values = axis["dimension"], axis["values"]
+        if isinstance(values, Mapping):
+            rows += values.values()
+        else:
+            rows += [{dimension: value} for value in values]
+    for slot in SLOTS:
+        for name in {row.get(slot.name): None for row in rows}:
+            if isinstance(name, str) and name not in slot.choices:
+                return slot.name, name
+    return None
 
 
 def provenance(dataset: xr.Dataset) -> Provenance:
@@ -213,7 +264,7 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     origin, of = get_origin(kind), get_args(kind)
     if kind is Any or _is_one(value, kind):
         return value
-    if (kind is Scene or is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
+    if (is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
         return _object(value, kind, path)
     if origin is UnionType:
         return _either(value, of, path)
@@ -268,13 +319,9 @@ def _list(value: Sequence[Any], origin: Any, of: tuple[Any, ...], path: str) -> 
 
 def _object(value: Mapping[str, Any], kind: Any, path: str) -> Any:
     """A dataclass has its fields and no others; a typed dictionary may have others."""
-    kinds = KINDS if kind is Scene else get_type_hints(kind)
-    closed = kind is Scene or is_dataclass(kind)
+    kinds, closed = get_type_hints(kind), is_dataclass(kind)
     names = [field.name for field in fields(kind)] if is_dataclass(kind) else list(kinds)
-    for name in names:
-        if name not in value:
-            raise refused(_inside(path, name), "is missing")
-    parts = {name: fit(value[name], kinds[name], _inside(path, name)) for name in names}
+    parts = _fitted(value, {name: kinds[name] for name in names}, path)
     if not closed:
         return {**value, **parts}
     for name in value:
@@ -284,6 +331,14 @@ def _object(value: Mapping[str, Any], kind: Any, path: str) -> Any:
         return kind(**parts)
     except InvalidValue as error:
         raise refused(_inside(path, error.name), f"is refused ({error})") from error
+
+
+def _fitted(value: Mapping[str, Any], kinds: Mapping[str, Any], path: str) -> dict[str, Any]:
+    """The parts of a mapping that must be there."""
+    for name in kinds:
+        if name not in value:
+            raise refused(_inside(path, name), "is missing")
+    return {name: fit(value[name], kind, _inside(path, name)) for name, kind in kinds.items()}
 
 
 def _inside(path: str, name: str) -> str:

@@ -12,8 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.study import Study
 from rsfstudy.files.journal import Columns, Layout
-from rsfstudy.measures import Measure
-from rsfstudy.slider.fields import FIELDS
+from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
 
@@ -58,11 +57,11 @@ def variables(
     shape : tuple of int
         Lengths of the dimensions the cells fill.
     """
-    layout, dims = Layout(study.measure), study.dimensions
+    layout, dims, own = Layout(study.measure), study.dimensions, study.quantities
     found = {}
     for name, inner in study.measure.variables.items():
         values = columns.numbers[:, layout.places[name]].reshape(shape + layout.shapes[name])
-        found[name] = ((*dims, *inner), values, _about(name, measure=study.measure))
+        found[name] = ((*dims, *inner), values, _about(name, own))
     kept = {
         "status": columns.status,
         "rhs_evaluations": columns.work,
@@ -70,7 +69,7 @@ def variables(
         "message": columns.message,
     }
     for name, values in kept.items():
-        found[name] = (dims, values.reshape(shape), _about(name))
+        found[name] = (dims, values.reshape(shape), _about(name, {}))
     found["status"][2].update(
         flag_values=np.array([int(s) for s in Status], dtype=np.int8),
         flag_meanings=" ".join(s.label for s in Status),
@@ -88,6 +87,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
     """Dimension coordinates, what follows from them, and the fixed values as scalars."""
     strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:]
     coords: dict[Any, Any] = {}
+    own = study.quantities
     sample = []
     for axis, stride in zip(study.axes, strides, strict=True):
         along = [study.scene(i * int(stride)) for i in range(len(axis))]
@@ -101,20 +101,20 @@ def coordinates(study: Study) -> dict[Any, Any]:
             for row, scene in zip(axis.rows, along, strict=True)
         ]
         for name in axis.fields:
-            varied = [point[name] for point in points]
-            coords[name] = (axis.dimension, _array(varied), _about(name, varied[0]))
-    for name in FIELDS:
-        present = {scene.as_dict()[name] for scene in sample} - {None}
+            varied = [point.get(name) for point in points]
+            coords[name] = (axis.dimension, _array(varied), _about(name, own, _first(varied)))
+    for name in study.scene_fields:
+        present = {scene.as_dict().get(name) for scene in sample} - {None}
         if name not in coords and len(present) == 1:
             fixed = present.pop()
-            coords[name] = ((), _array([fixed])[0], _about(name, fixed))
+            coords[name] = ((), _array([fixed])[0], _about(name, own, fixed))
     for name, (source, formula) in DERIVED.items():
         if source in coords:
             dims, values, _attrs = coords[source]
             derived = [formula(value) for value in np.ravel(values).tolist()]
-            coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name))
+            coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name, {}))
     for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, np.asarray(values), _about(name, measure=study.measure))
+        coords[name] = (name, np.asarray(values), _about(name, own))
     return coords
 
 
@@ -122,19 +122,26 @@ def _array(values: list[Any]) -> np.ndarray:
     """Values of one field as NetCDF can hold them: text, flags as int8, numbers with NaN for
     none.
     """
-    if isinstance(values[0], str):
-        return np.array(values, dtype=object)
-    if isinstance(values[0], bool):
+    if isinstance(_first(values), str):
+        return np.array([value or "" for value in values], dtype=object)
+    if isinstance(_first(values), bool) and None not in values:
         return np.array(values, dtype=np.int8)
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _about(name: str, value: Any = None, measure: Measure | None = None) -> dict[str, Any]:
-    """Attributes of a quantity; of a coordinate whose values are like this one; of a number or
-    inner dimension of a measure.
+def _first(values: list[Any]) -> Any:
+    """The first value there is."""
+    return next((value for value in values if value is not None), None)
+
+
+def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[str, Any]:
+    """Attributes of a quantity, be it one of the study's own; of a coordinate whose values are like
+    this one.
     """
-    about = quantity(name, {q.name: q for q in measure.quantities} if measure else {})
+    about = quantity(name, own)
     attrs: dict[str, Any] = {"long_name": about.long_name}
+    if name in own and about.symbol:
+        attrs["symbol"] = about.symbol  # which the vocabulary does not hold
     if about.units and not isinstance(value, str | bool):
         attrs["units"] = about.units
     if about.scale:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from types import ModuleType
 from typing import Any, TypedDict
@@ -15,10 +15,20 @@ from rsfstudy import measures, reduce
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files.contents import Declaration, PlainMeasure, PlainReduction, fit, refused
+from rsfstudy.files import contents
+from rsfstudy.files.contents import (
+    Declaration,
+    PlainAxis,
+    PlainMeasure,
+    PlainReduction,
+    fit,
+    refused,
+)
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
+from rsfstudy.slider.fields import SLOTS, by_class
+from rsfstudy.slider.parts import Part
 from rsfstudy.status import Status
 
 
@@ -29,8 +39,8 @@ def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
     ----------
     declared : Declaration
     of_its_own : Study, optional
-        Where to take the measure and the reductions from, if they are not part of rsfstudy; the
-        measure with the plain fields that the declaration states.
+        Where to take the measure, the reductions and parts of the slider from, if they are
+        not part of rsfstudy; the measure with the plain fields that the declaration states.
 
     Raises
     ------
@@ -40,6 +50,8 @@ def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
         Where the declaration makes no study, naming the part.
     """
     parts = {field.name: getattr(declared, field.name) for field in fields(declared)}
+    own = _own_parts(of_its_own)
+    parts["base"] = contents.scene(declared.base, own)
     if of_its_own is None:
         parts["measure"] = measure(declared.measure, "declaration.measure")
         parts["reductions"] = [
@@ -47,16 +59,31 @@ def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
             for number, described in enumerate(declared.reductions)
         ]
     else:
-        for name in ("measure", "reductions", "declared_in"):
+        for name in ("reductions", "declared_in"):
             parts[name] = getattr(of_its_own, name)
-        own = of_its_own.measure
-        stated = {name: v for name, v in declared.measure.items() if name in own.plain_fields}
-        parts["measure"] = own.with_(**stated)
+        kind = of_its_own.measure
+        stated = {name: v for name, v in declared.measure.items() if name in kind.plain_fields}
+        parts["measure"] = kind.with_(**stated)
     try:
-        parts["axes"] = [Axis(axis["dimension"], axis["values"]) for axis in declared.axes]
+        parts["axes"] = [_axis(axis, own) for axis in declared.axes]
         return Study(**parts)
     except InvalidValue as error:
         raise refused("declaration", f"makes no study ({error})") from error
+
+
+def _own_parts(study: Study | None) -> Mapping[str, type[Part]]:
+    """Parts of a user's own, by name: those that a study has, and others of the files it comes
+    from, which are known since it was loaded.
+    """
+    others = {name: part for slot in SLOTS for name, part in slot.own.items()}
+    return {} if study is None else {**others, **study.own_parts}
+
+
+def _axis(described: PlainAxis, own: Mapping[str, type[Part]]) -> Axis:
+    dimension, values = described["dimension"], described["values"]
+    if isinstance(values, Mapping):
+        return Axis(dimension, {label: by_class(row, own) for label, row in values.items()})
+    return Axis(dimension, [by_class({dimension: value}, own)[dimension] for value in values])
 
 
 def measure(described: PlainMeasure, path: str) -> Measure:
@@ -101,7 +128,10 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
     wanted, kinds = values.pop("kind"), _kinds(Reduction, reduce)
     if wanted not in kinds:
-        raise InvalidValue("reduction", wanted, "is not part of rsfstudy", choices=kinds)
+        remedy = "If it is your own, name the file that declares it: --study FILE (study=)."
+        raise InvalidValue(
+            "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
+        )
     found: Reduction = fit(values, kinds[wanted], path)
     return found
 

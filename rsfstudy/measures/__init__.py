@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import math
-import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, ClassVar
@@ -27,7 +26,7 @@ from rsfstudy.motion.accuracy import (
     relative_work,
 )
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.slider.fields import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -61,11 +60,6 @@ class Outcome:
 
 #: Names that are there whatever is measured.
 TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
-
-
-def is_name(name: object) -> bool:
-    """Whether a text can name a variable: an identifier, as a file gives it back."""
-    return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 """Figures: ``draw(dataset, axes)`` draws a results dataset and computes nothing; one file each,
-found by name.
+found by name, or a function or module of the user's own.
 
 A figure of several panels lists its functions of that kind in ``PANELS``.
 """
@@ -12,7 +12,8 @@ import os
 import pkgutil
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
+from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
@@ -33,21 +34,27 @@ NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.nam
 _PANEL, _COLUMNS = (6.4, 4.8), 2
 
 
-def figure(dataset: xr.Dataset) -> Figure:
+def figure(dataset: xr.Dataset, own: Any = None) -> Figure:
     """The figure of a results dataset, as its study declares it, with all its panels.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    own : function or module, optional
+        What draws it where that is no module of `rsfstudy.plots`.
 
     Raises
     ------
     InvalidValue
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
     """
-    module = _module(dataset)
+    module = _module(dataset, own)
     panels, size = getattr(module, "PANELS", (None,)), getattr(module, "PANEL", _PANEL)
     columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
     rows = -(-len(panels) // columns)
     found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):
-        draw(dataset, found.add_subplot(rows, columns, number), panel)
+        _draw(dataset, module, found.add_subplot(rows, columns, number), panel or module.draw)
     overrides = declaration(dataset).overrides
     if overrides:
         found.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
@@ -57,12 +64,15 @@ def figure(dataset: xr.Dataset) -> Figure:
 def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
     module = _module(dataset)
-    chosen: Panel = panel or module.draw
-    drawn = chosen(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
+    return _draw(dataset, module, axes, panel or module.draw)
+
+
+def _draw(dataset: xr.Dataset, module: Any, axes: Axes, panel: Panel) -> Axes:
+    panel(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
     lacking = _lacking(dataset)
     if lacking:
-        drawn.set_title(f"{drawn.get_title()} [{lacking}]".strip(), color="tab:red")
-    return drawn
+        axes.set_title(f"{axes.get_title()} [{lacking}]".strip(), color="tab:red")
+    return axes
 
 
 def _lacking(dataset: xr.Dataset) -> str:
@@ -76,28 +86,38 @@ def _lacking(dataset: xr.Dataset) -> str:
     return ", ".join(filter(None, parts))
 
 
-def _module(dataset: xr.Dataset) -> ModuleType:
-    """The module that draws a dataset: the one it declares, or plain lines where it has more axes
-    than that has room for.
+def _module(dataset: xr.Dataset, own: Any = None) -> Any:
+    """The module that draws a dataset, or what is like one: the one it declares, or plain lines
+    where it has more axes than that has room for.
     """
     name = declaration(dataset).plot
-    if name not in NAMES:
+    if name in NAMES:
+        module: Any = importlib.import_module(f"{__name__}.{name}")
+    elif own is None:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
-    module = importlib.import_module(f"{__name__}.{name}")
+    else:
+        module = own if hasattr(own, "draw") else SimpleNamespace(draw=own)
     varied = {str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1}
     if varied <= set(getattr(module, "DIMENSIONS", varied)):
         return module
     return importlib.import_module(f"{__name__}.lines")
 
 
-def _single(dataset: xr.Dataset, module: ModuleType) -> set[str]:
+def _single(dataset: xr.Dataset, module: Any) -> set[str]:
     """Dimensions of one point that a figure does not know of."""
     known = getattr(module, "DIMENSIONS", dataset["status"].dims)
     return {str(d) for d in dataset["status"].dims if dataset.sizes[d] == 1 and d not in known}
 
 
-def save(dataset: xr.Dataset, path: Path) -> None:
+def save(dataset: xr.Dataset, path: Path, own: Any = None) -> None:
     """Write the figure of a results dataset as PNG: the old file stays, or the whole new one.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    path : Path
+    own : function or module, optional
+        As in `figure`.
 
     Raises
     ------
@@ -108,7 +128,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     """
     image = io.BytesIO()
     try:
-        figure(dataset).savefig(image, format="png", dpi=160)
+        figure(dataset, own).savefig(image, format="png", dpi=160)
     except RsfStudyError:
         raise
     except Exception as error:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.slider.fields import FIELDS, KINDS, without_meaning
+from rsfstudy.slider.fields import kinds_with, own_named, without_meaning
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import stress_at
 from rsfstudy.vocabulary import quantity
@@ -26,11 +26,14 @@ def coupling(cell: xr.Dataset) -> tuple[str, float]:
 
 def scene_of(cell: xr.Dataset) -> Scene:
     """The scene of one cell, from its coordinates."""
-    own = (name for name in FIELDS if name in cell.coords and cell[name].ndim == 0)
-    values = {name: cell[name].item() for name in own}
-    values = {name: value for name, value in values.items() if value == value}  # no NaN
-    values |= {name: bool(value) for name, value in values.items() if KINDS[name] is bool}
-    for name in without_meaning(Scene().as_dict() | values):
+    here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
+    parts = own_named(here, [here])
+    kinds = kinds_with(parts.values())
+    # no NaN, and no part of the user's own where there is none
+    values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
+    flags = [name for name in values if kinds[name] in (bool, bool | None)]
+    values |= {name: bool(values[name]) for name in flags}
+    for name in without_meaning(Scene().as_dict() | values, parts.values()):
         values.pop(name, None)
     return Scene(**values)
 

@@ -57,18 +57,21 @@ def reduced(
         support = without_failures(dataset) if despite else dataset
         own = worst(support["status"], support[reduction.of].dims)
         support = known(support, reduction.of, drawn.get(reduction.of, own))
-        made = reduction(support)
+        made, stated = reduction(support), {q.name: q for q in reduction.quantities}
         _check_new(reduction, made, dataset)
         for name, values in made.data_vars.items():
             drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
             if bool(failed(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
-            values.attrs = {**_about(quantity(str(name), stated_by(dataset)), values), **despite}
+            about = _about(quantity(str(name), stated_by(dataset) | stated), values)
+            if str(name) in stated and stated[str(name)].symbol:
+                about["symbol"] = stated[str(name)].symbol
+            values.attrs = {**about, **despite}
             dataset = dataset.assign({name: values})
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:
-                    about = quantity(str(coordinate))
-                    dataset[coordinate].attrs = {"long_name": about.long_name, "units": about.units}
+                    along = quantity(str(coordinate), stated)
+                    dataset[coordinate].attrs = {"long_name": along.long_name, "units": along.units}
     return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -39,6 +39,11 @@ class Reduction:
         dimensions out that the results have lost.
         """
         return status
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """What its results mean, with their units: those that the vocabulary does not hold."""
+        return ()
 
     def describe(self) -> dict[str, Any]:
         """The reduction as plain data."""
@@ -123,7 +128,7 @@ def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
     return {
         str(name): Quantity(
             str(name),
-            "",
+            str(values.attrs.get("symbol", "")),
             str(values.attrs.get("units", "1")),
             str(values.attrs["long_name"]),
             str(values.attrs.get("scale", "")),

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, NamedTuple, get_type_hints
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider import dynamics, laws, loading, normal_stress
-from rsfstudy.slider.parts import Part, checked, names_of, number, quantities_of
+from rsfstudy.slider import dynamics, laws, loading, normal_stress, own
+from rsfstudy.slider.loading.step import Step
+from rsfstudy.slider.parts import Part, checked, is_flag, names_of, number, quantities_of
 
 _POSITIVE = "must be greater than 0"
 
@@ -46,14 +47,33 @@ class Slider(Part):
 
 @dataclass(frozen=True)
 class Slot:
-    """What a scene has one of: the choices by name, and the one that is meant where none is
-    named.
+    """What a scene has one of.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    base : type
+        What all of its parts are derived from.
+    choices : mapping of str to type
+        The parts of rsfstudy, by name.
+    default : str
+        The one that is meant where none is named.
+    long_name : str
+        What it is.
+    functions : tuple of str
+        Functions that each part states.
+    own : dict of str to type
+        Parts of the user's own, by name, as far as they are known in this process.
     """
 
     name: str
+    base: type[Part]
     choices: Mapping[str, type[Part]]
     default: str
     long_name: str
+    functions: tuple[str, ...] = ()
+    own: dict[str, type[Part]] = field(default_factory=dict)
 
     @cached_property
     def callers(self) -> Mapping[str, type[Part]]:
@@ -67,10 +87,23 @@ class Slot:
 
 
 SLOTS: tuple[Slot, ...] = (
-    Slot("law", laws.PARTS, "slip", "state evolution law"),
-    Slot("normal_stress", normal_stress.PARTS, "variable", "normal stress condition"),
-    Slot("dynamics", dynamics.PARTS, "quasi_static", "what balances the spring besides friction"),
-    Slot("loading", loading.PARTS, "step", "what the load point does"),
+    Slot("law", laws.Law, laws.PARTS, "slip", "state evolution law", ("evolution",)),
+    Slot(
+        "normal_stress",
+        normal_stress.NormalStress,
+        normal_stress.PARTS,
+        "variable",
+        "normal stress condition",
+    ),
+    Slot(
+        "dynamics",
+        dynamics.Dynamics,
+        dynamics.PARTS,
+        "quasi_static",
+        "what balances the spring besides friction",
+        ("balance", "growth"),
+    ),
+    Slot("loading", Step, loading.PARTS, "step", "what the load point does"),
 )
 #: Slots of which there is a choice to be named.
 NAMED = tuple(slot for slot in SLOTS if slot.is_named and len(slot.choices) > 1)
@@ -89,6 +122,8 @@ FIELDS: tuple[str, ...] = tuple(
 )
 #: Those that name what fills a slot.
 SLOT_FIELDS: frozenset[str] = frozenset(slot.name for slot in NAMED)
+#: What names a part of the user's own in each slot.
+SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Those that decide neither what fills a slot nor which of two fields sets the spring.
 PLAIN_FIELDS: frozenset[str] = frozenset(FIELDS) - {
     *SLOT_FIELDS,
@@ -123,45 +158,179 @@ def _kind(name: str) -> Any:
 KINDS: Mapping[str, Any] = {slot.name: str for slot in NAMED} | {n: _kind(n) for n in _OWNERS}
 
 
-def without_meaning(values: Mapping[str, Any]) -> frozenset[str]:
-    """Fields that belong to other parts than those that values name."""
-    named = tuple(values[slot.name] for slot in NAMED)
-    return _without_meaning(named) if all(isinstance(n, str) for n in named) else frozenset()
+# ---- parts of a user's own -----------------------------------------------------------------------
+
+#: Those that were checked, and the slots they fill.
+_CHECKED: dict[type[Part], Slot] = {}
+
+
+def known(slot: Slot, part: type) -> type[Part]:
+    """A part that is given by its class; from its first use on, its name stands for it.
+
+    Raises
+    ------
+    InvalidValue
+        Where it cannot fill the slot.
+    """
+    if part in slot.choices.values() and slot.name in SLOT_FIELDS:
+        return part
+    if _CHECKED.get(part) is not slot:
+        own.check(slot, part, SLOTS, _OWNERS)
+        know([part])
+    return part
+
+
+def know(parts: Iterable[type[Part]]) -> None:
+    """Have the names of parts that were checked stand for them, whatever they stood for."""
+    for part in parts:
+        slot = next(slot for slot in SLOTS if issubclass(part, slot.base))
+        slot.own[part.name] = part
+        _CHECKED[part] = slot
+
+
+def named(field: str, value: Any) -> Any:
+    """A value of a field; a part that is given by its class by its name, which it has from now on.
+
+    Raises
+    ------
+    InvalidValue
+        Where the class cannot fill the slot.
+    """
+    for slot in SLOTS if isinstance(value, type) else ():
+        if slot.name == field:
+            return known(slot, value).name
+    return value
+
+
+def own_named(names: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> dict[str, type[Part]]:
+    """The parts of the user's own that rows name in some fields, by name."""
+    slots = [slot for slot in SLOTS if slot.own and slot.name in names]
+    places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
+    return {n: slot.own[n] for slot, n in places if isinstance(n, str) and n in slot.own}
+
+
+def by_class(values: Mapping[str, Any], parts: Mapping[str, type[Part]]) -> dict[str, Any]:
+    """Values of fields, with these parts by their classes instead of their names."""
+    texts = {n: values[n] for n in SLOT_NAMES & set(values) if isinstance(values[n], str)}
+    return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
+
+
+def fields_with(parts: Iterable[type[Part]]) -> tuple[str, ...]:
+    """Names of the fields of scenes that may have these parts of the user's own.
+
+    Raises
+    ------
+    InvalidValue
+        Where one name means several things.
+    """
+    stated = {name: part.__dataclass_fields__[name] for name, part in _OWNERS.items()}
+    names = dict.fromkeys(FIELDS)
+    for part in parts:
+        names[_CHECKED[part].name] = None
+        for name in names_of(part):
+            field_, names[name] = part.__dataclass_fields__[name], None
+            if stated.setdefault(name, field_).metadata != field_.metadata:
+                rule = "is the name of something else, of another part"
+                raise InvalidValue(f"field of {part.name}", name, rule)
+    return tuple(names)
+
+
+def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
+    """What those fields hold."""
+    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
+    parts = tuple(parts)
+    for part in parts:
+        kinds |= {n: (bool if is_flag(part, n) else float) | None for n in names_of(part)}
+    return {name: KINDS.get(name, kinds.get(name)) for name in fields_with(parts)}
+
+
+# ---- which fields have a meaning -----------------------------------------------------------------
+
+
+def without_meaning(values: Mapping[str, Any], parts: Iterable[type[Part]] = ()) -> frozenset[str]:
+    """Fields that belong to other parts than those that values name.
+
+    Parameters
+    ----------
+    values : mapping of str to value
+    parts : iterable of type
+        Parts of the user's own that may be among those.
+    """
+    named = tuple([_by_class(slot, values.get(slot.name)) for slot in SLOTS])
+    return _without_meaning(named, tuple(parts))
+
+
+def _by_class(slot: Slot, value: Any) -> type[Part] | None:
+    """The part that a value names in a slot, if it names one."""
+    if isinstance(value, str):
+        return slot.choices.get(value) or slot.own.get(value)
+    return value if isinstance(value, type) else None
 
 
 @cache
-def _without_meaning(named: tuple[str, ...]) -> frozenset[str]:
+def _without_meaning(
+    named: tuple[type[Part] | None, ...], parts: tuple[type[Part], ...]
+) -> frozenset[str]:
     names: set[str] = set()
-    for slot, name in zip(NAMED, named, strict=True):
-        if name in slot.choices:
-            others = {n for other in slot.choices.values() for n in names_of(other)}
-            names |= others - set(names_of(slot.choices[name]))
+    for slot, part in zip(SLOTS, named, strict=True):
+        others = [other for other in parts if _CHECKED[other] is slot]
+        others += slot.choices.values() if part is not None else []
+        meant = FIELDS if part is None else names_of(part)
+        names |= {name for other in others for name in names_of(other)} - set(meant)
     return frozenset(names)
 
 
 def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
     """The part that is asked for in a slot."""
-    if slot.is_named:
+    value = given.get(slot.name)
+    if isinstance(value, type):
+        return known(slot, value)
+    if isinstance(value, str) and value in slot.own:
+        return slot.own[value]
+    if slot.name in SLOT_FIELDS:
         name = given.get(slot.name, slot.default)
         if not isinstance(name, str) or name not in slot.choices:
-            raise InvalidValue(slot.name, name, "is unknown", choices=slot.choices)
+            raise InvalidValue(slot.name, name, "is unknown", choices=(*slot.choices, *slot.own))
         return slot.choices[name]
-    for field, part in slot.callers.items():
-        value = given.get(field)
-        if value is not None and checked(part, field, value):
+    if value is not None:
+        others = ", ".join(slot.callers) or "the other fields"
+        remedy = f"Those of rsfstudy are called for by {others}."
+        raise InvalidValue(slot.name, value, "is unknown", choices=slot.own, remedy=remedy)
+    for caller, part in slot.callers.items():
+        value = given.get(caller)
+        if value is not None and checked(part, caller, value):
             return part
     return slot.choices[slot.default]
 
 
 class Layout(NamedTuple):
-    """Where the fields of a scene with certain parts are: the place of the part that owns each; the
-    part that refuses each of the others; and what those hold.
+    """Where the fields of a scene with certain parts are.
+
+    Attributes
+    ----------
+    parts : tuple of type
+        The parts, the numbers of every slider first.
+    places : mapping of str to int
+        The place of the part that owns each field.
+    refusing : mapping of str to type
+        The part that refuses each of the others,
+    elsewhere : mapping of str to value
+        and what those hold.
+    own : mapping of str to type
+        Parts of the user's own, by slot.
+    fields : tuple of str
+        Names of all fields: those of every scene, and those of parts of the user's own.
+    plain : frozenset of str
+        Those that decide nothing but a number.
     """
 
     parts: tuple[type[Part], ...]
     places: Mapping[str, int]
     refusing: Mapping[str, type[Part]]
     elsewhere: Mapping[str, Any]
+    own: Mapping[str, type[Part]]
+    fields: tuple[str, ...]
+    plain: frozenset[str]
 
 
 _LAYOUTS: dict[tuple[type[Part], ...], Layout] = {}
@@ -176,18 +345,25 @@ def layout_of(chosen: tuple[type[Part], ...]) -> Layout:
 
 def _laid_out(chosen: tuple[type[Part], ...]) -> Layout:
     parts: tuple[type[Part], ...] = (Slider, *chosen)
+    filled = list(zip(SLOTS, chosen, strict=True))
+    owned = {slot.name: part for slot, part in filled if part not in slot.choices.values()}
     places = {name: place for place, part in enumerate(parts) for name in names_of(part)}
+    if len(places) < sum(len(names_of(part)) for part in parts):
+        names = ", ".join(part.name for part in owned.values())
+        raise InvalidValue("parts", names, "have a field of one name", remedy="Rename one.")
     refusing: dict[str, type[Part]] = {}
     elsewhere: dict[str, Any] = {}
-    for slot, part in zip(SLOTS, chosen, strict=True):
-        if slot.name in SLOT_FIELDS:
+    for slot, part in filled:
+        if slot.name in (*SLOT_FIELDS, *owned):
             elsewhere[slot.name] = part.name
         for other in slot.choices.values():
             for name in set(names_of(other)) - set(places):
                 refusing[name] = part
                 calls = name == other.called_by
                 elsewhere[name] = other.__dataclass_fields__[name].default if calls else None
-    return Layout(parts, places, refusing, elsewhere)
+    fields = fields_with(owned.values())
+    plain = PLAIN_FIELDS | (set(fields) - {*FIELDS, *SLOT_NAMES})
+    return Layout(parts, places, refusing, elsewhere, owned, fields, plain)
 
 
 def refuse_unless_idle(name: str, value: Any, part: type[Part]) -> None:
@@ -199,6 +375,12 @@ def refuse_unless_idle(name: str, value: Any, part: type[Part]) -> None:
         raise part.refuse(name, value)
 
 
-def unknown_field(name: str) -> InvalidValue:
-    """The error for a name that is no field of a scene."""
-    return InvalidValue("field", name, "is not a field of a scene", choices=FIELDS)
+def unknown_field(name: str, value: Any, layout: Layout) -> InvalidValue:
+    """The error for a name that is no field of a scene with these parts."""
+    for slot, part in zip(SLOTS, layout.parts[1:], strict=True):
+        owner = next((other for other in slot.own.values() if name in names_of(other)), None)
+        if owner is not None:
+            rule = f"has no meaning for {slot.name}={part.name!r}"
+            remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
+            return InvalidValue(name, value, rule, remedy=remedy)
+    return InvalidValue("field", name, "is not a field of a scene", choices=layout.fields)

@@ -13,7 +13,7 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -31,7 +31,10 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """Base of all parts."""
+    """Base of all parts.
+
+    One of a user's own is given by its class: ``Scene(law=MyLaw)``.
+    """
 
     #: What the part is called; a part that a field calls for by its value names that field instead.
     name: ClassVar[str]
@@ -85,6 +88,16 @@ RULES: Mapping[str, Callable[[float], bool]] = {
 }
 
 
+def has_meaning(stated: Field[Any]) -> bool:
+    """Whether a field was made by `number` or `flag`."""
+    return "about" in stated.metadata and stated.metadata["rule"] in (*RULES, _FLAG)
+
+
+def is_flag(part: type[Part], name: str) -> bool:
+    """Whether a field of a part holds true or false."""
+    return bool(part.__dataclass_fields__[name].metadata["rule"] == _FLAG)
+
+
 def names_of(part: type[Part]) -> tuple[str, ...]:
     """Names of the fields of a part."""
     if part not in _NAMES:
@@ -114,12 +127,12 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
         return None
     if type(value) is float and math.isfinite(value) and rule in RULES and RULES[rule](value):
         return value  # as most are
-    is_flag = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
+    flagged = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
     if rule == _FLAG:
-        if not is_flag:
+        if not flagged:
             raise InvalidValue(name, value, rule)
         return bool(value)
-    if is_flag or not isinstance(value, Real):
+    if flagged or not isinstance(value, Real):
         raise InvalidValue(name, value, "must be a number")
     try:
         plain = float(value)

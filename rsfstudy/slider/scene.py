@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
 from rsfstudy.slider.fields import (
-    FIELDS,
-    PLAIN_FIELDS,
-    SLOT_FIELDS,
+    SLOT_NAMES,
     SLOTS,
     Layout,
     chosen,
@@ -44,10 +42,14 @@ class Scene:
 
     Parameters
     ----------
-    law : {"slip", "slowness"}
-        State evolution law; any file of `rsfstudy.slider.laws`.
-    normal_stress : {"constant", "variable"}
-        Constant, or coupled to shear stress by a driving stress inclined at `phi`.
+    law : {"slip", "slowness"}, or type
+        State evolution law; any file of `rsfstudy.slider.laws`, or a class of your own, whose
+        fields are then fields of the scene.
+    normal_stress : {"constant", "variable"}, or type
+        Constant, or coupled to shear stress by a driving stress inclined at `phi`; or a class of
+        your own.
+    dynamics, loading : type, optional
+        A class of your own in these slots, which other fields fill without it.
     alpha : float, optional
         Strength of the normal stress effect on the state variable (variable normal stress only;
         0.56). Zero leaves the effect out.
@@ -94,6 +96,7 @@ class Scene:
 
     parts: Parts
     _slider: Part
+    _layout: Layout
     if TYPE_CHECKING:
         a: float
         mu_star: float
@@ -104,13 +107,12 @@ class Scene:
         def __getattr__(self, name: str) -> Any: ...
 
     def __init__(self, **given: Any) -> None:
-        for name in given:
-            if name not in FIELDS:
-                raise unknown_field(name)
         layout = layout_of(tuple(chosen(slot, given) for slot in SLOTS))
         own: tuple[dict[str, Any], ...] = tuple({} for _part in layout.parts)
         for name, value in given.items():
-            if value is None or name in SLOT_FIELDS:
+            if name not in layout.fields and name not in SLOT_NAMES:
+                raise unknown_field(name, value, layout)
+            if value is None or name in SLOT_NAMES:
                 continue
             place = layout.places.get(name)
             if place is None:
@@ -124,7 +126,8 @@ class Scene:
     def _fill(self, layout: Layout, made: Sequence[Part]) -> None:
         """Take the fields from the parts, and let the parts say whether they go together."""
         slider, *parts = made
-        self.__dict__.update(layout.elsewhere, _slider=slider, parts=Parts(*parts))  # type: ignore[arg-type]
+        self.__dict__.update(layout.elsewhere, _layout=layout, _slider=slider)
+        self.__dict__["parts"] = Parts(*parts)  # type: ignore[arg-type]
         for part in (slider, *parts):
             self.__dict__.update(part.__dict__)
         for part in parts:
@@ -146,7 +149,7 @@ class Scene:
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, (self.as_dict(),)
+        return _made, ({**self.as_dict(), **self._layout.own},)
 
     # ---- what follows from the parameters -------------------------------------------------------
 
@@ -243,20 +246,19 @@ class Scene:
         Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
         the place of its ratio, and the other way round.
         """
-        for name in sorted(changes):
-            if name not in FIELDS:
-                raise unknown_field(name)
-        if all(name in PLAIN_FIELDS and value is not None for name, value in changes.items()):
+        plain = self._layout.plain
+        if all(name in plain and value is not None for name, value in changes.items()):
             return self._with_numbers(changes)
-        kept = self.as_dict()
-        kept |= dict.fromkeys(without_meaning(kept | changes))
+        kept = {**self.as_dict(), **self._layout.own}
+        for name in without_meaning({**kept, **changes}, self._layout.own.values()):
+            kept.pop(name, None)
         if any(changes.get(name) is not None for name in _SPRING):
             kept |= dict.fromkeys(_SPRING)
         return Scene(**kept | changes)
 
     def _with_numbers(self, changes: Mapping[str, Any]) -> Scene:
         """A copy with the same parts, of which those that change are made and checked anew."""
-        layout = layout_of(tuple(type(part) for part in self.parts))
+        layout = self._layout
         made: list[Part] = [self._slider, *self.parts]
         for name, value in changes.items():
             place = layout.places.get(name)
@@ -269,7 +271,12 @@ class Scene:
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
-        return {name: self.__dict__[name] for name in FIELDS}
+        return {name: self.__dict__[name] for name in self._layout.fields}
+
+    @property
+    def own_parts(self) -> tuple[type[Part], ...]:
+        """Those of its parts that are the user's own."""
+        return tuple(self._layout.own.values())
 
 
 #: The fields of which one sets the spring.

@@ -1,0 +1,110 @@
+"""A part of a user's own: a class that fills a slot as the files of that slot do.
+
+It is known by its name from its first use on, in this process. A notebook cell that is run again
+defines it anew; a name that stands for something else is refused.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from types import FunctionType
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import is_name
+from rsfstudy.slider.parts import Part, has_meaning
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.fields import Slot
+
+
+def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, type[Part]]) -> None:
+    """Raise InvalidValue for what cannot fill a slot.
+
+    Parameters
+    ----------
+    slot : Slot
+        The one it is to fill.
+    part : object
+        What was given for it.
+    slots : iterable of Slot
+        All, whose parts have names already.
+    owners : mapping of str to type
+        The parts of rsfstudy, by the fields of a scene that they own.
+    """
+    _check_kind(slot, part)
+    _check_name(slot, part, slots)
+    taken = {*_of_every_scene(), *(slot.name for slot in slots)}
+    for stated in fields(part):
+        _check_field(slot, part, stated.name, owners)
+        if stated.name in taken - set(owners):
+            raise _taken(part, stated.name, "every scene")
+    for name in slot.functions:
+        function = inspect.getattr_static(part, name, None)
+        if not isinstance(getattr(function, "__func__", None), FunctionType):
+            rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
+            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _check_kind(slot: Slot, part: Any) -> None:
+    base = f"{slot.base.__module__}.{slot.base.__name__}"
+    if not isinstance(part, type) or not issubclass(part, slot.base):
+        is_part = isinstance(part, type) and issubclass(part, Part)
+        rule = "fills another slot" if is_part else "is no part of a slider"
+        raise InvalidValue(slot.name, part, rule, remedy=f"Derive a class from {base}.")
+    params = vars(part).get("__dataclass_params__")
+    if params is None or not params.frozen:
+        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
+        raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
+
+
+def _check_name(slot: Slot, part: type[Part], slots: Iterable[Slot]) -> None:
+    name: object = getattr(part, "name", None)
+    remedy = f'Write name = "..." in {part.__qualname__}.'
+    if not isinstance(name, str) or not is_name(name):
+        rule = f"must be named by a Python identifier, not {name!r}"
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    for other in slots:
+        if name in other.choices:
+            rule = f"takes the name of a part of rsfstudy, {name!r}"
+            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+        if name in other.own and origin(other.own[name]) != origin(part):
+            rule = f"takes the name {name!r} of {'.'.join(origin(other.own[name]))}"
+            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def origin(part: type[Part]) -> tuple[str, str]:
+    """Where a part is defined: what it has in common with an earlier definition of it."""
+    return part.__module__, part.__qualname__
+
+
+def _of_every_scene() -> set[str]:
+    from rsfstudy.slider.scene import Scene  # which is made of parts itself
+
+    return {*dir(Scene), *Scene.__annotations__}
+
+
+def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]) -> None:
+    stated = part.__dataclass_fields__[name]
+    if not has_meaning(stated):
+        rule, remedy = "says neither what it is nor its rule", "State it by number() or flag()."
+        raise InvalidValue(_field_of(part), name, rule, remedy=remedy)
+    if not is_name(name):
+        rule = "must be a Python identifier, its accents composed (NFC)"
+        raise InvalidValue(_field_of(part), name, rule)
+    owner = owners.get(name)
+    if owner is not None:
+        same = stated.metadata == owner.__dataclass_fields__[name].metadata
+        if not same or owner not in slot.choices.values():
+            raise _taken(part, name, owner.name)
+
+
+def _field_of(part: type[Part]) -> str:
+    return f"field of {part.__qualname__}"
+
+
+def _taken(part: type[Part], name: str, whose: str) -> InvalidValue:
+    rule = f"is the name of something else, of {whose}"
+    return InvalidValue(_field_of(part), name, rule, remedy="Give it another name.")

@@ -1,0 +1,31 @@
+"""A measure in seconds: how long loading takes to speed slip up by a factor of e."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.quantity import Quantity
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class LoadingTime(Measure):
+    name: ClassVar[str] = "loading_time"
+    headline = "loading_time"
+    variables: ClassVar = {"loading_time": ()}
+    quantities = (Quantity("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        stressing = scene.stiffness * scene.load_velocity * scene.reference_rate
+        return Outcome(Status.OK, {"loading_time": scene.a / stressing})
+
+
+study = Study(
+    name="loading_times",
+    title="How long loading takes",
+    base=Scene(normal_stress="constant"),
+    axes=[Axis("load_velocity_ratio", [1, 10, 100])],
+    measure=LoadingTime(),
+)

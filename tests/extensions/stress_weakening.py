@@ -1,0 +1,45 @@
+"""A state that stress wears away (Nagata et al. 2012), on top of the slowness law.
+
+What evolves by the law alone is ``Psi = Theta + c (mu - mu_*)``: the state effect states that shift
+and its slope.
+"""
+
+from dataclasses import dataclass
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.slider.laws.slowness import SlownessLaw
+from rsfstudy.slider.parts import number
+from rsfstudy.slider.slots import MU_STAR
+
+OWN = 0
+
+
+def worn(friction, ratio, change, p):
+    stress, c = p[MU_STAR] + friction, p[OWN + 1]
+    return c * (stress / ratio - p[MU_STAR]), c * (1.0 - stress * change / ratio) / ratio
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressWeakening(SlownessLaw):
+    c: float = number(
+        2.0, "$c$", "1", "stress effect on the state variable", rule="must be 0 or greater"
+    )
+
+    name = "stress_weakening"
+    state_effect = staticmethod(worn)
+
+    def numbers(self, scene):
+        return (*super().numbers(scene), self.c)
+
+
+study = Study(
+    name="stress_weakened",
+    title="Critical stiffness where stress wears the state away",
+    base=Scene(law=StressWeakening),
+    axes=[
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("c", [0.0, 0.5, 2.0]),
+    ],
+    measure=LinearStability(),
+)

@@ -1,0 +1,506 @@
+"""A part, a measure, a reduction or a figure of a user's own is one file outside of the package: it
+runs, is checked, rerun and drawn like ours, and gives the numbers that mathematics says it must.
+"""
+
+import copy
+import json
+import math
+import pickle
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+
+import cloudpickle
+import numpy as np
+import pytest
+from running import call, run, same_numbers
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy.declare import catalogue
+from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.plots import lines
+from rsfstudy.slider import fields, laws
+from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
+from rsfstudy.slider.laws.slip import SlipLaw
+from rsfstudy.slider.loading.step import Step
+from rsfstudy.slider.normal_stress import NormalStress
+from rsfstudy.slider.parts import flag, number
+from rsfstudy.status import Status
+
+EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
+#: One cell of each.
+PLACES = {
+    "perrin_rice_zheng": {"law": "perrin_rice_zheng", "stiffness_ratio": 2.0},
+    "law_family": {"law_exponent": 0.5, "stiffness_ratio": 1.5},
+    "stress_weakening": {"normal_stress": "variable", "c": 2.0},
+    "loading_time": {"load_velocity_ratio": 10.0},
+    "power_law": {"b_over_a": 2.0, "a": 0.01},
+    "own_figure": {"phi": 60.0, "b_over_a": 2.0},
+}
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory, cluster):
+    """Each example, copied to a directory of its own and run there on two workers."""
+    ran = {}
+    for example in EXAMPLES:
+        place = tmp_path_factory.mktemp(example.stem)
+        study = place / "mine.py"
+        shutil.copy(example, study)
+        dataset = rsfstudy.run(study, client=cluster, output=place, progress=False)
+        file = place / f"{dataset.attrs['id']}.nc"
+        ran[example.stem] = SimpleNamespace(study=study, file=file, dataset=dataset)
+    return ran
+
+
+def test_every_example_is_used():
+    assert {example.stem for example in EXAMPLES} == set(PLACES)
+
+
+# ---- like ours ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_it_is_checked_rerun_and_drawn(name, outside):
+    example = outside[name]
+    assert (example.dataset.status == int(Status.OK)).all(), example.dataset.message.values
+    same_numbers(rsfstudy.open(example.file), example.dataset)
+    checked = call("check", example.file)
+    assert checked.returncode == 0, checked.stderr
+    drawn = call("plot", example.file)
+    assert (drawn.returncode, drawn.stderr) == (0, "")
+    assert example.file.with_suffix(".png").is_file()
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
+    example, place = outside[name], PLACES[name]
+    _scene, found = rsfstudy.cell(example.file, place, study=example.study)
+    there = example.dataset.sel(place)
+    for number_, value in found.values.items():
+        assert float(value) == pytest.approx(float(there[number_]), rel=0.0, abs=0.0, nan_ok=True)
+    agreed = rsfstudy.rerun(example.file, study=example.study, workers=0, progress=False)
+    assert (agreed["values"] == agreed["identical"]).all()
+    assert agreed.attrs["differs"] == {}
+
+
+def test_a_cell_by_the_command(outside):
+    example = outside["law_family"]
+    cell = [w for n, v in PLACES["law_family"].items() for w in ("--cell", f"{n}={v}")]
+    ran = call("rerun", example.file, "--study", example.study, *cell)
+    assert ran.returncode == 0, ran.stderr
+    assert "law_exponent = 0.5" in ran.stdout
+    shown = call("show", example.study, "--set", "law=slip,family", "--set", "law_exponent=0:1:3")
+    assert (shown.returncode, shown.stderr) == (0, "")
+    assert "slip, family" in shown.stdout
+
+
+def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
+    example = outside["law_family"]
+    about = rsfstudy.open(example.file).law_exponent.attrs
+    stated = {"long_name": "exponent of the law", "units": "1", "symbol": r"$\epsilon$"}
+    assert stated.items() <= about.items()
+    lattice = example.dataset.transpose("stiffness_ratio", "law_exponent", ...)
+    drawn = plots.draw(lattice, plots.Figure().add_subplot())
+    assert drawn.get_xlabel() == r"Exponent of the law, $\epsilon$"
+    assert outside["loading_time"].dataset.loading_time.attrs["units"] == "s"
+    exponent = outside["power_law"].dataset.exponent
+    assert exponent.attrs["long_name"] == "exponent of critical_stiffness as a power of a"
+    assert exponent.attrs["symbol"] == "$n$"
+
+
+def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
+    """As alpha at constant normal stress: the cells without it are one."""
+    family = catalogue.load(str(outside["law_family"].study))
+    dataset = run(family, law=["slip", "family"], stiffness_ratio=[0.8])
+    assert dataset.sizes == {"law": 2, "law_exponent": 3, "stiffness_ratio": 1}
+    slip, own = dataset.critical_displacement.squeeze("stiffness_ratio").transpose("law", ...)
+    assert len(set(slip.values)) == 1
+    assert float(own[0]) == pytest.approx(float(slip[0]), rel=1e-9)
+
+
+# ---- the numbers are those of mathematics -------------------------------------------------------
+
+
+def test_the_symmetric_law(outside):
+    """With the load point held, steps of asinh(r)/r a/(b - a) D_c are critical, r = k/k_cr, and
+    by the slip law those of a/(b - a) D_c.
+    """
+    found = outside["perrin_rice_zheng"].dataset.critical_displacement
+    ratio = found.stiffness_ratio
+    exact = np.arcsinh(ratio) / ratio
+    np.testing.assert_allclose(found.sel(law="perrin_rice_zheng"), exact, rtol=1e-6)
+    np.testing.assert_allclose(found.sel(law="slip"), 1.0, rtol=1e-6)
+
+
+def test_the_family_of_laws(outside):
+    """Steps of -ln(1 - e r)/(e r) a/(b - a) D_c, r = k/k_cr, and none that runs away without bound
+    where e r reaches 1.
+    """
+    found = outside["law_family"].dataset.critical_displacement
+    for exponent, ratio in ((0.0, 0.8), (0.0, 1.5), (0.5, 0.8), (0.5, 1.5), (1.0, 0.8)):
+        product = exponent * ratio
+        exact = -math.log1p(-product) / product if product else 1.0
+        tolerance = 1e-6 if product < 0.5 else 2e-3  # the norm is finite
+        ours = float(found.sel(law_exponent=exponent, stiffness_ratio=ratio))
+        assert ours == pytest.approx(exact, rel=tolerance)
+
+
+def test_what_does_not_run_away_needs_larger_steps_for_larger_norms(outside):
+    family = catalogue.load(str(outside["law_family"].study))
+    steps = run(family, instability_norm=[1e4, 1e8]).critical_displacement
+    growth = steps.isel(instability_norm=1) / steps.isel(instability_norm=0)
+    assert float(growth.sel(law_exponent=1.0, stiffness_ratio=1.5)) > 1.2
+    assert float(growth.sel(law_exponent=0.5, stiffness_ratio=1.5)) < 1.01
+
+
+@pytest.mark.parametrize(("exponent", "law"), [(0.0, "slip"), (1.0, "slowness")])
+def test_the_ends_of_the_family_are_laws_of_rsfstudy(exponent, law, outside):
+    measure = CriticalStep(of="displacement_step")
+    ours = Scene(law=law, normal_stress="constant", stiffness_ratio=0.8)
+    theirs = ours.with_(law="family", law_exponent=exponent)
+    same, found = (measure(scene, Accuracy(1e-6)).values for scene in (ours, theirs))
+    assert found["critical_displacement"] == pytest.approx(same["critical_displacement"], rel=1e-5)
+
+
+def test_stress_that_wears_the_state_away(outside):
+    """k_cr is 1/(1 + c) of that without, at constant normal stress; with all effects, that of the
+    assembled equations.
+    """
+    dataset = outside["stress_weakening"].dataset
+    constant = dataset.critical_stiffness.sel(normal_stress="constant")
+    expected = float(constant.sel(c=0.0)) / (1.0 + dataset.c)
+    np.testing.assert_allclose(constant, expected, rtol=1e-12)
+    grown = dataset.critical_stiffness_from_growth
+    np.testing.assert_allclose(dataset.critical_stiffness, grown, rtol=1e-6)
+
+
+def test_a_measure_a_reduction_and_a_figure(outside):
+    times = outside["loading_time"].dataset.loading_time
+    base = Scene(normal_stress="constant")
+    seconds = base.a / (base.stiffness * base.reference_rate)
+    np.testing.assert_allclose(times * times.load_velocity_ratio, seconds, rtol=1e-14)
+    np.testing.assert_allclose(outside["power_law"].dataset.exponent, 1.0, rtol=1e-12)
+    study = catalogue.load(str(outside["own_figure"].study))
+    drawn = plots.figure(outside["own_figure"].dataset, study.plot).axes[0]
+    assert drawn.get_ylabel() == "Angle (degrees)"
+
+
+# ---- without its file, and with another ---------------------------------------------------------
+
+
+def test_without_the_study_file(outside, tmp_path, monkeypatch):
+    """What needs no code works; the rest says what it lacks."""
+    gone = tmp_path / "mine.py"
+    for name in ("own_figure", "law_family"):
+        shutil.copy(outside[name].file, tmp_path)
+    family, figure = (outside[n].file.name for n in ("law_family", "own_figure"))
+    monkeypatch.chdir(tmp_path)
+    outside["own_figure"].study.rename(gone.with_suffix(".kept"))
+    try:
+        drawn = call("plot", figure)
+    finally:
+        gone.with_suffix(".kept").rename(outside["own_figure"].study)
+    assert drawn.returncode == 0
+    assert "drawn as lines, because the figure was not found: study = " in drawn.stderr
+    as_lines = Path(figure).with_suffix(".png").read_bytes()
+    assert call("plot", figure, "--study", outside["own_figure"].study).stderr == ""
+    assert Path(figure).with_suffix(".png").read_bytes() != as_lines
+    with pytest.raises(InvalidValue, match="'family': is a user's own.*--study FILE.*mine.py"):
+        rsfstudy.cell(family, PLACES["law_family"])
+    with pytest.raises(InvalidValue, match="declares the study 'stiffness_map'"):
+        rsfstudy.cell(family, PLACES["law_family"], study=outside["own_figure"].study)
+    with pytest.raises(InvalidValue, match="reduction = 'exponent'.*--study FILE"):
+        rsfstudy.rerun(outside["power_law"].file, workers=0)
+
+
+def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, monkeypatch):
+    for slot in fields.SLOTS:
+        monkeypatch.setitem(vars(slot), "own", {})
+    dataset = rsfstudy.open(outside["law_family"].file)
+    assert dataset.attrs["id"] == "family_of_laws"
+    assert rsfstudy.check(dataset).empty
+    with pytest.raises(InvalidValue, match="law = 'family': is unknown"):
+        Scene(law="family")
+
+
+def test_an_altered_base_is_refused_by_its_path(outside, tmp_path):
+    dataset = rsfstudy.open(outside["law_family"].file)
+    declared = json.loads(dataset.attrs["declaration"])
+    for change, complaint in (
+        ({"law_exponent": "much"}, 'base.law_exponent is "much", and must be a number or null'),
+        ({"law_exponent": 7.0}, "base.law_exponent is refused .*must not exceed 1"),
+        ({"novel": 1.0}, "declaration.base.novel is unknown"),
+        ({"law": "other"}, "declaration.base.(law|law_exponent) is (refused|unknown)"),
+    ):
+        other = {**declared, "base": {**declared["base"], **change}}
+        altered = dataset.assign_attrs(declaration=json.dumps(other))
+        with pytest.raises(DataError, match=complaint):
+            rsfstudy.api.study_of(altered, outside["law_family"].study)
+
+
+def test_edited_code_is_refused_with_the_journal(tmp_path):
+    text, study = EXAMPLES[0].with_name("law_family.py").read_text(), tmp_path / "mine.py"
+    options = {"workers": 0, "output": tmp_path, "progress": False, "stiffness_ratio": 0.8}
+    study.write_text(text)
+    before = rsfstudy.run(study, **options)
+    edited = text.replace("/ exponent\n", "/ exponent * 1.5\n")
+    assert edited != text
+    study.write_text(edited)
+    with pytest.raises(DataError, match="own_code: .* there, .* now"):
+        rsfstudy.run(study, **options)
+    after = rsfstudy.run(study, fresh=True, **options)
+    assert (before.critical_displacement != after.critical_displacement).any()
+    study.write_text(text)  # in this process, where both have been known
+    same_numbers(rsfstudy.run(study, fresh=True, **options).drop_attrs(), before.drop_attrs())
+
+
+def test_a_worker_that_lacks_a_module_is_told(tmp_path, monkeypatch, cluster):
+    text = EXAMPLES[0].with_name("law_family.py").read_text()
+    (tmp_path / "only_here.py").write_text(text.replace('"family"', '"only_here"'))
+    monkeypatch.syspath_prepend(tmp_path)
+    import only_here
+
+    with pytest.raises(RunError, match="a worker cannot load the measure, or a part.*'only_here'"):
+        run(only_here.study, client=cluster)
+
+
+# ---- in a notebook, or anywhere -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubled(SlipLaw):
+    factor: float = number(2.0, "$f$", "1", "factor of nothing", rule="must be 0 or greater")
+    is_odd: bool = flag(False, "whether it is odd")
+
+    name = "doubled"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sticky(QuasiStatic):
+    grip: float = number(1.0, "$g$", "m", "grip of nothing", scale="D_c")
+
+    name = "sticky"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steplike(Step):
+    name = "steplike"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unvaried(NormalStress):
+    name = "unvaried"
+
+
+def test_a_scene_of_ones_own_parts():
+    scene = Scene(law=Doubled, factor=3, normal_stress=Unvaried, dynamics=Sticky, loading=Steplike)
+    values = scene.as_dict()
+    assert tuple(values)[: len(fields.FIELDS)] == fields.FIELDS
+    own = {"factor": 3.0, "is_odd": False, "dynamics": "sticky", "grip": 1.0, "loading": "steplike"}
+    assert {name: values[name] for name in tuple(values)[len(fields.FIELDS) :]} == own
+    assert (scene.law, scene.normal_stress, scene.alpha) == ("doubled", "unvaried", None)
+    assert Scene(**values) == scene  # by the names, which are known now
+    for again in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene),
+                  cloudpickle.loads(cloudpickle.dumps(scene))):  # fmt: skip
+        assert again == scene
+        assert again.parts == scene.parts
+    assert scene.with_(grip=2.0).grip == 2.0
+    plain = scene.with_(law="slip", normal_stress="variable", dynamics=None, loading=None)
+    assert plain == Scene()
+    assert tuple(plain.as_dict()) == fields.FIELDS
+    assert Scene(law=SlipLaw) == Scene()
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"law": "slip", "factor": 2.0}, "factor = 2.0: has no meaning for law='slip'.*'doubled'"),
+        ({"law": Doubled, "factor": -1.0}, "factor = -1.0: must be 0 or greater"),
+        ({"law": Doubled, "is_odd": 1.0}, "is_odd = 1.0: must be true or false"),
+        ({"law": Doubled, "facter": 1.0}, "is not a field of a scene. Did you mean 'factor'"),
+        ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
+        ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
+        ({"dynamics": "inertia"}, "dynamics = 'inertia': is unknown.*called for by inertia, radia"),
+        ({"dynamics": QuasiStatic}, "takes the name of a part of rsfstudy, 'quasi_static'"),
+        ({"law": Sticky}, "law = .*fills another slot. Derive a class from rsfstudy.slider.laws.L"),
+        ({"law": int}, "law = <class 'int'>: is no part of a slider"),
+    ],
+)  # fmt: skip
+def test_scenes_that_are_refused(given, complaint):
+    Scene(law=Doubled)
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**given)
+
+
+def made(base=laws.Law, frozen=True, **body):
+    """A class of a law, or of what is none."""
+    annotations = {name: float for name, value in body.items() if hasattr(value, "metadata")}
+    stated = {"name": "made", "evolution": staticmethod(lambda x, state, p: -x), **body}
+    kind = type("Made", (base,), {**stated, "__annotations__": annotations})
+    return dataclass(frozen=frozen, kw_only=True)(kind) if frozen else kind
+
+
+@pytest.mark.parametrize(
+    ("body", "complaint"),
+    [
+        ({"frozen": False}, "must be a frozen dataclass. Write @dataclass"),
+        ({"name": None}, "must be named by a Python identifier, not None"),
+        ({"name": "my law"}, "must be named by a Python identifier, not 'my law'"),
+        ({"name": "slowness"}, "takes the name of a part of rsfstudy, 'slowness'. Write name"),
+        ({"name": "inertia"}, "takes the name of a part of rsfstudy, 'inertia'"),
+        ({"name": "doubled"}, r"takes the name 'doubled' of test_extensions\.Doubled"),
+        ({"evolution": None}, "states no evolution. Write evolution = staticmethod"),
+        ({"evolution": lambda x, state, p: -x}, "states no evolution"),
+        ({"c": field(default=1.0)}, "field of Made = 'c': says neither what it is.*number"),
+        ({"phi": number(1.0, "", "1", "another")}, "'phi': .*something else, of variable"),
+        ({"a": number(1.0, "", "1", "another")}, "'a': .*something else, of slider"),
+        ({"b_over_a": number(1.0, "", "1", "another")}, "'b_over_a': .*something else, of sl"),
+        ({"stiffness": number(1.0, "", "1", "another")}, "'stiffness': .*something else, of sl"),
+        ({"b": number(1.0, "", "1", "another")}, "'b': .*something else, of every scene"),
+        ({"parts": number(1.0, "", "1", "another")}, "'parts': .*something else, of every scene"),
+        ({"loading": number(1.0, "", "1", "another")}, "'loading': .*else, of every scene"),
+    ],
+)
+def test_classes_that_fill_no_slot(body, complaint):
+    Scene(law=Doubled)
+    with pytest.raises(InvalidValue, match=f"(?s){complaint}"):
+        Scene(law=made(**body))
+
+
+def test_a_field_may_be_stated_anew_with_another_default():
+    words = "$b/a$", "1", "ratio of evolution effect to direct effect"
+    ours = number(3.0, *words, rule="must be greater than 0")
+    assert Scene(law=made(name="steeper", b_over_a=ours)).b_over_a == 3.0
+
+
+def test_a_cell_of_a_notebook_that_is_run_twice():
+    """Its class is known anew; what was made of the earlier one stays what it is."""
+    first, second = made(name="again"), made(name="again")
+    scene = Scene(law=first)
+    assert type(Scene(law="again").parts.law) is first
+    assert type(Scene(law=second).parts.law) is second
+    assert type(Scene(law="again").parts.law) is second
+    assert type(scene.with_(normal_stress="constant").parts.law) is first
+    axes = [Axis("b_over_a", [2.0])]
+    study = Study(name="n", title="t", base=scene, axes=axes, measure=LinearStability())
+    assert type(study.scene(0).parts.law) is first
+
+
+def test_two_parts_of_one_scene_share_no_field():
+    other = made(name="gripping", grip=number(1.0, "", "1", "another"))
+    with pytest.raises(InvalidValue, match="parts = 'gripping, sticky': have a field of one name"):
+        Scene(law=other, dynamics=Sticky)
+
+
+@pytest.mark.parametrize("name", ["status", "slip", "steady_friction", "a_over_b_minus_a"])
+def test_a_field_that_would_be_mistaken_in_a_file(name):
+    part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
+    with pytest.raises(InvalidValue, match=f"field = '{name}': is the name of something else"):
+        Study(name="n", title="t", base=Scene(law=part), axes=[Axis("phi", [60])],
+              measure=LinearStability())  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Held(Measure):
+    """Says which parts a scene has, where it is computed."""
+
+    name = "held"
+    headline = "held"
+    variables = {"held": ()}  # noqa: RUF012
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        grip = getattr(scene.parts.dynamics, "grip", 0.0)
+        return Outcome(Status.OK, {"held": grip + 10.0 * scene.as_dict().get("is_odd", False)})
+
+
+def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
+    """Here, and on workers that have only what they are sent; numbers, flags and texts of cells
+    without them are left out.
+    """
+    study = Study(
+        name="zipped", title="t", base=Scene(),
+        axes=[
+            Axis("case", {
+                "ours": {"inertia": True},
+                "mine": {"dynamics": Sticky, "grip": 5.0},
+                "odd": {"law": Doubled, "is_odd": True, "loading": Steplike},
+            }),
+            Axis("b_over_a", [2.0, 3.0]),
+        ],
+        measure=Held(),
+    )  # fmt: skip
+    here = run(study)
+    assert here.held.isel(b_over_a=0).values.tolist() == [0.0, 5.0, 10.0]
+    assert here.dynamics.values.tolist() == ["", "sticky", ""]
+    assert here.law.values.tolist() == ["slip", "slip", "doubled"]
+    np.testing.assert_array_equal(here.grip, [np.nan, 5.0, np.nan])
+    np.testing.assert_array_equal(here.is_odd, [np.nan, np.nan, 1.0])
+    assert here.grip.attrs["units"] == "m"
+    there = run(study, client=cluster, output=tmp_path)
+    same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
+    same_numbers(there, here)
+
+
+def test_overrides_by_class_whatever_their_order():
+    study = Study(name="n", title="t", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=Held())
+    for other in (study.with_(factor=[1.0, 2.0], law=Doubled),
+                  study.with_(law=[Doubled]).with_(factor=[1.0, 2.0])):  # fmt: skip
+        assert {cell.scene.factor for cell in other.cells()} == {1.0, 2.0}
+        assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
+    with pytest.raises(InvalidValue, match="override = 'factor': is neither an axis nor a field"):
+        study.with_(factor=[1.0])
+
+
+def test_built_in_scenes_are_what_they_were():
+    """Whatever is known in this process."""
+    Scene(law=Doubled, dynamics=Sticky)
+    scene = Scene(alpha=0.3)
+    assert tuple(scene.as_dict()) == fields.FIELDS
+    assert pickle.loads(pickle.dumps(scene)) == scene
+    study = Study(name="n", title="t", base=scene, axes=[Axis("phi", [60])], measure=Held())
+    assert set(study.describe()["base"]) == set(fields.FIELDS)
+
+
+# ---- figures ------------------------------------------------------------------------------------
+
+
+def squares(dataset, axes):
+    axes.plot(dataset.held.values.ravel() ** 2)
+    axes.set_title("squares")
+
+
+@pytest.mark.parametrize(
+    ("plot", "complaint"),
+    [
+        (3, "plot = 3: must be a name, or a function or module"),
+        (lambda dataset, axes: axes, "plot = '<lambda>': needs a name of its own"),
+        (lines, "plot = 'lines': needs a name of its own"),
+    ],
+)
+def test_figures_that_are_none(plot, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Study(
+            name="n", title="t", base=Scene(), axes=[Axis("phi", [60])], measure=Held(), plot=plot
+        )
+
+
+def test_a_module_or_a_function_draws(tmp_path):
+    study = Study(name="n", title="t", base=Scene(), axes=[Axis("phi", [60, 70])], measure=Held(),
+                  plot=squares)  # fmt: skip
+    dataset = run(study)
+    assert json.loads(dataset.attrs["declaration"])["plot"] == "squares"
+    assert plots.figure(dataset, squares).axes[0].get_title() == "squares"
+    with pytest.raises(InvalidValue, match="plot = 'squares': is unknown"):
+        plots.figure(dataset)
+    module = SimpleNamespace(__name__="mine.squares", draw=squares, PANELS=(None, squares))
+    assert len(plots.figure(dataset, module).axes) == 2
+    partial = dataset.assign_attrs(completeness="partial: 1 of 2 cells")
+    assert "partial" in plots.figure(partial, squares).axes[0].get_title()
