@@ -38,6 +38,7 @@ EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 PLACES = {
     "perrin_rice_zheng": {"law": "perrin_rice_zheng", "stiffness_ratio": 2.0},
     "law_family": {"law_exponent": 0.5, "stiffness_ratio": 1.5},
+    "hold_and_reload": {"hold_time": 1e4},
     "stress_weakening": {"normal_stress": "variable", "c": 2.0},
     "loading_time": {"load_velocity_ratio": 10.0},
     "power_law": {"b_over_a": 2.0, "a": 0.01},
@@ -126,6 +127,34 @@ def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
 
 
 # ---- the numbers are those of mathematics -------------------------------------------------------
+
+
+def test_a_hold_and_a_reload(outside):
+    """Slowness law, r = k/k_cr: stress relaxes by a r ln(r)/(r - 1) sigma_*, and after a long hold
+    of t peaks at b ln(t) - a b ln(K/b)/(K - b); what is left out of both goes as 1/t.
+    """
+    found = outside["hold_and_reload"]
+    study = catalogue.load(str(found.study))
+    scene, hold = study.base, found.dataset.hold_time
+    a, b, stiffness, ratio = scene.a, scene.b, scene.stiffness, scene.stiffness_ratio
+    limit = -a * ratio * math.log(ratio) / (ratio - 1.0)
+    assert found.dataset.relaxation.values[0] == pytest.approx(limit, rel=1e-4)
+    assert found.dataset.relaxation.values[1] == pytest.approx(limit, rel=1e-6)
+    peak = b * np.log(hold) - a * b * math.log(stiffness / b) / (stiffness - b)
+    assert found.dataset.peak_stress.values[0] == pytest.approx(peak.values[0], rel=1e-4)
+    assert found.dataset.peak_stress.values[1] == pytest.approx(peak.values[1], rel=1e-6)
+
+
+def test_the_whole_history_is_one_motion(outside):
+    """Time, slip and load point displacement run through the segments, and so does the spring."""
+    scene = catalogue.load(str(outside["hold_and_reload"].study)).base.with_(hold_time=1000.0)
+    motion = rsfstudy.simulate(scene, duration=1500.0)
+    assert motion.attrs["status"] == "ok"
+    assert (np.diff(motion.time) >= 0.0).all()
+    assert motion.time.values[-1] == pytest.approx(1500.0, rel=1e-12)
+    load = np.maximum(motion.time - 1000.0, 0.0)
+    spring = scene.mu_star + scene.stiffness * (load - motion.slip)
+    np.testing.assert_allclose(motion.shear_stress, spring, atol=1e-12)
 
 
 def test_the_symmetric_law(outside):

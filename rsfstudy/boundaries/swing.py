@@ -114,11 +114,11 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
 
 
 def orbits_may_close(scene: Scene) -> bool:
-    """Whether every orbit closes at critical stiffness: where friction alone acts, without an
-    effect of stress on it (Gu et al. 1984 for the slip law, Ranjith and Rice 1999 for the slowness
-    law).
+    """Whether every orbit closes at critical stiffness: where friction of one state acts alone,
+    and stress has no effect on it (Gu et al. 1984 for the slip law, Ranjith and Rice 1999 for the
+    slowness law).
     """
-    return not set(scene.effects) - {"inertia"}
+    return scene.parts.law.states == 1 and not set(scene.effects) - {"inertia"}
 
 
 def settles(scene: Scene) -> bool:

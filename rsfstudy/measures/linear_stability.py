@@ -128,10 +128,9 @@ def _cot_phi(scene: Scene) -> float:
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
     """Stiffness at which perturbations of steady sliding neither grow nor decay."""
     with_mass = scene.dynamics.norm(scene, steady.log_rate) > _MASS_SHOWS
-    around = near / scene.critical_stiffness
 
-    def growth_at(ratio: float) -> float:
-        changed = scene.with_(stiffness_ratio=ratio)
+    def growth_at(stiffness: float) -> float:
+        changed = scene.with_(stiffness=stiffness)
         if with_mass:
             equations = in_rupture(changed)
             state = (steady.spring, steady.log_rate, steady.spring, *steady.psis[1:])
@@ -141,8 +140,7 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
         meter.charge(equations.regime, 2 * len(state))
         return growth(jacobian(equations, state))
 
-    ratio = float(brentq(growth_at, 0.5 * around, 2.0 * around, xtol=1e-15, rtol=1e-14))
-    return ratio * scene.critical_stiffness
+    return float(brentq(growth_at, 0.5 * near, 2.0 * near, xtol=1e-15 * near, rtol=1e-14))
 
 
 def growth(jacobian: np.ndarray) -> float:

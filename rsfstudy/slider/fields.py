@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, get_type_hints
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import dynamics, laws, loading, normal_stress, own
-from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.parts import Part, checked, is_flag, names_of, number, quantities_of
 
 _POSITIVE = "must be greater than 0"
@@ -61,8 +60,6 @@ class Slot:
         The one that is meant where none is named.
     long_name : str
         What it is.
-    functions : tuple of str
-        Functions that each part states.
     own : dict of str to type
         Parts of the user's own, by name, as far as they are known in this process.
     """
@@ -72,7 +69,6 @@ class Slot:
     choices: Mapping[str, type[Part]]
     default: str
     long_name: str
-    functions: tuple[str, ...] = ()
     own: dict[str, type[Part]] = field(default_factory=dict)
 
     @cached_property
@@ -87,7 +83,7 @@ class Slot:
 
 
 SLOTS: tuple[Slot, ...] = (
-    Slot("law", laws.Law, laws.PARTS, "slip", "state evolution law", ("evolution",)),
+    Slot("law", laws.Law, laws.PARTS, "slip", "state evolution law"),
     Slot(
         "normal_stress",
         normal_stress.NormalStress,
@@ -101,9 +97,8 @@ SLOTS: tuple[Slot, ...] = (
         dynamics.PARTS,
         "quasi_static",
         "what balances the spring besides friction",
-        ("balance", "growth"),
     ),
-    Slot("loading", Step, loading.PARTS, "step", "what the load point does"),
+    Slot("loading", loading.Loading, loading.PARTS, "step", "what the load point does"),
 )
 #: Slots of which there is a choice to be named.
 NAMED = tuple(slot for slot in SLOTS if slot.is_named and len(slot.choices) > 1)
@@ -236,12 +231,16 @@ def fields_with(parts: Iterable[type[Part]]) -> tuple[str, ...]:
 
 
 def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
-    """What those fields hold."""
-    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
+    """What those fields hold; none, where the part stands for another that owns them."""
+    kinds: dict[str, Any] = {**dict.fromkeys(SLOT_NAMES, str), **KINDS}
     parts = tuple(parts)
     for part in parts:
-        kinds |= {n: (bool if is_flag(part, n) else float) | None for n in names_of(part)}
-    return {name: KINDS.get(name, kinds.get(name)) for name in fields_with(parts)}
+        others = _CHECKED[part].choices.values()
+        kinds |= {n: KINDS[n] | None for other in others for n in names_of(other)}
+        for name in names_of(part):
+            own_kind = (bool if is_flag(part, name) else float) | None
+            kinds[name] = KINDS.get(name, own_kind)
+    return {name: kinds[name] for name in fields_with(parts)}
 
 
 # ---- which fields have a meaning -----------------------------------------------------------------

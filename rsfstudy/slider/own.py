@@ -41,7 +41,7 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
         _check_field(slot, part, stated.name, owners)
         if stated.name in taken - set(owners):
             raise _taken(part, stated.name, "every scene")
-    for name in slot.functions:
+    for name in part.functions():
         function = inspect.getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
             rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."

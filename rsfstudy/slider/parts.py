@@ -53,6 +53,11 @@ class Part:
         return ()
 
     @classmethod
+    def functions(cls) -> tuple[str, ...]:
+        """Names of the functions that the part must state."""
+        return ()
+
+    @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
         """The error for a value of another part of the slot, which has no meaning here."""
         return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy="Leave it out.")

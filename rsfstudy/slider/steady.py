@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 #: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
 _STRONGEST = 1e9
 #: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
-_STEP = 0.05
+#: States take a part of it, over b, because each of several may have a small part of b.
+_STEP, _PART = 0.05, 0.1
 _WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
 
 Polynomial = list[float]
@@ -197,7 +198,7 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[np.ndarray, np.ndarray,
     count = len(steady.psis)
     slopes = np.zeros((count, count + 2))
     for column in range(count + 2):
-        scale = 1.0 if column == 0 else b
+        scale = 1.0 if column == 0 else _PART * b
         for number, weight in _WEIGHTS:
             for sign in (1.0, -1.0):
                 x, stress, *psis = (

@@ -33,6 +33,10 @@ class Dynamics(Part):
     rupture_rate: ClassVar[Function | None] = None
     rupture_point: ClassVar[Function | None] = None
 
+    @classmethod
+    def functions(cls) -> tuple[str, ...]:
+        return ("balance", "growth")
+
     def radiated(self, log_rate: float) -> float:
         """Part of the spring stress that waves carry away at ln(V/V_*), over sigma_*."""
         return 0.0

@@ -48,6 +48,10 @@ class Law(Part):
     #: state variable, and its derivative with respect to friction; none for most laws.
     state_effect: ClassVar[Function | None] = None
 
+    @classmethod
+    def functions(cls) -> tuple[str, ...]:
+        return ("evolution",) if cls.states == 1 else ("evolutions", "resting")
+
     def numbers(self, scene: Scene) -> Numbers:
         """b."""
         return (scene.a * self.b_over_a,)

@@ -1,0 +1,64 @@
+"""A loading history, and a measure that reads it: the load point is held, then moves on."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import error_between
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import number
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoldAndReload(Loading):
+    hold_time: float = number(
+        100.0, "$t_h$", "1", "time of the hold", rule="must be greater than 0", scale="D_c/V_*"
+    )
+
+    name = "hold_and_reload"
+
+    @property
+    def segments(self):
+        return Segment(load_velocity=0.0, duration=self.hold_time), Segment(load_velocity=1.0)
+
+
+@dataclass(frozen=True)
+class Healing(Measure):
+    name = "healing"
+    headline = "peak_stress"
+    quantities = (
+        Quantity("peak_stress", "", "1", "rise of stress to its peak on reloading", "sigma_*"),
+        Quantity("relaxation", "", "1", "change of stress during the hold", "sigma_*"),
+    )
+    variables: ClassVar = {"peak_stress": (), "peak_stress_error": (), "relaxation": ()}
+    typical_work = 4_000
+
+    def find(self, scene, accuracy, meter):
+        (left, peak), (_left, again) = (
+            self.read(scene, asked, meter) for asked in (accuracy, accuracy.refined())
+        )
+        error = error_between(peak, again, 0.01 * accuracy.rtol)
+        values = {"peak_stress": peak, "peak_stress_error": error, "relaxation": left}
+        return Outcome(Status.OK, values)
+
+    def read(self, scene, accuracy, meter):
+        motion = follow(scene, accuracy, meter, [maximum("spring")])
+        reload = next(event for event in motion if event.kind is Kind.SEGMENT)
+        peak = next(event for event in motion if event.kind is Kind.MAXIMUM)
+        return reload.point.spring, peak.point.spring
+
+
+study = Study(
+    name="holds",
+    title="Healing during holds",
+    base=Scene(
+        law="slowness", normal_stress="constant", loading=HoldAndReload, stiffness_ratio=3.0
+    ),
+    axes=[Axis("hold_time", [1e4, 1e6])],
+    measure=Healing(),
+)
