@@ -11,15 +11,18 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, cli
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
 
@@ -43,15 +46,48 @@ def run(study=SMALL, **options) -> xr.Dataset:
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
 
 
-def named_results(study: str | Study, tmp_path_factory, client) -> tuple[xr.Dataset, Path]:
-    """Results of a named study, and their file, computed once for all processes of the tests."""
+#: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
+#: claims speak of, and some between; of costs, the integrators that they turn on; of error
+#: estimates, a scene of each kind.
+ENOUGH = {
+    "accuracy_cost": {
+        "integrator": ["DOP853", "RK45", "DOP853 + Radau", "Radau (mass always)"],
+        "requested_digits": [4, 6, 8, 9],
+        "repeats": 1,
+    },
+    "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},
+    "coverage": {"sample": [0]},
+    "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
+    "instability_norm": {
+        "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
+        "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
+    },
+    "rate_step_lattice": {"stiffness_ratio": [1.0, 1.5, 2.0]},
+    "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},
+    "stress_drop": {
+        "stiffness_ratio": [0.4, 0.8],
+        "load_velocity_ratio": 10.0 ** np.linspace(0.0, 3.0, 4),
+    },
+}
+
+
+def enough(name: str) -> Study:
+    """The study, or enough of it: fewer points, but the study as declared, with all its claims."""
+    study = catalogue.load(name)
+    return replace(study.with_(**ENOUGH.get(name, {})), overrides=study.overrides)
+
+
+def named_results(name: str, tmp_path_factory, **where) -> tuple[xr.Dataset, Path]:
+    """Results of enough of a named study, and their file, computed once for all processes of the
+    tests; in this process, unless told otherwise.
+    """
     place = tmp_path_factory.getbasetemp()
     output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
     end = time.monotonic() + HANGS
     while True:
         try:
-            dataset = rsfstudy.run(study, output=output, client=client, progress=False)
-            return dataset, output / f"{dataset.attrs['id']}.nc"
+            dataset = run(enough(name), output=output, **where)
+            return dataset, output / f"{name}.nc"
         except DataError as error:
             if "another run uses" not in str(error) or time.monotonic() > end:
                 raise

@@ -15,7 +15,7 @@ import xarray as xr
 from faulty import declared
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import FAULTY, SMALL, called, command, ended, run, same_numbers
+from running import FAULTY, SMALL, call, called, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots, terminal
@@ -55,6 +55,7 @@ def made(make, names):
 # ---- declarations -------------------------------------------------------------------------------
 
 
+@settings(max_examples=50)
 @given(st.dictionaries(st.sampled_from(FIELDS) | st.text(max_size=6), ODD, max_size=4))
 def test_a_scene_is_made_or_refused(fields):
     scene = made(lambda: Scene(**fields), fields)
@@ -282,7 +283,7 @@ JSON = st.recursive(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_a_declaration_that_was_meddled_with(small, data):
     """Sealed anew, so that the digests are right: it is restored, or refused."""
@@ -340,18 +341,18 @@ def test_a_journal_that_cannot_be_written(tmp_path, monkeypatch):
         run(output=tmp_path)
 
 
-def test_an_error_on_the_command_line_is_one_message(tmp_path):
-    code, _out, said = ended(command("run", FAULTY, "--output", "/dev/null/results"))
-    assert code == 1
-    assert said.startswith("error: cannot use")
+def test_an_error_on_the_command_line_is_one_message():
+    ran = call("run", FAULTY, "--output", "/dev/null/results")
+    assert ran.returncode == 1
+    assert ran.stderr.startswith("error: cannot use")
 
 
 def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
     (tmp_path / "faulty.png").mkdir()
-    code, out, said = ended(command("run", FAULTY, "--serial", "--output", tmp_path))
-    assert code == 1
-    assert "no figure:" in said
-    assert "faulty.png" not in out
+    ran = call("run", FAULTY, "--serial", "--output", tmp_path)
+    assert ran.returncode == 1
+    assert "no figure:" in ran.stderr
+    assert "faulty.png" not in ran.stdout
     assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"
 
 
@@ -387,14 +388,17 @@ def test_a_time_limit_beyond_all_clocks():
             run(time_limit=limit)
 
 
-@pytest.mark.parametrize("command_", ["check", "plot"])
-def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(command_, tmp_path):
-    code, _out, said = ended(command(command_, "stress_drp", "--output", tmp_path))
+@pytest.mark.parametrize("command", ["check", "plot"])
+def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
+    command, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "500")
+    code, said = called([command, "stress_drp", "--output", str(tmp_path)])
     assert (code, "Did you mean 'stress_drop'" in said) == (2, True)
-    code, _out, said = ended(command(command_, "stress_drop", "--output", tmp_path))
+    code, said = called([command, "stress_drop", "--output", str(tmp_path)])
     assert (code, "Run the study first" in said) == (1, True)
     (tmp_path / "stress_drop.partial.nc").touch()
-    code, _out, said = ended(command(command_, "stress_drop", "--output", tmp_path))
+    code, said = called([command, "stress_drop", "--output", str(tmp_path)])
     assert (code, "stress_drop.partial.nc does" in said) == (1, True)
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 from click.testing import CliRunner
 from faulty import declared
 from running import SMALL as LATTICE
-from running import call
+from running import call, named_results
 
 import rsfstudy
 from rsfstudy import cli
@@ -68,8 +68,8 @@ def test_check_all_checks_what_is_there_and_names_what_is_not(results):
         assert f"{name}: not run yet" in checked.stdout
 
 
-def test_check_fails_when_a_verdict_moves(tmp_path):
-    moved = rsfstudy.run(NAME, workers=0, output=None, progress=False)
+def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
+    moved, _path = named_results(NAME, tmp_path_factory)
     moved["zeta"] = moved["zeta"] + 0.5
     store.write(moved, tmp_path / "moved.nc")
     checked = call("check", tmp_path / "moved.nc")

@@ -27,24 +27,51 @@ DASK = [sys.executable, "-m", "dask"]
 
 
 class Cluster:
-    """A scheduler and workers as processes, each worker in an empty directory of its own."""
+    """A scheduler and workers as processes, each worker in an empty directory of its own; what a
+    test kills is started again for the next.
+    """
 
-    def __init__(self, tmp_path, stack):
-        self.tmp_path, self.stack, self.workers = tmp_path, stack, []
-        file = tmp_path / "scheduler.json"
+    def __init__(self, place, stack):
+        self.place, self.gate, self.stack = place, place / "gate", stack
+        self.scheduler, self.workers, self.started = None, [], 0
+        self.gate.mkdir()
+
+    def repaired(self):
+        """With two workers, and the gate as at the beginning."""
+        for mark in self.gate.iterdir():
+            mark.unlink()
+        if self.scheduler is None or self.scheduler.poll() is not None:
+            for worker in self.workers:
+                self._end(worker)
+            self._start_scheduler()
+        self.workers = [worker for worker in self.workers if worker.poll() is None]
+        while len(self.workers) < 2:
+            self._start_worker()
+        return self
+
+    def _start_scheduler(self):
+        file = self.place / "scheduler.json"
+        file.unlink(missing_ok=True)
         words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file"]
-        self.scheduler = self._start("scheduler", *words, str(file))
+        self.scheduler = self._start("scheduler", *words, str(file), cwd=self.place)
         until(lambda: file.exists() and file.stat().st_size > 0, self.scheduler)
         self.address = json.loads(file.read_text())["address"]
 
-    def _start(self, *words, cwd=None, **environment):
+    def _start_worker(self):
+        place = self.place / f"worker{self.started}"
+        place.mkdir()
+        self.started += 1
+        words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+        self.workers.append(self._start(*words, cwd=place))
+
+    def _start(self, *words, cwd):
         process = subprocess.Popen(
             [*DASK, *words],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
             cwd=cwd,
-            env={**os.environ, **environment},
+            env={**os.environ, "FAULT_GATE": str(self.gate)},
         )
         self.stack.callback(self._end, process)
         return process
@@ -62,23 +89,26 @@ class Cluster:
         self.workers.append(self._start(*words, cwd=place, **environment))
 
 
-@pytest.fixture
-def separate(tmp_path):
+@pytest.fixture(scope="module")
+def started(tmp_path_factory):
     with contextlib.ExitStack() as stack:
-        yield Cluster(tmp_path, stack)
+        yield Cluster(tmp_path_factory.mktemp("cluster"), stack)
+
+
+@pytest.fixture
+def separate(started):
+    return started.repaired()
 
 
 def test_the_same_bits_as_in_this_process(separate, tmp_path):
     """The workers write nothing, neither where they are nor where the results go."""
-    separate.worker()
-    separate.worker()
     with workers.existing_cluster(separate.address, timeout=HANGS) as client:
         client.wait_for_workers(2)
         same_numbers(run(SMALL, client=client, output=tmp_path / "results"), run())
     assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
-    for place in ("worker0", "worker1"):
-        assert not list((tmp_path / place).rglob("*.nc"))
-        assert not list((tmp_path / place).rglob("*.sqlite"))
+    for place in separate.place.glob("worker*"):
+        assert not list(place.rglob("*.nc"))
+        assert not list(place.rglob("*.sqlite"))
 
 
 @pytest.fixture
@@ -86,15 +116,12 @@ def held(separate, tmp_path):
     """A run on two workers that has kept some of its cells, while the others wait until the gate is
     open; its directory, and that gate.
     """
-    output, gate = tmp_path / "results", tmp_path / "gate"
-    gate.mkdir()
-    separate.worker(FAULT_GATE=str(gate))
-    separate.worker(FAULT_GATE=str(gate))
+    output = tmp_path / "results"
     words = ("run", FAULTY, "--scheduler", separate.address, "--output", output)
     process = command(*words, FAULT_CELLS="30")
     until_kept(output / "faulty.cells.sqlite", process)
-    until(lambda: len(list(gate.iterdir())) == 2, process)  # both have cells
-    yield process, output, gate / "open"
+    until(lambda: len(list(separate.gate.iterdir())) == 2, process)  # both have cells
+    yield process, output, separate.gate / "open"
     process.kill()
     process.communicate()
 
@@ -184,7 +211,7 @@ def cluster(walltime, queue, **words):
     return LocalCluster(**words)
 
 runpy.run_path(sys.argv[1])["main"](
-    "rate_step_boundary", cluster, jobs=1, cores=1, processes=1, memory="2GB",
+    "rigid_response", cluster, jobs=1, cores=1, processes=1, memory="2GB",
     python=sys.executable, death_timeout=1200, scheduler_options={"dashboard_address": ":0"},
 )
 """
@@ -195,7 +222,7 @@ def test_the_slurm_script_runs_a_study(tmp_path):
     ran = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     assert "reproduced" in ran.stdout
-    assert (tmp_path / "outputs" / "rate_step_boundary.nc").exists()
+    assert (tmp_path / "outputs" / "rigid_response.nc").exists()
 
 
 def test_the_kubernetes_file_starts_a_cluster(tmp_path):

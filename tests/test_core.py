@@ -113,7 +113,7 @@ REFERENCES = {
 
 
 @pytest.mark.parametrize("law", sorted(REFERENCES))
-@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-7, 1e-9])
 def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
     scene = Scene(
         law=law,

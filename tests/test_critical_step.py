@@ -137,7 +137,7 @@ def test_requested_tolerance_is_met(law, rtol):
     assert abs(value - exact) <= error + finest
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(
     law=st.sampled_from(["slip", "slowness"]),
     weakening=st.floats(0.2, 6.0),

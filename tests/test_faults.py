@@ -3,17 +3,17 @@ is drawn from it unless one says so.
 """
 
 import logging
-import os
 import shlex
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, HANGS, call, command, ended, run
+from running import FAULTY, HANGS, call, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, cli, terminal
@@ -33,9 +33,10 @@ def only_one_failed(dataset, status):
     np.testing.assert_array_equal(dataset.total, [2.0, np.nan, 3.0, 3.5])
 
 
-@pytest.mark.parametrize(
-    ("fault", "status", "message"),
-    [
+#: What goes wrong in a cell, how it ends, and with which message.
+WRONG = {
+    fault: (status, message)
+    for fault, status, message in [
         ("raises", "cell_raised", "ZeroDivisionError: in the cell"),
         ("raises unprintable", "cell_raised", "Unprintable"),
         ("runs out of memory", "cell_raised", "MemoryError"),
@@ -59,24 +60,41 @@ def only_one_failed(dataset, status):
         ("nul", "cell_raised", r"ValueError: bad\0byte [/red]"),
         ("cancelled", "cell_raised", "CancelledError"),
         ("generator", "cell_raised", "GeneratorExit"),
-    ],
-)
-def test_a_cell_that_goes_wrong(fault, status, message, cluster, tmp_path, capsys):
-    """In this process and on a worker alike; the file and the terminal hold the message."""
+    ]
+}
+
+
+@pytest.fixture(scope="module")
+def gone_wrong(tmp_path_factory, cluster):
+    """Cells that go wrong in all these ways, each among others that do not: computed in this
+    process and on workers, and the files.
+    """
+    each = declared(at=(2.5,))
+    study = replace(each, axes=[Axis("fault", list(WRONG)), *each.axes])
+    found = []
     for where in ({"workers": 0}, {"client": cluster}):
-        dataset = run(declared(fault, at=(2.5,)), **where, output=tmp_path, fresh=True)
-        only_one_failed(dataset, status)
-        assert message in dataset.message.values[1]
-        only_one_failed(rsfstudy.open("faulty", tmp_path), status)
-        assert terminal.failures(dataset) == 1
+        output = tmp_path_factory.mktemp("wrong")
+        found += [run(study, **where, output=output), rsfstudy.open("faulty", output)]
+    return found
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
+    """In this process and on a worker alike; the file and the terminal hold the message."""
+    status, message = WRONG[fault]
+    for dataset in gone_wrong:
+        cells = dataset.sel(fault=fault)
+        only_one_failed(cells, status)
+        assert message in cells.message.values[1]
+        assert terminal.failures(cells) == 1
         assert status in capsys.readouterr().out
 
 
 @pytest.fixture(scope="module")
 def sturdy(tmp_path_factory):
-    """Workers that are started again when a cell kills them."""
+    """A worker that is started again when a cell kills it."""
     log = tmp_path_factory.mktemp("sturdy") / "workers.log"
-    with workers.local_cluster(2, log) as client:
+    with workers.local_cluster(1, log) as client:
         yield client, log
 
 
@@ -108,7 +126,7 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     """A worker may be a thread of it."""
     from distributed import Client
 
-    monkeypatch.setenv("FAULT_TAKES", "1")
+    monkeypatch.setenv("FAULT_TAKES", "0.3")
     with Client(processes=False, n_workers=1, dashboard_address=None) as client:
         dataset = run(declared(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
@@ -155,10 +173,11 @@ def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
     assert dataset.status.values.tolist() == [0, 0, 0, 0]
 
 
-def test_a_cell_that_exhausts_memory(tmp_path):
+def test_a_cell_that_exhausts_memory(monkeypatch):
     """Dask ends the worker before the machine does."""
     from distributed import Client, LocalCluster
 
+    monkeypatch.setattr(workers, "_TRIES", 1)  # a worker takes seconds to start
     with (
         LocalCluster(
             n_workers=1,
@@ -219,12 +238,9 @@ def test_a_few_failures_or_a_small_lattice_do_not_stop_it(tmp_path):
 
 
 def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monkeypatch):
-    environment = {"FAULT": "raises", "FAULT_AT": "2.5 3.5"}
-    code, _out, _said = ended(
-        command("run", FAULTY, "--serial", "--output", tmp_path, **environment)
-    )
-    assert code == 1
-    monkeypatch.setenv("COLUMNS", "500")
+    for name, value in {"FAULT": "raises", "FAULT_AT": "2.5 3.5", "COLUMNS": "500"}.items():
+        monkeypatch.setenv(name, value)
+    assert call("run", FAULTY, "--serial", "--output", tmp_path).returncode == 1
     shown = call("show", tmp_path / "faulty.nc")
     out = shown.stdout
     assert shown.returncode == 1
@@ -239,7 +255,6 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, **environment},
     )
     # it fails as it failed, with the traceback that says where
     assert alone.returncode == 1
@@ -248,8 +263,8 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
 
 
 def test_a_cell_of_a_named_study_alone(tmp_path):
-    whole = rsfstudy.run("displacement_boundary", workers=0, output=tmp_path, progress=False,
-                         b_over_a=[2.0, 3.0])  # fmt: skip
+    fewer = {"case": ["constant normal stress"], "stiffness_ratio": [1.0], "b_over_a": [2.0, 3.0]}
+    whole = run("displacement_boundary", output=tmp_path, **fewer)
     last = whole.isel(dict.fromkeys(whole.critical_displacement.dims, -1))
     place = {str(d): last[d].item() for d in whole.critical_displacement.dims}
     scene, outcome = rsfstudy.cell(tmp_path / "displacement_boundary.nc", place)

@@ -4,6 +4,7 @@ kept.
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, SMALL, command, ended, run
+from running import FAULTY, SMALL, call, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
@@ -189,10 +190,17 @@ def test_cells_differ_by_the_last_bit():
 # ---- what a file says of itself -----------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    output = tmp_path_factory.mktemp("small")
+    run(output=output)
+    return output / "small.nc"
+
+
 @pytest.fixture
-def small(tmp_path):
-    run(output=tmp_path)
-    return tmp_path / "small.nc"
+def small(written, tmp_path):
+    """A file of its own for each test, which may change it."""
+    return shutil.copy(written, tmp_path / "small.nc")
 
 
 def test_a_number_changed_in_a_file_is_named(small):
@@ -358,8 +366,8 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     with pytest.raises(InvalidValue, match="inf.* is not on its axis"):
         rsfstudy.cell(small, {**place, "b_over_a": "inf"})
     words = [f"--cell={name}={value}" for name, value in place.items()]
-    code, out, _said = ended(command("rerun", tmp_path / "other.nc", *words))
-    assert (code, "physics: older then" in out) == (0, True)
+    told = call("rerun", tmp_path / "other.nc", *words)
+    assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
 
 
 def test_a_measure_of_ones_own_is_not_taken_for_one_of_ours(tmp_path):
@@ -391,15 +399,15 @@ def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
     empty = xr.load_dataset(small)
     empty["status"][:] = 25
     store.write(empty, tmp_path / "empty.nc")
-    code, out, _said = ended(command("rerun", tmp_path / "empty.nc", "--serial", "--quiet"))
-    assert code == 1
-    assert "nothing to compare" in out
+    told = call("rerun", tmp_path / "empty.nc", "--serial", "--quiet")
+    assert told.returncode == 1
+    assert "nothing to compare" in told.stdout
 
 
 def test_a_rerun_on_the_command_line(small):
-    code, out, _said = ended(command("rerun", small, "--serial", "--quiet"))
-    assert code == 0
-    assert "every number is the same" in out
+    told = call("rerun", small, "--serial", "--quiet")
+    assert told.returncode == 0
+    assert "every number is the same" in told.stdout
 
 
 def test_a_rerun_of_a_study_of_ones_own(tmp_path):
@@ -413,7 +421,7 @@ def test_a_rerun_of_a_study_of_ones_own(tmp_path):
 
 
 def test_show_tells_what_is_in_a_file(small):
-    code, out, _said = ended(command("show", small))
-    assert code == 0
+    told = call("show", small)
+    assert told.returncode == 0
     for text in ("2 case x 3 b_over_a", "complete", "6 ok", "scipy", "critical_velocity_ratio"):
-        assert text in out
+        assert text in told.stdout

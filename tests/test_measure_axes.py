@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import command, ended, run, same_numbers
+from running import call, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -94,8 +94,8 @@ def test_a_point_of_a_zipped_axis_sets_both():
     assert run(scaled(case).with_(factor=[2.0, 4.0])).total.sel(case="factor = 4.0")[0] == 8.0
 
 
-def test_the_same_on_workers_and_in_pieces(tmp_path):
-    same_numbers(run(BOTH, workers=2), run(BOTH))
+def test_the_same_on_workers_and_in_pieces(tmp_path, cluster):
+    same_numbers(run(BOTH, client=cluster), run(BOTH))
     run(BOTH, output=tmp_path, format="zarr")
     same_numbers(rsfstudy.open(tmp_path / "both.zarr"), run(BOTH))
 
@@ -246,20 +246,21 @@ study = Study(
 """
 
 
-def test_a_study_file_with_a_measure_of_its_own(tmp_path):
+def test_a_study_file_with_a_measure_of_its_own(tmp_path, monkeypatch):
     """On workers, which cannot import it; and a failed cell is told with its place."""
     file = tmp_path / "own.py"
     file.write_text(OWN)
-    words = ["--output", tmp_path, "--quiet"]
-    status, said, _errors = ended(command("run", file, "--set", "power=2,3,4", *words))
-    assert status == 1
-    assert "--cell power=4.0 --cell b_over_a=2.0" in said
+    monkeypatch.setenv("COLUMNS", "500")
+    words = ["--workers", "1", "--output", tmp_path, "--quiet"]
+    ran = call("run", file, "--set", "power=2,3,4", *words)
+    assert ran.returncode == 1
+    assert "--cell power=4.0 --cell b_over_a=2.0" in ran.stdout
     found = rsfstudy.open(tmp_path / "own.nc")
     assert found.total.sel(power=[2.0, 3.0]).values.tolist() == [[4.0, 9.0], [8.0, 27.0]]
     place = ["--cell", "power=3", "--cell", "b_over_a=3"]
-    status, said, _errors = ended(command("rerun", tmp_path / "own.nc", "--study", file, *place))
-    assert status == 0
-    assert "total = 27.0" in said
+    alone = call("rerun", tmp_path / "own.nc", "--study", file, *place)
+    assert alone.returncode == 0
+    assert "total = 27.0" in alone.stdout
 
 
 def test_a_measure_of_its_own_is_computed_anew_as_it_was_set(tmp_path):

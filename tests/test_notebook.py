@@ -25,7 +25,7 @@ STUDIES = (
 def executed(tmp_path_factory, cluster):
     outputs = tmp_path_factory.mktemp("outputs")
     for name in STUDIES:
-        _dataset, file = named_results(name, tmp_path_factory, cluster)
+        _dataset, file = named_results(name, tmp_path_factory, client=cluster)
         shutil.copy(file, outputs)
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     with pytest.MonkeyPatch.context() as patch:

@@ -66,7 +66,14 @@ def test_a_state_effect_is_part_of_the_friction_relation(effects):
 
 
 @pytest.mark.parametrize("law", ["stress_weakened", "perrin_rice_zheng"])
-@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"normal_stress": "constant"},
+        {"alpha": 0.56},
+        {"normal_stress": "constant", "inertia": True},
+    ],
+)
 def test_everything_follows_from_a_law(law, effects):
     """The critical stiffness is that of the assembled equations, and steps are critical."""
     scene = Scene(law=law, load_velocity_ratio=1.5, **effects)

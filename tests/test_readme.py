@@ -3,12 +3,13 @@ ours.
 """
 
 import ast
+import functools
 import re
-import subprocess
-import sys
+import shutil
 from pathlib import Path
 
 import pytest
+from running import call, named_results
 
 import rsfstudy
 from rsfstudy.cli import cli
@@ -29,21 +30,27 @@ def test_there_are_examples():
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
-def test_python_runs_as_it_stands(number, tmp_path):
-    """In an empty directory, in this order where one uses another's results."""
+def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch):
+    """In an empty directory, on workers that are there already; where it uses the results of a
+    study, on those.
+    """
+    monkeypatch.chdir(tmp_path)
     code = BLOCKS[number]
     if number == FILE:
         (tmp_path / "angle.py").write_text(code)
-        command = [sys.executable, "-m", "rsfstudy.cli", "run", "angle.py"]
-    elif "outputs/rate_step_boundary.nc" in code:
-        rsfstudy.run("rate_step_boundary", workers=0, output=tmp_path / "outputs", progress=False)
-        (tmp_path / "test_block.py").write_text(code)
-        command = [sys.executable, "-m", "pytest", "-q", "test_block.py"]
-    else:
-        (tmp_path / "block.py").write_text(code)
-        command = [sys.executable, "block.py"]
-    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stdout + ran.stderr
+        ran = call("run", "angle.py", "--serial")
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+        return
+    if "outputs/rate_step_boundary.nc" in code:
+        _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
+        (tmp_path / "outputs").mkdir()
+        shutil.copy(file, tmp_path / "outputs")
+    monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
+    names = {"__name__": "block"}
+    exec(compile(code, f"block {number}", "exec"), names)
+    for name, test in list(names.items()):
+        if name.startswith("test_"):
+            test()
 
 
 def test_commands_and_options_exist():
@@ -71,8 +78,8 @@ def test_every_study_is_listed():
         assert f"| `{name}` |" in README
 
 
-def test_the_table_of_zeta_is_ours():
-    dataset = rsfstudy.run("rate_step_boundary", workers=0, output=None, progress=False)
+def test_the_table_of_zeta_is_ours(tmp_path_factory):
+    dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     rows = re.findall(
         r"^\| (constant normal stress|alpha = [\d.]+) \| ([\d.]+) \| ([\d.]+) \|", README, re.M
     )

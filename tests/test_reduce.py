@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.stats import linregress
 
@@ -43,6 +43,7 @@ def lattice(values, status=None) -> xr.Dataset:
     )
 
 
+@settings(max_examples=30)
 @given(st.floats(0.1, 3.0))
 def test_an_exact_law_is_fitted_exactly(slope):
     result = reduced(lattice(1.0 + slope * X), (FIT,))
@@ -51,6 +52,7 @@ def test_an_exact_law_is_fitted_exactly(slope):
     assert int(result.zeta_points) == 3
 
 
+@settings(max_examples=30)
 @given(st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
 def test_fit_agrees_with_numpy(noise):
     """Slope and standard error against numpy's least squares with one column."""
@@ -168,6 +170,7 @@ def test_a_range_without_points_gives_nothing():
     assert "zeta" not in reduced(outside, (FIT,))
 
 
+@settings(max_examples=30)
 @given(st.floats(-2.0, 2.0), st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
 def test_linear_fit_agrees_with_scipy(slope, noise):
     values = 0.3 + slope * X + np.array(noise)
@@ -272,6 +275,7 @@ def answers(values, status=None) -> xr.Dataset:
     )
 
 
+@settings(max_examples=30)
 @given(st.floats(1.0, 3.0), st.permutations(range(5)))
 def test_the_bracket_holds_the_boundary_in_any_order_of_the_axis(edge, order):
     assume(edge not in V0)
@@ -309,6 +313,7 @@ def test_cells_without_an_answer_widen_the_bracket_and_failed_ones_refuse_it():
     assert "failed" in result.edge.attrs["refused"]
 
 
+@settings(max_examples=30)
 @given(st.floats(0.2, 3.0), st.floats(1.2, 8.0))
 def test_a_level_of_a_power_law_is_inverted(power, level):
     """In logarithms a power law is a straight line, which the interpolant keeps."""

@@ -109,7 +109,7 @@ def test_a_script_needs_no_guard(tmp_path):
                 name="own", title="Own", base=rsfstudy.Scene(), measure=Own(),
                 axes=[rsfstudy.Axis("b_over_a", [2, 3])],
             )
-            print(rsfstudy.run(study, output=None, progress=False).total.values)
+            print(rsfstudy.run(study, workers=1, output=None, progress=False).total.values)
         """)
     )
     ran = subprocess.run(

@@ -1,5 +1,6 @@
 """Large lattices: little memory and few messages a cell, and stores that are written in pieces."""
 
+import functools
 import json
 import os
 
@@ -16,6 +17,12 @@ from rsfstudy.compute import plan, runner
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import pieces
 from rsfstudy.slider.scene import Scene
+
+
+@functools.cache
+def in_memory() -> xr.Dataset:
+    """What the stores of the small lattice are held against."""
+    return run(SMALL)
 
 
 @pytest.mark.parametrize("format", ["netcdf", "zarr"])
@@ -83,13 +90,13 @@ def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch)
     """In pieces of one cell, of part of a row, and in one; nothing but the store is left."""
     monkeypatch.setattr(pieces, "_NUMBERS", numbers)
     in_pieces = run(SMALL, output=tmp_path, format="zarr")
-    same_numbers(in_pieces.load().map(plain), run(SMALL))
+    same_numbers(in_pieces.load().map(plain), in_memory())
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.zarr"]
     alone = xr.open_dataset(tmp_path / "small.zarr", engine="zarr", consolidated=False)
     assert alone.attrs["completeness"] == "complete"
-    assert alone.critical_velocity_ratio.attrs == run().critical_velocity_ratio.attrs
+    assert alone.critical_velocity_ratio.attrs == in_memory().critical_velocity_ratio.attrs
     assert rsfstudy.check(tmp_path / "small.zarr").empty
-    plots.save(rsfstudy.open(tmp_path / "small.zarr"), tmp_path / "small.png")
+    assert plots.figure(rsfstudy.open(tmp_path / "small.zarr")).axes
 
 
 def plain(values: xr.DataArray) -> xr.DataArray:
@@ -130,7 +137,7 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
         with pytest.raises(rsfstudy.errors.RunError, match="6 of 6 cells are finished"):
             run(SMALL, output=tmp_path, format="zarr")
     assert os.listdir(tmp_path) == ["small.cells.sqlite"]
-    same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), run(SMALL))
+    same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), in_memory())
 
 
 def test_a_chunk_that_is_damaged_is_told(tmp_path):
@@ -160,7 +167,7 @@ def test_a_file_and_a_store_of_one_name_are_told_apart(tmp_path):
     run(SMALL, output=tmp_path)
     with pytest.raises(DataError, match=r"small\.nc and .*small\.zarr are both there"):
         rsfstudy.open("small", tmp_path)
-    same_numbers(rsfstudy.open(tmp_path / "small.nc"), run(SMALL))
+    same_numbers(rsfstudy.open(tmp_path / "small.nc"), in_memory())
 
 
 def test_a_chunk_that_is_lost_is_noticed(tmp_path):

@@ -1,9 +1,9 @@
 """A study in a file of the user's own: it runs by its path, and what is wrong with it is told."""
 
-import subprocess
 import sys
 
 import pytest
+from running import command, ended
 
 import rsfstudy
 from rsfstudy.declare import catalogue
@@ -58,16 +58,18 @@ def written(tmp_path, text: str) -> str:
 
 def test_a_file_runs_by_its_path_on_workers(tmp_path):
     file = written(tmp_path, DECLARATION)
-    command = [sys.executable, "-m", "rsfstudy.cli", "run", file, "--output", str(tmp_path)]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert ran.returncode == 0, ran.stderr
+    words = ("run", file, "--workers", "1", "--output", tmp_path)
+    code, _out, said = ended(command(*words))
+    assert code == 0, said
     assert (tmp_path / "mine.nc").exists()
     assert (tmp_path / "mine.png").exists()
     assert rsfstudy.open("mine", tmp_path).sizes["phi"] == 2
 
 
-def test_a_measure_of_the_file_reaches_the_workers(tmp_path):
-    dataset = rsfstudy.run(written(tmp_path, OWN_MEASURE), output=tmp_path, progress=False)
+def test_a_measure_of_the_file_reaches_the_workers(tmp_path, cluster):
+    dataset = rsfstudy.run(
+        written(tmp_path, OWN_MEASURE), client=cluster, output=tmp_path, progress=False
+    )
     assert (dataset.status == 0).all(), dataset.message.values
     assert float(dataset.spring[0]) == rsfstudy.Scene(phi=55).stiffness
     assert "study_file_mine" not in sys.modules
