@@ -17,6 +17,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
 from rsfstudy.motion.recording import SAMPLES, observed
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
@@ -186,5 +187,5 @@ class _Watch:
         for fallen, event in enumerate(self._seen):
             if event.kind is Kind.FALL:
                 after = self._seen[fallen:]
-                return next((e.point for e in after if e.regime != "inertial"), None)
+                return next((e.point for e in after if e.regime != IN_RUPTURE), None)
         return None

@@ -250,7 +250,7 @@ class DisplacementSteps(Steps):
         That is a delay on the same path, but for what the load point moves meanwhile.
         """
         scene = self.scene_at(size)
-        if not scene.inertia:
+        if not scene.has_mass:
             return False
         rate = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
         behind = scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2
@@ -289,7 +289,7 @@ class DisplacementSteps(Steps):
         if self.sign < 0:
             weakest = scene.parts.normal_stress.weakest(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = _RISE_OF_MASS if scene.inertia else 0.0
+        farther = _RISE_OF_MASS if scene.has_mass else 0.0
         friction = steady.stress_after_jump(scene, scene.a * (scene.log_norm_rate + farther))
         if friction is None:
             return _LARGEST_STRESS / scene.stiffness

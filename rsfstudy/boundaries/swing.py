@@ -13,7 +13,7 @@ from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
 from rsfstudy.motion.regimes import check_start, mass_acts, on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
-from rsfstudy.slider.equations import without_mass
+from rsfstudy.slider.equations import IN_RUPTURE, without_mass
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
@@ -113,12 +113,27 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     return Swing(reached, max(excess, 1e-12) if reached else min(excess, -1e-12))
 
 
-def orbits_may_close(scene: Scene) -> bool:
-    """Whether every orbit closes at critical stiffness: where friction of one state acts alone,
-    and stress has no effect on it (Gu et al. 1984 for the slip law, Ranjith and Rice 1999 for the
-    slowness law).
+def friction_acts_alone(scene: Scene) -> bool:
+    """Whether only rate and state change friction, and only friction damps: stiffness is then
+    critical at every load point velocity or at none.
     """
-    return scene.parts.law.states == 1 and not set(scene.effects) - {"inertia"}
+    stress_acts = scene.parts.normal_stress.effects or scene.parts.law.state_effect
+    return not stress_acts and not scene.dynamics.damping(0.0)
+
+
+def orbits_may_close(scene: Scene) -> bool:
+    """Whether every orbit closes at critical stiffness."""
+    return scene.parts.law.orbits_close and friction_acts_alone(scene)
+
+
+def neutral(scene: Scene, within: float) -> bool:
+    """Whether stiffness is so close to the critical one, at any load point velocity, that growth
+    and decay cannot be told apart; where all orbits close at critical stiffness, that is known.
+    """
+    off = abs(scene.stiffness_ratio - 1.0)
+    return (
+        friction_acts_alone(scene) and off < within and (off > 0.0 or not orbits_may_close(scene))
+    )
 
 
 def settles(scene: Scene) -> bool:
@@ -232,7 +247,7 @@ def _orbit(
             if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
                 return _Orbit(tuple(peaks), reached=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady.stable and event.regime != "inertial":
+            if slow and not steady.stable and event.regime != IN_RUPTURE:
                 return _Orbit(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 

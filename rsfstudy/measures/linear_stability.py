@@ -104,16 +104,13 @@ class LinearStability(Measure):
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
         found = _threshold(scene, steady, critical, meter)
-        explicit = closed_forms.critical_stiffness(
-            load, scene.mu_star, scene.a, scene.b, _cot_phi(scene), scene.alpha or 0.0
-        )
         return Outcome(
             Status.OK,
             {
                 "critical_stiffness": critical,
                 "critical_stiffness_error": abs(found - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": found,
-                "critical_stiffness_explicit": explicit * (1.0 + rise),
+                "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
                 "relative_critical_stiffness": critical / scene.critical_stiffness,
                 "rise_by_dynamics": rise,
                 **values,
@@ -121,8 +118,14 @@ class LinearStability(Measure):
         )
 
 
-def _cot_phi(scene: Scene) -> float:
-    return 0.0 if scene.phi is None else 1.0 / math.tan(math.radians(scene.phi))
+def _explicit(scene: Scene) -> float:
+    """The published formula, for scenes it speaks of; NaN for others."""
+    law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
+    if coupling is None or law.resting is not None or law.state_effect is not None:
+        return math.nan
+    return closed_forms.critical_stiffness(
+        scene.log_load_rate, scene.mu_star, scene.a, scene.b, *coupling
+    )
 
 
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:

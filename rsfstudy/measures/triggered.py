@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.boundaries.swing import orbits_may_close, swing
+from rsfstudy.boundaries.swing import neutral, swing
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
@@ -48,10 +48,7 @@ class Triggered(Measure):
         accuracies = accuracy, accuracy.refined()
         answer, again = (swing(scene, asked, meter).reached for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
-        neutral = orbits_may_close(scene) and (
-            0.0 < abs(scene.stiffness_ratio - 1.0) < 10.0 * accuracy.rtol
-        )
-        if answer != again or neutral:
+        if answer != again or neutral(scene, 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )

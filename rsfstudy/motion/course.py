@@ -20,7 +20,7 @@ from rsfstudy.motion.events import (
 from rsfstudy.motion.regimes import motion, starting
 from rsfstudy.motion.stepping import Meter, Step, steps
 from rsfstudy.motion.timeline import elapsed, moment_in, timed
-from rsfstudy.slider.equations import Equations
+from rsfstudy.slider.equations import RIGID, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
@@ -114,7 +114,7 @@ def along(
 
 def _of_path(step: Step, told: Told, point: Point) -> Event:
     regime = step.equations.regime
-    slip = told.clock if regime == "rigid" else math.nan
+    slip = told.clock if regime == RIGID else math.nan
     return Event(told.kind, told.watch, math.nan, slip, point, regime, step.meter.spent)
 
 

@@ -64,7 +64,7 @@ def motion(
         With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
         the equations end, or as `steps` does.
     """
-    if scene.dynamics.rupture_rate is None:
+    if not scene.has_mass:
         equations, state = without_mass(scene, clock=clock), _unknowns(start, clock)
         yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
         return
@@ -92,7 +92,7 @@ def starting(scene: Scene) -> Point:
     """
     check_start(scene)
     stepped = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.parts.law.states)
-    if scene.dynamics.rupture_rate is None:
+    if not scene.has_mass:
         return stepped
     return stepped._replace(log_rate=0.0, friction=0.0)
 
@@ -159,7 +159,7 @@ def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
     """Whether mass matters up to the instability norm, beyond what the slow manifold holds of
     it.
     """
-    return scene.inertia and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
+    return scene.has_mass and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
 
 
 def error_of_slow_manifold(scene: Scene) -> float:
