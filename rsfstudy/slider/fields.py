@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, NamedTuple, get_type_hints
@@ -211,6 +211,8 @@ def own_named(names: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> dict[s
 
 def by_class(values: Mapping[str, Any], parts: Mapping[str, type[Part]]) -> dict[str, Any]:
     """Values of fields, with these parts by their classes instead of their names."""
+    if not parts:
+        return dict(values)
     texts = {n: values[n] for n in SLOT_NAMES & set(values) if isinstance(values[n], str)}
     return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
 
@@ -233,6 +235,14 @@ def fields_with(parts: Iterable[type[Part]]) -> tuple[str, ...]:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {part.name}", name, rule)
     return tuple(names)
+
+
+def quantities_with(parts: Iterable[type[Part]]) -> Iterator[Quantity]:
+    """What the fields mean that parts of the user's own add to those of every scene."""
+    for part in parts:
+        slot = _CHECKED[part]
+        stated = (Quantity(slot.name, "", "", slot.long_name), *quantities_of(part))
+        yield from (about for about in stated if about.name not in FIELDS)
 
 
 def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
