@@ -303,9 +303,9 @@ class Study:
         of_scene, changes = self._split(rows)
         # one row that states both a choice and what has no meaning then is contradictory
         stated = {name for row in rows if set(row) & SLOT_NAMES for name in row}
-        own = self.own_parts
-        values = by_class(self.base.as_dict() | of_scene, own)
-        meaningless = without_meaning(values, own.values()) - stated
+        parts = self.own_parts
+        values = by_class(self.base.as_dict() | of_scene, parts)
+        meaningless = without_meaning(values, parts.values()) - stated
         of_scene = {name: values[name] for name in of_scene if name not in meaningless}
         try:
             return Cell(self.base.with_(**of_scene), changes)
