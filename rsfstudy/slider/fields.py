@@ -295,7 +295,7 @@ def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
     value = given.get(slot.name)
     if isinstance(value, type):
         return known(slot, value)
-    if isinstance(value, str) and value in slot.own:
+    if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
     if slot.name in SLOT_FIELDS:
         name = given.get(slot.name, slot.default)
