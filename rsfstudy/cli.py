@@ -406,6 +406,8 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     try:
         return api.own_figure(dataset, study)
     except RsfStudyError as error:
+        if study is not None:
+            raise
         _stderr.print(f"note: drawn as lines, because the figure was not found: {error}")
         return lines
 
