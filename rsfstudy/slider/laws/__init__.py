@@ -60,7 +60,7 @@ class Law(Part):
         super().__init_subclass__()
         if {"evolution", "evolutions"} & vars(cls).keys():
             for name, unknown in (("orbits_close", False), ("stress_left", None)):
-                if name not in vars(cls):
+                if name not in vars(cls) and getattr(cls, name) != unknown:
                     setattr(cls, name, unknown)
 
     @classmethod
