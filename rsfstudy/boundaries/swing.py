@@ -128,12 +128,12 @@ def orbits_may_close(scene: Scene) -> bool:
 
 def neutral(scene: Scene, within: float) -> bool:
     """Whether stiffness is so close to the critical one, at any load point velocity, that growth
-    and decay cannot be told apart; where all orbits close at critical stiffness, that is known.
+    and decay cannot be told apart. Where all orbits close at critical stiffness, that is known;
+    with the load point held there are none.
     """
     off = abs(scene.stiffness_ratio - 1.0)
-    return (
-        friction_acts_alone(scene) and off < within and (off > 0.0 or not orbits_may_close(scene))
-    )
+    known = scene.log_load_rate == -math.inf or (off == 0.0 and orbits_may_close(scene))
+    return friction_acts_alone(scene) and off < within and not known
 
 
 def settles(scene: Scene) -> bool:

@@ -119,7 +119,7 @@ class CriticalStep(Measure):
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
         below = not orbits_may_close(scene) or scene.stiffness_ratio < 1.0
-        if below and neutral(scene, 10.0 * accuracy.rtol):
+        if below and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED,
                 message="stiffness is critical to within the accuracy: ask for a smaller rtol",
