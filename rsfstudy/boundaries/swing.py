@@ -27,6 +27,8 @@ _LINEAR = 0.05
 #: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
 _LEAP, _SHORTEST_LEAP = 1.3, 1.002
 
+#: How much higher in ln V a motion is taken to rise that is followed up to the norm only.
+_HIGHER = 1.0
 #: Part of the farthest distance from steady sliding at which a motion has come to it.
 _CLOSE = 1e-3
 
@@ -176,7 +178,7 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     watches = (_TOP, minimum("log_rate"), rise("log_rate", norm))
     for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):
         if event.kind is Kind.RISE:
-            return norm
+            return norm + _HIGHER
         if event.watch is not None or event.point.log_rate >= norm or event.point.growth == 0.0:
             return event.point.log_rate
     raise AssertionError("a motion never ends by itself")
@@ -237,7 +239,7 @@ def _orbit(
             elif top >= norm and not heavy:
                 return _Orbit((top,), reached=True)
         elif event.kind is Kind.RISE:
-            return _Orbit((*peaks, norm), reached=True)
+            return _Orbit((*peaks, norm + _HIGHER), reached=True)
         elif event.kind is Kind.SETTLED:
             return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
         elif event.kind is Kind.MAXIMUM:
