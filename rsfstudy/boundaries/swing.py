@@ -276,12 +276,12 @@ def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
 def _steady(scene: Scene) -> _Steady:
     """Steady sliding at the load point velocity of the scene; `Halt` if there is none."""
     load = scene.log_load_rate
-    found = steady.steady_sliding(scene, load)
-    if found is None:
+    sliding = steady.steady_sliding(scene, load)
+    if sliding is None:
         raise Halt(
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
     critical = steady.critical_stiffness(scene, load)
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    return _Steady(load, found.spring, found.psis, margin)
+    return _Steady(load, sliding.spring, sliding.psis, margin)

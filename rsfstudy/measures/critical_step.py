@@ -160,10 +160,10 @@ class CriticalStep(Measure):
             if above.reached and not below.reached:
                 relative = width if boundary.by_motions else boundary.relative_error
                 error = steps.error(boundary.size, relative)
-                found = self._values(
+                values = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
-                return Outcome(Status.OK, found)
+                return Outcome(Status.OK, values)
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
@@ -253,8 +253,10 @@ class CriticalStep(Measure):
             )
         if steps.jumps_to_norm and not steps.scene.has_mass:
             value = steps.value(largest)
-            found = self._values(steps, largest, largest * ROUNDING, value, value)
-            return Outcome(Status.OK, found, "the jump of slip rate at the step itself is critical")
+            values = self._values(steps, largest, largest * ROUNDING, value, value)
+            return Outcome(
+                Status.OK, values, "the jump of slip rate at the step itself is critical"
+            )
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
             self._values(steps, stable=steps.value(largest)),

@@ -103,13 +103,13 @@ class LinearStability(Measure):
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
-        found = _threshold(scene, steady, critical, meter)
+        by_growth = _threshold(scene, steady, critical, meter)
         return Outcome(
             Status.OK,
             {
                 "critical_stiffness": critical,
-                "critical_stiffness_error": abs(found - critical) + 1e-15 * critical,
-                "critical_stiffness_from_growth": found,
+                "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
+                "critical_stiffness_from_growth": by_growth,
                 "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
                 "relative_critical_stiffness": critical / scene.critical_stiffness,
                 "rise_by_dynamics": rise,

@@ -139,8 +139,8 @@ def relation_of(scene: Scene) -> Callable[[float], tuple[float, float, float, fl
     relation, p = functions(scene)["strength"], numbers_of_friction(scene)
 
     def at(friction: float) -> tuple[float, float, float, float]:
-        found: tuple[float, float, float, float] = relation(friction, p)
-        return found
+        values: tuple[float, float, float, float] = relation(friction, p)
+        return values
 
     return at
 

@@ -242,8 +242,8 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
         scene.stiffness * scene.dynamics.norm(scene, log_rate) ** 2,
     ]
     polynomial = _sum(_product(spring, below), [0.0, *above])
-    found = np.roots(polynomial[::-1])
-    return np.asarray(found[np.argsort(-found.real)])
+    roots = np.roots(polynomial[::-1])
+    return np.asarray(roots[np.argsort(-roots.real)])
 
 
 def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
@@ -254,11 +254,11 @@ def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def _product(first: Polynomial, second: Polynomial) -> Polynomial:
-    found = [0.0] * (len(first) + len(second) - 1)
+    product = [0.0] * (len(first) + len(second) - 1)
     for i, x in enumerate(first):
         for j, y in enumerate(second):
-            found[i + j] += x * y
-    return found
+            product[i + j] += x * y
+    return product
 
 
 def _sum(first: Polynomial, second: Polynomial) -> Polynomial:
@@ -277,6 +277,6 @@ def _positive_roots(polynomial: Polynomial) -> list[float]:
     if len(polynomial) == 2:
         roots = [-polynomial[0] / polynomial[1]]
     else:
-        found = np.roots(polynomial[::-1])
-        roots = found.real[np.abs(found.imag) <= 1e-12 * np.abs(found)].tolist()
+        every = np.roots(polynomial[::-1])
+        roots = every.real[np.abs(every.imag) <= 1e-12 * np.abs(every)].tolist()
     return [root for root in roots if root > 0.0]
