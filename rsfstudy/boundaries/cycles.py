@@ -89,9 +89,13 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch = _Watch(start)
+    watch, ahead = _Watch(start), 0 if start else len(scene.segments) - 1
     swings: list[float] = []
     for event in follow(scene, accuracy, meter, _asked(scene), start=start, clock=True):
+        if event.kind is Kind.SEGMENT:
+            watch, ahead = _Watch(None), ahead - 1
+        if ahead:
+            continue
         cycle = watch.see(event)
         if cycle is not None:
             swings.append(cycle.swing)

@@ -91,7 +91,8 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     the one before means that none will ever be higher, and peaks that grow go on growing until they
     reach the norm or a limit cycle. To see which without following a thousand swings, the motion
     leaps to a somewhat larger orbit: if that grows too, and so on up to the norm, so does the orbit
-    inside it. With mass, which acts during ruptures only, the same rules serve. Once the load point
+    inside it. With mass, which acts during ruptures only, the same rules serve; with several states
+    only the norm or steady sliding itself ends a motion. Once the load point
     is held, spring stress can only fall, and the first peak is the last.
 
     Raises
@@ -226,6 +227,7 @@ def _orbit(
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
     watches += [settling(_CLOSE)] if steady.stable else []
+    planar = scene.parts.law.states == 1
     peaks: list[float] = []
     at_start = -math.inf
     for event in follow(scene, accuracy, meter, watches, start=start):
@@ -246,6 +248,8 @@ def _orbit(
             peaks.append(top)
             if top >= norm:
                 return _Orbit(tuple(peaks), reached=True)
+            if not planar:
+                continue
             if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
                 return _Orbit(tuple(peaks), reached=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)

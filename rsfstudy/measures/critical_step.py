@@ -251,7 +251,7 @@ class CriticalStep(Measure):
                 self._values(steps, stable=steps.value(largest)),
                 f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
             )
-        if steps.jumps_to_norm and not steps.scene.has_mass:
+        if steps.jumps_to_norm and not steps.scene.has_mass and not why:
             value = steps.value(largest)
             values = self._values(steps, largest, largest * ROUNDING, value, value)
             return Outcome(

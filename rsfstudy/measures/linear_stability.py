@@ -18,7 +18,7 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import Steady, critical_stiffness, resolvent, steady_sliding
+from rsfstudy.slider.steady import Steady, critical_stiffness, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
@@ -111,11 +111,15 @@ class LinearStability(Measure):
                 "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": by_growth,
                 "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
-                "relative_critical_stiffness": critical / scene.critical_stiffness,
+                "relative_critical_stiffness": _over(critical, scene.critical_stiffness),
                 "rise_by_dynamics": rise,
                 **values,
             },
         )
+
+
+def _over(stiffness: float, at_reference: float) -> float:
+    return stiffness / at_reference if at_reference else math.inf
 
 
 def _explicit(scene: Scene) -> float:
@@ -147,18 +151,8 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
 
 
 def growth(jacobian: np.ndarray) -> float:
-    """What has the sign of the growth of small oscillations: minus the Hurwitz determinant of the
-    characteristic polynomial that vanishes where two roots are imaginary. Of two unknowns it is the
-    trace.
-    """
-    size = len(jacobian)
-    coefficients = resolvent(jacobian)[0][::-1]
-    table = np.zeros((size - 1, size - 1))
-    for row in range(size - 1):
-        for column in range(size - 1):
-            place = 2 * column + 1 - row
-            table[row, column] = coefficients[place] if 0 <= place <= size else 0.0
-    return -float(np.linalg.det(table))
+    """Growth rate of the fastest growing perturbation, per unit of the clock."""
+    return float(np.linalg.eigvals(jacobian).real.max())
 
 
 def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:

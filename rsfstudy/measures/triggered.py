@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.boundaries.swing import neutral, swing
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
@@ -38,6 +39,10 @@ class Triggered(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion until the answer is certain, at two tolerances."""
+        if len(scene.segments) > 1:
+            rule = "is no single step, after which a motion decides"
+            remedy = "Read its peaks by step_response, or by simulate."
+            raise InvalidValue("loading", scene.parts.loading.name, rule, remedy=remedy)
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
             return Outcome(
                 Status.NORM_BELOW_LOADING_RATE,

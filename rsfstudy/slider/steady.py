@@ -37,8 +37,11 @@ if TYPE_CHECKING:
 _STRONGEST = 1e9
 #: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
 #: States take a part of it, over b, because each of several may have a small part of b.
-_STEP, _PART = 0.05, 0.1
+_STEP, _PART = 0.05, 0.05
 _WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+
+#: Critical stiffness over a that rounding leaves where there is none.
+_ROUNDING = 1e-12
 
 Polynomial = list[float]
 
@@ -171,7 +174,7 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
         elastic = squared * _value(turns, squared) / _value(size, squared)
         inertial = 1.0 - norm**2 * squared
         critical = max(critical, elastic / inertial if inertial > 0.0 else math.inf)
-    return critical
+    return critical if critical > _ROUNDING * scene.a else 0.0
 
 
 def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
