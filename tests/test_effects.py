@@ -123,7 +123,7 @@ def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
 
 
 #: What the equations of any scene call.
-ALWAYS = {"balance", "strength", "evolving", "evolutions", "evolution", "total"}
+ALWAYS = {"balance", "strength", "evolving", "evolution", "total"}
 
 
 @pytest.mark.parametrize(

@@ -135,14 +135,20 @@ class Watcher:
         self.watch = watch
         self._is_extremum = watch.kind in (Kind.MAXIMUM, Kind.MINIMUM)
         self._quantity = _SLOPES[watch.of] if self._is_extremum else _above(watch)
+        self._upwards = _UPWARDS[watch.kind]
+        self._latest: tuple[Point | None, float] = None, 0.0
 
     def within(self, step: Step) -> float | None:
         """Clock at which it happens within a step."""
         p = step.equations.p
+        known, before = self._latest
+        if known is not step.before:
+            before = self._quantity(step.before, p)
+        after = self._quantity(step.after, p)
+        self._latest = step.after, after
         # against the clock, slopes change sign the other way round
         reverse = self._is_extremum and step.end < step.start
-        ends = self._quantity(step.before, p), self._quantity(step.after, p)
-        if not self._happens(*ends, reverse=reverse):
+        if not self._happens(before, after, reverse=reverse):
             return None
         return step.locate(lambda point: self._quantity(point, p))
 
@@ -159,8 +165,9 @@ class Watcher:
         return before.point if kept and self.watch.of == "log_rate" else after.point
 
     def _happens(self, before: float, after: float, *, reverse: bool) -> bool:
-        sign = 1.0 if _UPWARDS[self.watch.kind] is not reverse else -1.0
-        return sign * before < 0.0 <= sign * after
+        if self._upwards is not reverse:
+            return before < 0.0 <= after
+        return before > 0.0 >= after
 
 
 class _Settling(Watcher):

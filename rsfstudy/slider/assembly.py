@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rsfstudy.slider import forms, friction
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.slots import FIRST_OWN
+from rsfstudy.slider.states import only
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
@@ -97,8 +98,11 @@ def _assembled(
     filled["strength"] = bound(getattr(friction, form), **filled)
     if normal_stress is None:
         filled["normal_stress"] = forms.unchanged_normal_stress
-    for name in ("evolving", "point_at"):
-        filled[name] = bound(getattr(forms, name), **filled)
+    alone = states == 1 and of_law[0] is not None
+    if alone:
+        filled["total"] = only
+    filled["evolving"] = bound(forms.evolving_alone if alone else forms.evolving, **filled)
+    filled["point_at"] = bound(forms.point_at, **filled)
     *supplied, own = dynamics
     for name, function in zip(_OF_DYNAMICS, supplied, strict=True):
         if function is not None:

@@ -121,6 +121,13 @@ def evolving(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Number
     return evolutions(x, psis, shift, 1.0 / (1.0 + math.exp(load - x)), p)
 
 
+def evolving_alone(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
+    """The same, for a law of one state."""
+    load = p[LOG_LOAD_RATE]
+    x = max(log_rate, load - STATIONARY)
+    return (evolution(x, psis[0] - shift, p) / (1.0 + math.exp(load - x)),)
+
+
 def rate(state: Numbers, p: Numbers) -> Numbers:
     """Derivatives of f and Psi between ruptures."""
     psis = state[1:BEYOND]

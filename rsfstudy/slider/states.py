@@ -14,6 +14,11 @@ def total(numbers: Numbers) -> float:
     return together
 
 
+def only(numbers: Numbers) -> float:
+    """The same, of one state."""
+    return numbers[0]
+
+
 def states_at(value: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
     """All states, where friction has this strength: the first is what the others leave."""
     return (value - p[A] * log_rate - total((0.0, *others)), *others)

@@ -198,19 +198,21 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[np.ndarray, np.ndarray,
     """
     evolutions, b = evolutions_of(scene), scene.b
     shift = relation_of(scene)(steady.friction)[2]
-    count = len(steady.psis)
-    slopes = np.zeros((count, count + 2))
-    for column in range(count + 2):
-        scale = 1.0 if column == 0 else _PART * b
+    at, columns = [steady.log_rate, shift, *steady.psis], []
+    for place, value in enumerate(at):
+        step = _STEP if place == 0 else _STEP * _PART * b
+        slopes = [0.0] * len(steady.psis)
         for number, weight in _WEIGHTS:
-            for sign in (1.0, -1.0):
-                x, stress, *psis = (
-                    value + sign * number * _STEP * scale * (place == column)
-                    for place, value in enumerate((steady.log_rate, shift, *steady.psis))
-                )
-                changes = evolutions(x, tuple(psis), stress)
-                slopes[:, column] += sign * weight / (_STEP * scale) * np.array(changes)
-    return slopes[:, 0], slopes[:, 1], slopes[:, 2:]
+            at[place] = value + number * step
+            ahead = evolutions(at[0], tuple(at[2:]), at[1])
+            at[place] = value - number * step
+            behind = evolutions(at[0], tuple(at[2:]), at[1])
+            for state, (more, less) in enumerate(zip(ahead, behind, strict=True)):
+                slopes[state] += weight * (more - less) / step
+        at[place] = value
+        columns.append(slopes)
+    matrix = np.array(columns).T
+    return matrix[:, 0], matrix[:, 1], matrix[:, 2:]
 
 
 def resolvent(matrix: np.ndarray) -> tuple[Polynomial, list[np.ndarray]]:
