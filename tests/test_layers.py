@@ -33,13 +33,13 @@ FLOORS = {
 }
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"compute/workers", "files/store"},
+    "dask": {"compute/workers", "files/store", "files/pieces"},
     "distributed": {"compute/workers", "compute/worker_log"},
     "matplotlib": {"plots"},
     "click": {"cli"},
     "rich": {"api", "cli", "terminal"},
     "sqlite3": {"files/journal"},
-    "zarr": {"files/pieces"},
+    "zarr": set(),  # xarray writes and reads it
 }
 
 

@@ -48,20 +48,24 @@ class Digests:
         self._of: dict[str, Any] = {}
         self._about: dict[str, str] = {}
 
-    def add(self, name: str, values: np.ndarray) -> None:
-        """The next values of a variable, in row-major order."""
-        digest = self._of.setdefault(name, hashlib.sha256())
-        if values.dtype.kind in "OUST":
-            digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
-        else:
-            little = values.dtype.newbyteorder("<")
-            digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
+    def add(self, dataset: xr.Dataset) -> None:
+        """The values of each variable of a dataset, or the next of them, in row-major order."""
+        for name in dataset.variables:
+            values = dataset[name].values
+            digest = self._of.setdefault(str(name), hashlib.sha256())
+            if values.dtype.kind in "OUST":
+                digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
+            else:
+                little = values.dtype.newbyteorder("<")
+                digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
 
-    def describe(self, name: str, sizes: Mapping[Any, int], attrs: Mapping[Any, Any]) -> None:
-        """The dimensions of a variable and its attributes, as they are written."""
-        plain = {str(key): np.asarray(value).tolist() for key, value in attrs.items()}
-        self._about[f"{name}()"] = json.dumps([[str(d), int(n)] for d, n in sizes.items()])
-        self._about[f"{name}:"] = json.dumps(plain, sort_keys=True)
+    def describe(self, dataset: xr.Dataset) -> None:
+        """The dimensions of each variable and its attributes, as they are written."""
+        for name, variable in dataset.variables.items():
+            sizes = [[str(d), int(n)] for d, n in variable.sizes.items()]
+            attrs = {str(key): np.asarray(v).tolist() for key, v in variable.attrs.items()}
+            self._about[f"{name}()"] = json.dumps(sizes)
+            self._about[f"{name}:"] = json.dumps(attrs, sort_keys=True)
 
     def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
         """The dataset with these digests, and those of its attributes."""
@@ -109,9 +113,8 @@ def _named(name: str) -> str:
 
 def _digests_of(dataset: xr.Dataset) -> Digests:
     digests = Digests()
-    for name in dataset.variables:
-        digests.add(str(name), dataset[name].values)
-        digests.describe(str(name), dataset[name].sizes, dataset[name].attrs)
+    digests.add(dataset)
+    digests.describe(dataset)
     return digests
 
 
