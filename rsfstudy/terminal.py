@@ -18,7 +18,7 @@ from rich.text import Text
 
 from rsfstudy import api
 from rsfstudy.compute import runner
-from rsfstudy.compute.plan import Plan
+from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study, settings, short
 from rsfstudy.errors import RunError
@@ -80,7 +80,7 @@ def declaration(study: Study) -> None:
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
     table.add_row("cells", f"{study.size}, of which {len(Plan(study).different)} differ")
-    work, seconds = runner.estimated_cost(study)
+    work, seconds = estimated_cost(study)
     rtol = study.accuracy.rtol
     cost = f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {rtol:g}"
     table.add_row("cost", cost)
@@ -89,7 +89,7 @@ def declaration(study: Study) -> None:
 
 def announce(study: Study) -> None:
     """Say what an accuracy will cost, before it does."""
-    work, seconds = runner.estimated_cost(study)
+    work, seconds = estimated_cost(study)
     ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
     console.print(
         f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "

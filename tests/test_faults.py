@@ -18,7 +18,7 @@ from running import FAULTY, HANGS, call, run
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, cli, terminal
 from rsfstudy.compute import runner, worker_log, workers
-from rsfstudy.compute.runner import Run
+from rsfstudy.compute.plan import Batches
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
@@ -109,7 +109,7 @@ def lost(*words, **options):
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     """One batch holds the killer and its neighbours: only the killer is recorded."""
-    monkeypatch.setattr(Run, "_batch_size", lambda *_args: 4)
+    monkeypatch.setattr(Batches, "size", lambda _self: 4)
     dataset = lost(declared("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]

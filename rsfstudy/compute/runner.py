@@ -5,7 +5,6 @@ finished, and assembles, reduces and writes the dataset.
 from __future__ import annotations
 
 import contextlib
-import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -16,18 +15,16 @@ import xarray as xr
 
 from rsfstudy.compute import provenance
 from rsfstudy.compute.cells import Found, Mapper, Task
-from rsfstudy.compute.plan import Plan, scattered
+from rsfstudy.compute.plan import Batches, Plan, scattered
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import pieces, store
 from rsfstudy.files.journal import Columns, Journal, Layout
 from rsfstudy.files.lattice import assemble
+from rsfstudy.measures import Outcome
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
 
-#: Typical time of one right-hand side in s, the time a task should last, and the most cells it may
-#: hold: as many are lost with the machine.
-_SECONDS_PER_RHS, _SECONDS_PER_TASK, _LARGEST_BATCH = 6e-6, 0.3, 2000
 #: How a cell ends that ends its worker.
 _LOST = (Status.WORKER_LOST, Status.TIME_LIMIT_SPENT)
 #: A run ends early where so many cells have failed before any is answered.
@@ -169,21 +166,18 @@ class Run:
             self.worker_log.unlink(missing_ok=True)  # of an earlier run
         if not len(missing):
             return
-        batches = self.plan.batches(missing, self._batch_size(len(missing)))
+        batches = Batches(self.plan, missing, self.workers)
         with contextlib.closing(mapper(self.task, batches)) as arriving:
             for found in arriving:
                 journal.add(found)
                 self._tell_lost(found)
-                lost = [outcome for _key, (outcome, _s) in found if not outcome.status.is_answer]
-                failed, done = failed + len(lost), done + len(found)
+                for _key, (outcome, seconds) in found:
+                    batches.learn(seconds)
+                    failed += not outcome.status.is_answer
+                done += len(found)
                 progress(done, total)
                 if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
-                    first = lost[0]
-                    raise RunError(
-                        f"the first {done} cells all failed, the last with {first.status.label}"
-                        f"{': ' * bool(first.message)}{first.message}. "
-                        "Mend that, or go on all the same with --keep-going (keep_going=True)"
-                    )
+                    raise _hopeless(done, outcome)
 
     def _tell_lost(self, found: Found) -> None:
         """Name the cells that ended their worker, as soon as they have."""
@@ -195,13 +189,6 @@ class Run:
                     f"{outcome.message}. The run goes on",
                     stacklevel=2,
                 )
-
-    def _batch_size(self, cells: int) -> int:
-        """Cells per task: long enough to be worth sending, short enough to balance the workers."""
-        work = self.study.measure.expected_work(self.study.accuracy)
-        worthwhile = _SECONDS_PER_TASK / (_SECONDS_PER_RHS * work)
-        balanced = cells / (4 * self.workers)
-        return max(1, math.ceil(min(worthwhile, balanced, _LARGEST_BATCH)))
 
     # ---- what is made of the cells --------------------------------------------------------------
 
@@ -269,12 +256,12 @@ class Run:
         return f"{text} and kept in {where}; the same command goes on from there."
 
 
-def estimated_cost(study: Study) -> tuple[int, float]:
-    """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
-    core.
-    """
-    work = len(Plan(study).different) * study.measure.expected_work(study.accuracy)
-    return round(work), work * _SECONDS_PER_RHS
+def _hopeless(cells: int, last: Outcome) -> RunError:
+    return RunError(
+        f"the first {cells} cells all failed, the last with {last.status.label}"
+        f"{': ' * bool(last.message)}{last.message}. "
+        "Mend that, or go on all the same with --keep-going (keep_going=True)"
+    )
 
 
 def counts(dataset: xr.Dataset) -> Mapping[str, int]:
