@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,25 +14,17 @@ import xarray as xr
 from rich import progress as bars
 
 from rsfstudy.compute import own_code, provenance, runner
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
+from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
 from rsfstudy.compute.runner import Keeping, Progress
-from rsfstudy.compute.workers import on_client, on_local_cluster, threads
+from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.axis import check_text
 from rsfstudy.declare.claims import verdicts
-from rsfstudy.declare.study import Study, figure_name
-from rsfstudy.errors import DataError, InvalidValue, brief
-from rsfstudy.files import contents, restore, store
+from rsfstudy.declare.study import Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
-from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Outcome
 from rsfstudy.slider.scene import Scene
-
-OUTPUT = Path("outputs")
-#: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
-_LONGEST = 1e8
-#: Most worker processes for each core, and what any machine may have.
-_A_CORE, _ANYWHERE = 4, 8
 
 
 def studies() -> dict[str, Study]:
@@ -46,7 +37,7 @@ def run(
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = OUTPUT,
+    output: str | Path | None = places.DEFAULT,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
@@ -104,14 +95,15 @@ def run(
     """
     declared = declaration(study, rtol, overrides)
     keeping = Keeping(
-        output=directory(output),
+        output=places.directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
         despite_failures=despite_failures,
         command=command,
     )
-    return prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
+    where = Workers(workers, client, time_limit)
+    return prepared(declared, keeping, where, progress)()
 
 
 def declaration(
@@ -124,70 +116,10 @@ def declaration(
     return declared.with_(**overrides) if overrides else declared
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Where cells are computed, and whether a bar shows how far it is."""
-
-    processes: int = 2
-    client: Any = None
-    time_limit: float = DEFAULT_TIME_LIMIT
-    progress: bool = True
-
-    def __post_init__(self) -> None:
-        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
-        if not whole or self.processes < 0:
-            raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
-        most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
-        if self.client is None and self.processes > most:
-            rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
-            remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
-            raise InvalidValue("workers", self.processes, rule, remedy=remedy)
-        if self.client is not None and not hasattr(self.client, "submit"):
-            raise InvalidValue("client", self.client, "must be a distributed.Client")
-        limit: object = self.time_limit
-        if not isinstance(limit, int | float) or not 0.0 < limit <= _LONGEST:
-            rule = f"must be a number greater than 0, up to {_LONGEST:g} s"
-            raise InvalidValue("time_limit", limit, rule)
-
-    def threads(self) -> int:
-        """How many cells are computed at a time."""
-        at_a_time = self.processes if self.client is None else threads(self.client)
-        return max(1, at_a_time)
-
-    def mapper(self, log: Path | None = None) -> Mapper:
-        """What computes batches of cells there; `log` is for what processes of ours say when they
-        end.
-        """
-        if self.client is not None:
-            return on_client(self.client)
-        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
-
-
-def directory(output: str | Path | None) -> Path | None:
-    """Where results go: a directory, which need not be there yet, or nowhere.
-
-    Raises
-    ------
-    InvalidValue
-        For what cannot be the path of one.
-    """
-    if output is None:
-        return None
-    if not isinstance(output, str | Path):
-        raise InvalidValue("output", output, "must be a path, or None")
-    check_text("output", str(output))
-    if output == "":
-        remedy = "Name a directory; . is the one you are in."
-        raise InvalidValue("output", output, "is empty", remedy=remedy)
-    try:
-        Path(output).exists()
-    except OSError as error:
-        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
-    return Path(output)
-
-
-def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], xr.Dataset]:
-    """A run that only has to be called.
+def prepared(
+    study: Study, keeping: Keeping, workers: Workers, progress: bool = True
+) -> Callable[[], xr.Dataset]:
+    """A run that only has to be called; `progress` shows how far it is.
 
     Raises
     ------
@@ -202,7 +134,7 @@ def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], x
     ready = runner.Run(study, keeping, task, workers.threads())
 
     def run() -> xr.Dataset:
-        with _bar(study.name, workers.progress) as told:
+        with _bar(study.name, progress) as told:
             return ready(workers.mapper(ready.worker_log), told)
 
     return run
@@ -234,7 +166,7 @@ def _bar(name: str, show: bool) -> Iterator[Progress]:
         bar.stop()
 
 
-def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
     Raises
@@ -244,33 +176,7 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
-    path = Path(name)
-    if path.suffix not in (".nc", ".zarr"):
-        study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
-        try:
-            path = _results(study, directory(output) or OUTPUT)
-        except OSError as error:
-            raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
-    return store.read(path)
-
-
-def _results(name: str, output: Path) -> Path:
-    """The results of a study, by its name."""
-    file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
-    if file.exists() and in_pieces.exists():
-        raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
-    if file.exists() or in_pieces.exists():
-        return file if file.exists() else in_pieces
-    partial = output / f"{name}.partial.nc"
-    if partial.exists():
-        raise DataError(
-            f"{file} does not exist, but {partial} does: run the study again, or name it."
-        )
-    there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
-    if not there and name not in catalogue.names():
-        rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
-        raise InvalidValue("study", name, rule, choices=catalogue.names(), remedy=remedy)
-    return file
+    return store.read(places.results(name, output))
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
@@ -323,8 +229,8 @@ def rerun(
         Where the file is damaged, or the run cannot finish.
     """
     theirs = open(file)
-    declared = study_of(theirs, study)
-    place = directory(output)
+    declared = restore.study_of(theirs, study)
+    place = places.directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
             rule = f"holds {taken.name}, which this would take the place of"
@@ -336,63 +242,9 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    ours = prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
+    where = Workers(workers, client, time_limit)
+    ours = prepared(declared, keeping, where, progress)()
     return compared(theirs, ours)
-
-
-def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
-    """The study that made a dataset: from its own declaration, or, where that does not suffice,
-    from the file that declares it.
-    """
-    declared = contents.declaration(results)
-    if file is None:
-        about = contents.provenance(results)
-        if about["fingerprint"]["own_code"] != "none":
-            rule = "is a user's own, and code is never taken from a results file"
-            remedy = "Name the file that declares it: --study FILE (study=)."
-            if about["declared_in"]:
-                remedy += f" It was {brief(about['declared_in'])}."
-            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
-            raise InvalidValue(name, value, rule, remedy=remedy)
-        study = restore.study(declared)
-    else:
-        named = catalogue.load(str(file))
-        if named.name != declared.name:
-            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
-            raise InvalidValue("study", str(file), rule)
-        study = restore.study(declared, of_its_own=named)
-    _check_lattice(study, results)
-    return study
-
-
-def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
-    """What draws a dataset with a figure of the user's own, from the file that declares the study:
-    the one that is given, or the one that the dataset names.
-
-    Raises
-    ------
-    InvalidValue
-        Where there is no such file, or it has no such figure.
-    """
-    name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
-    if not (file or named_in):
-        remedy = "Name the file that declares it: --study FILE."
-        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
-    study = catalogue.load(str(file or named_in))
-    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
-        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
-        raise InvalidValue("study", str(file or named_in), rule)
-    return None if isinstance(study.plot, str) else study.plot
-
-
-def _check_lattice(study: Study, results: xr.Dataset) -> None:
-    """Refuse results whose cells are not those of their own declaration."""
-    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
-    if dims != study.dimensions:
-        raise contents.refused("status", f"lies along {dims}, not the axes of the declaration")
-    for name in study.dimensions:
-        if ours[name].values.tolist() != results[name].values.tolist():
-            raise contents.refused(name, "is not that axis of the declaration")
 
 
 def cell(
@@ -425,7 +277,7 @@ def cell(
     """
     results = open(file)
     number = cell_number(results, place)
-    declared = study_of(results, study)
+    declared = restore.study_of(results, study)
     now = provenance.fingerprint(declared)
     then = contents.provenance(results)["fingerprint"]
     for name, (theirs, ours) in differences(then, now).items():

@@ -26,6 +26,7 @@ FLOORS = {
     "trajectory": 10,
     "one_scene": 10,
     "api": 10,
+    "assignments": 10,
     "terminal": 10,
     "cli": 10,
     "__init__": 10,
@@ -33,8 +34,8 @@ FLOORS = {
 }
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"compute/workers", "files/store", "files/pieces"},
-    "distributed": {"compute/workers", "compute/worker_log"},
+    "dask": {"compute/clusters", "files/store", "files/pieces"},
+    "distributed": {"compute/clusters", "compute/workers", "compute/worker_log"},
     "matplotlib": {"plots"},
     "click": {"cli"},
     "rich": {"api", "cli", "terminal"},

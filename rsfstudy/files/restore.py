@@ -8,13 +8,17 @@ import importlib
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict
 
+import xarray as xr
+
 from rsfstudy import measures, reduce
+from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import Axis
-from rsfstudy.declare.study import Study
-from rsfstudy.errors import InvalidValue
+from rsfstudy.declare.study import Study, figure_name
+from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.files import contents
 from rsfstudy.files.contents import (
     Declaration,
@@ -24,6 +28,7 @@ from rsfstudy.files.contents import (
     fit,
     refused,
 )
+from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
@@ -32,7 +37,62 @@ from rsfstudy.slider.parts import Part
 from rsfstudy.status import Status
 
 
-def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
+def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
+    """The study that made a dataset: from its own declaration, or, where that does not suffice,
+    from the file that declares it.
+    """
+    declared = contents.declaration(results)
+    if file is None:
+        about = contents.provenance(results)
+        if about["fingerprint"]["own_code"] != "none":
+            rule = "is a user's own, and code is never taken from a results file"
+            remedy = "Name the file that declares it: --study FILE (study=)."
+            if about["declared_in"]:
+                remedy += f" It was {brief(about['declared_in'])}."
+            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
+            raise InvalidValue(name, value, rule, remedy=remedy)
+        study = from_declaration(declared)
+    else:
+        named = catalogue.load(str(file))
+        if named.name != declared.name:
+            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+            raise InvalidValue("study", str(file), rule)
+        study = from_declaration(declared, of_its_own=named)
+    _check_lattice(study, results)
+    return study
+
+
+def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
+    """What draws a dataset with a figure of the user's own, from the file that declares the study:
+    the one that is given, or the one that the dataset names.
+
+    Raises
+    ------
+    InvalidValue
+        Where there is no such file, or it has no such figure.
+    """
+    name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
+    if not (file or named_in):
+        remedy = "Name the file that declares it: --study FILE."
+        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
+    study = catalogue.load(str(file or named_in))
+    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
+        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
+        raise InvalidValue("study", str(file or named_in), rule)
+    return None if isinstance(study.plot, str) else study.plot
+
+
+def _check_lattice(study: Study, results: xr.Dataset) -> None:
+    """Refuse results whose cells are not those of their own declaration."""
+    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
+    if dims != study.dimensions:
+        raise refused("status", f"lies along {dims}, not the axes of the declaration")
+    for name in study.dimensions:
+        if ours[name].values.tolist() != results[name].values.tolist():
+            raise refused(name, "is not that axis of the declaration")
+
+
+def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> Study:
     """The study that describes itself by this declaration.
 
     Parameters
