@@ -63,16 +63,16 @@ def run(
     progress : bool
         Show a progress bar.
     fresh : bool
-        Compute every cell anew.
+        Forget the finished cells and compute all again.
     rtol : float, optional
         Accuracy of the cells.
     time_limit : float
-        CPU time in s after which a worker gives a cell up, or ten times as long on the clock where
-        the cell sleeps or waits; it does not bind in this process.
+        CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
+        times as much wall time. There is no limit in this process (``workers=0``).
     keep_going : bool
-        Go on where the first cells all fail, instead of stopping early.
+        Go on if the first cells all fail, instead of stopping early.
     despite_failures : bool
-        Reduce what there is where cells failed; the results say so.
+        Leave failed cells out of the reductions; the results say so.
     format : {"netcdf", "zarr"}
         One NetCDF file, or a Zarr store written in pieces, for lattices that do not fit in memory.
     command : str
@@ -89,7 +89,7 @@ def run(
     Raises
     ------
     InvalidValue
-        For a declaration or an override that makes no sense, before anything is computed.
+        For a wrong declaration or override, before anything is computed.
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
@@ -119,23 +119,23 @@ def declaration(
 def prepared(
     study: Study, keeping: Keeping, workers: Workers, progress: bool = True
 ) -> Callable[[], xr.Dataset]:
-    """A run that only has to be called; `progress` shows how far it is.
+    """A function that runs the study, once everything has been checked; `progress` shows a bar.
 
     Raises
     ------
     InvalidValue
-        For whatever is wrong with it.
+        For anything wrong with the study or the options.
     """
     parts = tuple(study.own_parts.values())
     digest = own_code.digest(type(study.measure), *parts)
     task = Task(study.measure, study.accuracy, workers.time_limit, parts=parts, own_code=digest)
     if workers.mapper() is not serial:
-        sendable(task)  # told before any work, if it is not
+        sendable(task)  # raises before any work if it cannot be sent
     ready = runner.Run(study, keeping, task, workers.threads())
 
     def run() -> xr.Dataset:
-        with _bar(study.name, progress) as told:
-            return ready(workers.mapper(ready.worker_log), told)
+        with _bar(study.name, progress) as show:
+            return ready(workers.mapper(ready.worker_log), show)
 
     return run
 
@@ -156,12 +156,12 @@ def _bar(name: str, show: bool) -> Iterator[Progress]:
     bar = bars.Progress(*columns)
     task = bar.add_task(name, total=None)
 
-    def told(done: int, total: int) -> None:
-        bar.start()  # not before there is something to tell
+    def update(done: int, total: int) -> None:
+        bar.start()  # only now, because a run may fail before its first report
         bar.update(task, completed=done, total=total)
 
     try:
-        yield told
+        yield update
     finally:
         bar.stop()
 
@@ -180,7 +180,7 @@ def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
-    """Hold a dataset (or a named study's results, or a file) against the claims its study makes.
+    """Compare a dataset (or a named study's results, or a file) with the claims of its study.
 
     Returns
     -------
@@ -203,7 +203,7 @@ def rerun(
     progress: bool = True,
     time_limit: float = DEFAULT_TIME_LIMIT,
 ) -> pd.DataFrame:
-    """Compute a results file anew from what it says of itself, and hold the numbers against it.
+    """Compute the cells of a results file again, from its own declaration, and compare the numbers.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def rerun(
 def cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Compute one cell of a results file alone, in this process, letting it raise what it raises.
+    """Compute one cell of a results file alone, in this process; what it raises is not caught.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def cell(
     Warns
     -----
     UserWarning
-        Where what decides its numbers is not what it was for the file.
+        Where something that decides its numbers has changed since the file was made.
     """
     results = open(file)
     number = cell_number(results, place)

@@ -17,13 +17,13 @@ _MOST_POINTS = 1_000_000
 
 def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     labels = {label for axis in study.axes for label in axis.labels or ()}
-    found: dict[str, Any] = {}
+    values_by_name: dict[str, Any] = {}
     for text in settings:
         name, values = setting(text, labels)
-        if name in found:
+        if name in values_by_name:
             raise InvalidValue("--set", text, f"sets {name} twice")
-        found[name] = values
-    return found
+        values_by_name[name] = values
+    return values_by_name
 
 
 def place(text: str) -> tuple[str, str]:

@@ -94,7 +94,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
-    # not to the console of errors, which would not know of a progress bar
+    # not by `_stderr`, which knows nothing of a progress bar and would write over it
     warnings.showwarning = lambda message, *_place: print(
         terminal.spelt(f"warning: {message}"), file=sys.stderr
     )
@@ -201,7 +201,7 @@ def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping) -> E
 
 
 def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: Keeping) -> int:
-    """One study after the other, whatever becomes of each; only Ctrl-C ends them all."""
+    """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
     ends: list[Ended] = []
     try:
         for study, compute in ready:
@@ -252,9 +252,9 @@ def rerun(
 ) -> int:
     """Compute a results file anew from what it says of itself, and compare every number."""
     if place:
-        with warnings.catch_warnings(record=True) as told:
-            scene, found = api.cell(file, dict(map(assignments.place, place)), study=study)
-        return terminal.outcome(scene, found, [str(warning.message) for warning in told])
+        with warnings.catch_warnings(record=True) as caught:
+            scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+        return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
     with _client(scheduler, serial) as client:
         table = api.rerun(
             file,
@@ -276,14 +276,14 @@ def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
     if not every:
         return terminal.checked(api.open(_results(name, every)[0], output))
-    status, found = OK, []
+    status, datasets = OK, []
     for what in catalogue.names():
         if (output / f"{what}.nc").exists():
-            found.append(api.open(what, output))
+            datasets.append(api.open(what, output))
         else:
             terminal.console.print(f"{what}: not run yet", style="red")
             status = FAILED
-    return max([status, terminal.all_claims(found), *map(terminal.failures, found)])
+    return max([status, terminal.all_claims(datasets), *map(terminal.failures, datasets)])
 
 
 @cli.command()
@@ -308,7 +308,7 @@ def plot(name: str | None, every: bool, output: Path, study: Path | None) -> int
     return status
 
 
-# ---- what was asked for ---------------------------------------------------------------------
+# ---- arguments ------------------------------------------------------------------------------
 
 
 def _results(name: str | None, every: bool) -> list[str]:
@@ -333,7 +333,7 @@ def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
 
 
 def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
-    """What draws results whose figure is none of ours: what their study file says, or lines."""
+    """What draws a figure that is not part of rsfstudy: the study file's own, or plain lines."""
     from rsfstudy import plots
     from rsfstudy.plots import lines
 

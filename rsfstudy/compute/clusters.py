@@ -14,17 +14,16 @@ from typing import Any
 
 from rsfstudy.errors import RunError, brief
 
-#: Time in s after which a process of this machine that does not answer never will.
+#: Time in s to wait for a process of this machine that does not answer.
 _HANGS = 600
 
 
 @contextlib.contextmanager
 def _script_not_imported() -> Iterator[None]:
-    """Keep worker processes from importing the user's script again, which would start workers of
-    its own.
+    """Keep worker processes from importing the user's script, which would start the study again.
 
-    Multiprocessing finds the script by these two names; what a script defines reaches the workers
-    by value all the same.
+    Multiprocessing finds the script by these two names. What the script defines still reaches the
+    workers, by value.
     """
     main = sys.modules["__main__"]
     hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
@@ -39,8 +38,8 @@ def _script_not_imported() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits until this is over, and never reaches a process that is started within: on
-    Ctrl-C it is the driver that ends a run, and its workers. Pressed twice, it does not wait.
+    """Delay Ctrl-C until the end of this block, and keep it from processes that are started in it:
+    on Ctrl-C the driver ends the run, and then its workers. A second Ctrl-C is not delayed.
     """
     held: list[int] = []
 
@@ -53,7 +52,7 @@ def _interrupts_held() -> Iterator[None]:
         yield
         return
     handler = signal.signal(signal.SIGINT, hold)
-    # threads that are started now, and their processes, keep what is blocked now
+    # threads and processes inherit the signals that are blocked when they are started
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -87,11 +86,11 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
 
     quiet = {
         "distributed.scheduler.allowed-failures": 0,
-        # nothing but a time limit ends a worker that is slow, or held up by its cell
+        # a worker that is slow, or busy with its cell, is ended by the time limit only
         "distributed.scheduler.worker-ttl": None,
-        # Dask closes for good a worker that died and happens to be starting again this long after
+        # when a worker has died, Dask would close it for good if it were not back after this time
         "distributed.deploy.lost-worker-timeout": "1000 days",
-        # what each process does beside its cells: 50 ticks and 100 looks at the stack a second
+        # by default each process ticks 50 times and samples its stack 100 times a second
         "distributed.admin.tick.interval": "1s",
         "distributed.worker.profile.enabled": False,
         "distributed.comm.timeouts.connect": f"{_HANGS}s",
@@ -100,7 +99,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         ),
     }
     with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
-        worker_log.start_tracker(log)  # first: it unblocks signals that `_interrupts_held` blocks
+        worker_log.start_tracker(log)  # before `_interrupts_held`, because it unblocks signals
         started = stack.enter_context(contextlib.ExitStack())
         started.enter_context(_interrupts_held())
         try:
@@ -119,12 +118,12 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         stack.enter_context(cluster)
         started.close()
         client = stack.enter_context(Client(cluster))
-        stack.callback(worker_log.start_tracker, log)  # if it was killed
+        stack.callback(worker_log.start_tracker, log)  # in case the tracker was killed
         yield client
 
 
 async def _greeting(address: str) -> None:
-    """What Dask says first; its client would wait for ever where something else listens."""
+    """Check that Dask answers; its client would wait for ever if another program listens there."""
     from distributed.comm.core import connect
 
     comm = await connect(address)
@@ -143,13 +142,13 @@ def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     from distributed import Client
     from distributed.utils import silence_logging_cmgr
 
-    # what goes wrong with a cluster is told once, by the run; Dask's client has more to say until
-    # it is closed
+    # the run reports a failure of the cluster once; Dask's client would log more until it is
+    # closed
     with silence_logging_cmgr(logging.CRITICAL + 1):
         try:
             asyncio.run(asyncio.wait_for(_greeting(address), timeout))
             client = Client(address, timeout=timeout)
-        except Exception as error:  # what Dask makes of an address that is none has no end
+        except Exception as error:  # Dask raises errors of many kinds for a wrong address
             raise RunError(
                 f"no Dask scheduler answers at {brief(address)!r}: "
                 f"{brief(error) or 'it took too long'}. "

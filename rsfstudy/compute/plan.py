@@ -1,6 +1,4 @@
-"""The cells of a study before any is computed: how each is found again, and in which order they
-are computed.
-"""
+"""The cells of a study before any is computed: their keys, their order, and their batches."""
 
 from __future__ import annotations
 
@@ -39,14 +37,14 @@ class Plan:
     Attributes
     ----------
     keys : ndarray of bytes, shape (cells,)
-        Name of each cell; equal ones share one.
+        Name of each cell; equal cells have the same name.
     different : ndarray of int
-        The first of equal cells.
+        Numbers of the cells that differ: of equal ones, the first.
 
     Raises
     ------
     InvalidValue
-        For a cell that makes no meaningful scene, naming its place on the axes.
+        For a cell that is no meaningful scene; the text names its place on the axes.
     """
 
     def __init__(self, study: Study) -> None:
@@ -92,15 +90,15 @@ class Batches(Iterator[list[tuple[bytes, Cell]]]):
         return max(1, min(self._most, round(_SECONDS_PER_TASK * self._timed / self._seconds)))
 
     def learn(self, seconds: float) -> None:
-        """Take note of how long a cell took; NaN where nobody knows."""
+        """Record how long a cell took; NaN where that is unknown."""
         if not math.isnan(seconds):
             self._timed += 1
             self._seconds += seconds
 
 
 def scattered(cells: np.ndarray) -> np.ndarray:
-    """The same cells in strides of the golden section: the first few are a sample of all, so that
-    what they show (all fail, or how long they take) holds for the rest.
+    """The same cells in another order, in strides of the golden section: the first few are a sample
+    of all, so that what they show (how long cells take, whether all fail) holds for the rest.
     """
     count = len(cells)
     stride = max(1, round(_GOLDEN * count))

@@ -1,5 +1,5 @@
-"""Runs a study: plans its cells, has those computed that are not known yet, keeps what is
-finished, and assembles, reduces and writes the dataset.
+"""Runs a study: plans its cells, has the missing ones computed, records them as they finish, and
+assembles, reduces and writes the dataset.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.compute import provenance
-from rsfstudy.compute.cells import Found, Mapper, Task
+from rsfstudy.compute.cells import FinishedCells, Mapper, Task
 from rsfstudy.compute.plan import Batches, Plan, scattered
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
@@ -25,9 +25,9 @@ from rsfstudy.measures import Outcome
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
 
-#: How a cell ends that ends its worker.
+#: Statuses of cells that ended their worker.
 _LOST = (Status.WORKER_LOST, Status.TIME_LIMIT_SPENT)
-#: A run ends early where so many cells have failed before any is answered.
+#: A run ends early when this many cells have failed and none has succeeded.
 _HOPELESS = 10
 
 FORMATS = ("netcdf", "zarr")
@@ -37,7 +37,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Keeping:
-    """What a run keeps, and what it does about failures.
+    """What a run writes, and what it does about failed cells.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ class Keeping:
     fresh : bool
         Forget the journal and compute every cell anew.
     keep_going : bool
-        Go on where the first cells all fail.
+        Go on even if the first cells all fail.
     despite_failures : bool
-        Reduce what there is where cells failed.
+        Reduce the other cells where some failed.
     command : str
         What the user typed, for the history.
     """
@@ -97,8 +97,8 @@ class Run:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Apply the reductions to the lattice as it is before anything is computed; where it is as
-        declared, the claims must speak of what comes out.
+        """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
+        Unless values were overridden, each claim must name a variable and a place of the result.
         """
         pending = Columns.pending(self.study.size, Layout(self.study.measure).width)
         lattice = assemble(self.study, pending, self.about)
@@ -120,18 +120,18 @@ class Run:
 
     @property
     def worker_log(self) -> Path | None:
-        """What worker processes say when they end, if anything is kept."""
+        """The file for the last words of worker processes, if anything is written."""
         return None if self.keeping.output is None else self.path(".workers.log")
 
     def __call__(self, mapper: Mapper, progress: Progress) -> xr.Dataset:
-        """Compute the cells that are not known yet, and assemble, reduce and write the dataset.
+        """Compute the missing cells, then assemble, reduce and write the dataset.
 
         Parameters
         ----------
         mapper : callable
             Where cells are computed: `cells.serial`, or what `workers.on_client` gives.
         progress : callable
-            Told the number of finished cells and of all.
+            Called with the number of finished cells and of all cells.
 
         Raises
         ------
@@ -168,20 +168,20 @@ class Run:
             return
         batches = Batches(self.plan, missing, self.workers)
         with contextlib.closing(mapper(self.task, batches)) as arriving:
-            for found in arriving:
-                journal.add(found)
-                self._tell_lost(found)
-                for _key, (outcome, seconds) in found:
+            for finished in arriving:
+                journal.add(finished)
+                self._tell_lost(finished)
+                for _key, (outcome, seconds) in finished:
                     batches.learn(seconds)
                     failed += not outcome.status.is_answer
-                done += len(found)
+                done += len(finished)
                 progress(done, total)
                 if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
                     raise _hopeless(done, outcome)
 
-    def _tell_lost(self, found: Found) -> None:
-        """Name the cells that ended their worker, as soon as they have."""
-        for key, (outcome, _seconds) in found:
+    def _tell_lost(self, finished: FinishedCells) -> None:
+        """Warn of cells that ended their worker."""
+        for key, (outcome, _seconds) in finished:
             if outcome.status in _LOST:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
@@ -190,21 +190,21 @@ class Run:
                     stacklevel=2,
                 )
 
-    # ---- what is made of the cells --------------------------------------------------------------
+    # ---- from cells to results ------------------------------------------------------------------
 
     def _finished(self, journal: Journal) -> xr.Dataset:
         zarr = self.keeping.format == "zarr"
         with self._reducing(journal):
-            found = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
+            results = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
         if self.keeping.output is None:
-            return store.sealed(found)
-        written = found if zarr else store.write(found, self.path(".nc"))
+            return store.sealed(results)
+        written = results if zarr else store.write(results, self.path(".nc"))
         for stale in (".partial.nc", ".partial.png", ".unreduced.nc", ".unreduced.png"):
             self.path(stale).unlink(missing_ok=True)
         return written
 
     def lattice(self, journal: Journal) -> xr.Dataset:
-        """What is known, as a dataset without reductions."""
+        """The dataset of the cells in the journal, without reductions."""
         return assemble(self.study, journal.read(self.plan.keys), self.about)
 
     def _reduced(self, lattice: xr.Dataset) -> xr.Dataset:
@@ -219,7 +219,7 @@ class Run:
 
     @contextlib.contextmanager
     def _reducing(self, journal: Journal) -> Iterator[None]:
-        """Keep the cells where they are all there but cannot be reduced."""
+        """Write the cells without reductions where a reduction raises."""
         try:
             yield
         except RsfStudyError:
@@ -233,7 +233,7 @@ class Run:
             raise DataError(f"{text}; its cells are in {path}, without reductions.") from error
 
     def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
-        """The error of a run that ended early, once what is finished has been kept."""
+        """Write what is finished, and give the error for a run that ended early."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.keeping.output is not None and self.keeping.format == "netcdf":
             lattice = self.lattice(journal)
@@ -247,7 +247,7 @@ class Run:
         return kind(why + self._resumable(journal))
 
     def _resumable(self, journal: Journal) -> str:
-        """How much is finished, where it is, and how to go on."""
+        """A sentence: how many cells are finished, where they are, and how to go on."""
         known = int((journal.ended(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.keeping.output is None:

@@ -1,8 +1,8 @@
-"""Dask workers: batches of cells are sent to them, and a cell that kills its worker is found.
+"""Sends batches of cells to Dask workers, and finds a cell that kills its worker.
 
-A worker that dies takes its whole batch with it, and may take others that waited there. The cells
-of all these are then sent one at a time while nothing else runs, so that only the cell that dies
-alone is blamed.
+When a worker dies, its batch is lost, and perhaps others that were waiting there. All these cells
+are then sent one at a time, while nothing else runs, so that only the cell that kills a worker on
+its own is blamed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rsfstudy.compute.cells import (
     DEFAULT_TIME_LIMIT,
     WAITING,
     Batch,
-    Found,
+    FinishedCells,
     Mapper,
     Task,
     on_worker,
@@ -35,11 +35,12 @@ from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-#: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
+#: Longest time limit in s, three years; the system's timers take `WAITING` times that, and not
+#: much more.
 _LONGEST = 1e8
-#: Most worker processes for each core, and what any machine may have.
+#: Most worker processes for each core, and most on a machine with few cores.
 _A_CORE, _ANYWHERE = 4, 8
-#: Time in s without any worker after which a run says so, and after which it ends.
+#: Time in s without any worker after which a run warns, and after which it ends.
 TELL, PATIENCE = 30.0, 600.0
 _LOOK = 2.0
 #: How often a cell may kill its worker before it is recorded as the culprit.
@@ -81,7 +82,7 @@ class Workers:
             raise InvalidValue("time_limit", limit, rule)
 
     def threads(self) -> int:
-        """How many cells are computed at a time."""
+        """Number of cells that are computed at the same time."""
         at_a_time = self.processes if self.client is None else threads(self.client)
         return max(1, at_a_time)
 
@@ -95,16 +96,16 @@ class Workers:
 
 
 def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
-    """On the workers of a Dask client; they need no shared file system.
+    """Compute on the workers of a Dask client, which need no shared file system.
 
     Parameters
     ----------
     client : distributed.Client
     log : str
-        Where a worker that ends says why, for messages.
+        Where workers write errors, for messages.
     """
 
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         sent, waiting = sendable(task), _Waiting(batches)
         running: dict[Any, Batch] = {}
         suspects: list[Any] = []
@@ -115,12 +116,12 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                 if running:
                     for future in _finished(client, running):
                         batch = running.pop(future)
-                        found = _result(future)
-                        if found is None:
+                        finished = _result(future)
+                        if finished is None:
                             suspects += batch
                         else:
-                            waiting.back(batch[len(found) :])
-                            yield found
+                            waiting.back(batch[len(finished) :])
+                            yield finished
                 elif suspects:
                     warnings.warn(
                         f"a worker ended: the cells it held ({len(suspects)}) are computed again, "
@@ -139,7 +140,7 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
 
 
 class _Waiting(Iterator[Batch]):
-    """Batches that are not sent yet; what a worker left of one is the next."""
+    """Batches that are not sent yet; the rest of one that a worker returned comes first."""
 
     def __init__(self, batches: Iterable[Batch]) -> None:
         self._new = iter(batches)
@@ -149,19 +150,19 @@ class _Waiting(Iterator[Batch]):
         return self._left.pop() if self._left else next(self._new)
 
     def back(self, rest: Batch) -> None:
-        """Take what is left of a batch."""
+        """Put the rest of a batch back."""
         self._left += [rest] if rest else []
 
 
 def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]) -> None:
-    """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
+    """Send just enough batches to keep the workers busy: more would fill the scheduler's memory."""
     enough = 4 + 2 * threads(client)
     for batch in itertools.islice(waiting, max(0, enough - len(running))):
         running[client.submit(on_worker, sent, packed(batch), pure=False)] = batch
 
 
 def threads(client: Any) -> int:
-    """How many cells the workers of a client compute at a time."""
+    """Number of cells that the workers of a client compute at the same time."""
     if client.status == "connecting":  # again
         raise RunError("the Dask scheduler is lost")
     if client.status != "running":
@@ -173,16 +174,16 @@ def threads(client: Any) -> int:
 
 
 def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
-    """Futures that are finished, once there are any.
+    """Wait for futures to finish, and give those that have.
 
     Raises
     ------
     RunError
-        If the scheduler is lost, or there has been no worker for a while.
+        If the scheduler is lost, or there has been no worker for `PATIENCE` seconds.
     """
     from distributed import wait
 
-    seen, told = time.monotonic(), False
+    seen, warned = time.monotonic(), False
     while True:
         try:
             done: Iterable[Any] = wait(
@@ -192,9 +193,9 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
         except TimeoutError:
             waited = time.monotonic() - seen
             if threads(client):
-                seen, told = time.monotonic(), False
-            elif waited > TELL and not told:
-                told = True
+                seen, warned = time.monotonic(), False
+            elif waited > TELL and not warned:
+                warned = True
                 warnings.warn(
                     f"the Dask cluster has no worker: waiting {PATIENCE:g} s for one", stacklevel=2
                 )
@@ -206,14 +207,18 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
             raise RunError("the Dask scheduler is lost") from error
 
 
-def _result(future: Any) -> Found | None:
-    """What a batch gave, or None where its worker died; anything else is a failure of the
-    cluster.
+def _result(future: Any) -> FinishedCells | None:
+    """The finished cells of a batch, or None where its worker died.
+
+    Raises
+    ------
+    RunError
+        If the cluster failed in any other way.
     """
     from distributed import KilledWorker
 
     try:
-        found: Found = future.result()
+        finished: FinishedCells = future.result()
     except KilledWorker:
         return None
     except RunError:
@@ -225,22 +230,22 @@ def _result(future: Any) -> Found | None:
             f"the Dask cluster gave up ({type(error).__name__}: {error}). "
             "Its workers need the same rsfstudy"
         ) from error
-    return found
+    return finished
 
 
-def _alone(client: Any, task: Task, batch: Batch) -> Found:
-    """A suspect by itself; the culprit where its worker dies again."""
+def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
+    """Compute a suspect cell alone; if its worker dies again, the cell is recorded as lost."""
     for _ in range(_TRIES):
         _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
         began = time.monotonic()
         future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
         try:
             _finished(client, [future])
-            found = _result(future)
+            finished = _result(future)
         finally:
             client.cancel([future])
-        if found is not None:
-            return found
+        if finished is not None:
+            return finished
         seconds = time.monotonic() - began
         if seconds > task.time_limit:
             text = (
@@ -256,9 +261,9 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
 
 
 def on_local_cluster(processes: int, log: Path | None) -> Mapper:
-    """On worker processes of this machine, started when there is something to compute."""
+    """Compute on worker processes of this machine, started when the first cell is needed."""
 
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         from rsfstudy.compute import worker_log
 
         with worker_log.kept(log) as file, local_cluster(processes, file) as client:

@@ -1,7 +1,7 @@
-"""Zarr stores: a lattice too large for one piece of memory, written slab by slab.
+"""Zarr stores: for a lattice that does not fit in memory, written slab by slab.
 
-Needs the extra ``zarr``. A store is written beside, read back, and then moved into place; one that
-is there already is never replaced, because whoever has it open reads its chunks one by one.
+Needs the extra ``zarr``. A store is written under a temporary name, read back, and then renamed. An
+existing store is never replaced: a reader that has it open would mix old chunks with new ones.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Reduce = Callable[[xr.Dataset], xr.Dataset]
 
 
 def check_installed() -> None:
-    """Refuse a Zarr store where nothing can write one."""
+    """Refuse the format where the package zarr is missing."""
     if importlib.util.find_spec("zarr") is None:
         raise InvalidValue(
             "format", "zarr", "needs a package", remedy="pip install 'rsfstudy[zarr]'."

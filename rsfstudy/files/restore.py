@@ -1,5 +1,5 @@
-"""A study from the declaration that its results carry: plain data in, and no code of the file's is
-run.
+"""Rebuilds a study from the declaration in its results. A declaration is plain data: no code from
+the results file is run.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from rsfstudy.status import Status
 
 
 def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
-    """The study that made a dataset: from its own declaration, or, where that does not suffice,
-    from the file that declares it.
+    """The study that made a dataset, from the declaration in it; where it uses code of the user,
+    from the file that declares the study.
     """
     declared = contents.declaration(results)
     if file is None:
@@ -63,8 +63,8 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
 
 
 def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
-    """What draws a dataset with a figure of the user's own, from the file that declares the study:
-    the one that is given, or the one that the dataset names.
+    """The figure that a user wrote for a dataset, from the file that declares the study: the given
+    file, or the one that the dataset names.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
 
 
 def _check_lattice(study: Study, results: xr.Dataset) -> None:
-    """Refuse results whose cells are not those of their own declaration."""
+    """Refuse results whose axes differ from those in their declaration."""
     ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
     if dims != study.dimensions:
         raise refused("status", f"lies along {dims}, not the axes of the declaration")
@@ -93,7 +93,7 @@ def _check_lattice(study: Study, results: xr.Dataset) -> None:
 
 
 def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> Study:
-    """The study that describes itself by this declaration.
+    """The study with this declaration.
 
     Parameters
     ----------
@@ -132,8 +132,8 @@ def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> 
 
 
 def _own_parts(study: Study | None) -> Mapping[str, type[Part]]:
-    """Parts of a user's own, by name: those that a study has, and others of the files it comes
-    from, which are known since it was loaded.
+    """Parts that a user wrote, by name: those of the study, and all others defined in the files
+    that were loaded with it.
     """
     others = {name: part for slot in SLOTS for name, part in slot.own.items()}
     return {} if study is None else {**others, **study.own_parts}
@@ -147,15 +147,15 @@ def _axis(described: PlainAxis, own: Mapping[str, type[Part]]) -> Axis:
 
 
 def measure(described: PlainMeasure, path: str) -> Measure:
-    """The measure that describes itself so, at a path in a file."""
+    """The measure with this description, which stands at `path` in a file."""
     values: dict[str, Any] = dict(described)
     name, kinds = values.pop("name"), _kinds(Measure, measures)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
     if "problems" in values:
         values["problems"] = _problems(values["problems"], f"{path}.problems")
-    found: Measure = fit(values, kinds[name], path)
-    return found
+    restored: Measure = fit(values, kinds[name], path)
+    return restored
 
 
 class _PlainProblem(TypedDict):
@@ -180,8 +180,8 @@ def _problem(described: _PlainProblem, path: str) -> Problem:
         "status": statuses[described["status"]],
         "scale": described["scale"] or 0.0,
     }
-    found: Problem = fit({**described, **made}, Problem, path)
-    return found
+    problem: Problem = fit({**described, **made}, Problem, path)
+    return problem
 
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
@@ -192,12 +192,12 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
         raise InvalidValue(
             "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
         )
-    found: Reduction = fit(values, kinds[wanted], path)
-    return found
+    restored: Reduction = fit(values, kinds[wanted], path)
+    return restored
 
 
 def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
-    """The classes of a package that are derived from one, by what they call themselves."""
+    """The classes of a package that are derived from `base`, by their names in declarations."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     within = f"{package.__name__}."
@@ -209,7 +209,7 @@ def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
 
 
 def _members(base: Any) -> Iterator[Any]:
-    """Classes derived from one, that are not for others to derive from."""
+    """The concrete classes derived from `base`: those with a name in declarations."""
     for kind in base.__subclasses__():
         yield from _members(kind)
         if "name" in vars(kind) or "kind" in vars(kind):
