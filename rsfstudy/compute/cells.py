@@ -84,16 +84,17 @@ Mapper = Callable[[Task, Iterable[Batch]], Generator[FinishedCells]]
 
 def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
     """Compute in this process, one cell after the other. Finished cells are handed over in groups,
-    because recording each on its own may cost more than computing it.
+    because recording each on its own may cost more than computing it: each group is as large as all
+    before it, unless it takes too long.
     """
     finished: FinishedCells = []
-    began = handed_over = time.monotonic()
+    handed_over, since = 0, time.monotonic()
     for key, cell in itertools.chain.from_iterable(batches):
         finished.append((key, computed(task, cell, let_through=(KeyboardInterrupt,))))
-        now = time.monotonic()
-        if now - handed_over > min(_HAND_OVER, 0.5 * (handed_over - began)):
+        if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER:
             yield finished
-            finished, handed_over = [], time.monotonic()
+            handed_over += len(finished)
+            finished, since = [], time.monotonic()
     yield finished
 
 
