@@ -293,7 +293,7 @@ def check(name: str | None, every: bool, output: Path) -> int:
 @_study
 def plot(name: str | None, every: bool, output: Path, study: Path | None) -> int:
     """Draw the figure of a named study's results, or of a file, beside it. A figure of your own is
-    taken from the file that declares the study, which is run.
+    taken from the file that --study names, which is run.
     """
     status = OK
     for what in _results(name, every):
@@ -344,7 +344,9 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     try:
         return restore.own_figure(dataset, study)
     except RsfStudyError as error:
-        _stderr.print(f"note: drawn as lines, because the figure was not found: {error}")
+        if study is not None:
+            raise
+        _stderr.print(f"note: drawn as lines. {error}")
         return lines
 
 

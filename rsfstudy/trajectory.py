@@ -14,11 +14,13 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind
 from rsfstudy.motion.recording import OBSERVED, SAMPLES, observed
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
-REGIMES = ("quasi_static", "slow_manifold", "inertial", "quasi_dynamic")
+#: Those of our own dynamics; others stand behind them.
+_REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
 
 def simulate(
@@ -58,27 +60,35 @@ def simulate(
         raise InvalidValue("duration", duration, "must be positive and finite")
     meter = Meter(budget)
     rows: list[tuple[float, ...]] = []
+    regimes = dict.fromkeys(_REGIMES)
     status, message = Status.OK, ""
     moving = follow(scene, Accuracy(rtol, budget), meter, samples=SAMPLES, until=duration)
     try:
         for event in moving:
             if event.kind is not Kind.END:  # the last sample is there
-                rows += [(*observed(scene, event), REGIMES.index(event.regime))]
+                regimes[event.regime] = None
+                rows += [(*observed(scene, event), list(regimes).index(event.regime))]
     except Halt as halt:
         status, message = halt.status, str(halt)
-    return _dataset(
-        scene, np.array(rows).reshape(-1, len(OBSERVED) + 1), status, message, rtol, meter
+    dataset = _dataset(np.array(rows).reshape(-1, len(OBSERVED) + 1), list(regimes))
+    dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
+    dataset = dataset.set_coords(["time", "slip", "reference_rate"])
+    return dataset.assign_attrs(
+        {
+            "title": f"Motion of a spring-slider, {scene.law} law",
+            "Conventions": "CF-1.11",
+            "scene": json.dumps(scene.as_dict()),
+            "effects": " ".join(scene.effects) or "none",
+            "status": status.label,
+            "message": message,
+            "rtol": rtol,
+            "rhs_evaluations": meter.spent,
+            "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
+        }
     )
 
 
-def _dataset(
-    scene: Scene,
-    samples: np.ndarray,
-    status: Status,
-    message: str,
-    rtol: float,
-    meter: Meter,
-) -> xr.Dataset:
+def _dataset(samples: np.ndarray, regimes: list[str]) -> xr.Dataset:
     dataset = xr.Dataset()
     for column, name in enumerate(OBSERVED):
         about = quantity(name)
@@ -89,21 +99,8 @@ def _dataset(
         samples[:, -1].astype(np.int8),
         {
             "long_name": quantity("regime").long_name,
-            "flag_values": np.arange(len(REGIMES), dtype=np.int8),
-            "flag_meanings": " ".join(REGIMES),
+            "flag_values": np.arange(len(regimes), dtype=np.int8),
+            "flag_meanings": " ".join(regimes),
         },
     )
-    dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
-    dataset = dataset.set_coords(["time", "slip", "reference_rate"])
-    dataset.attrs = {
-        "title": f"Motion of a spring-slider, {scene.law} law",
-        "Conventions": "CF-1.11",
-        "scene": json.dumps(scene.as_dict()),
-        "effects": " ".join(scene.effects) or "none",
-        "status": status.label,
-        "message": message,
-        "rtol": rtol,
-        "rhs_evaluations": meter.spent,
-        "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
-    }
     return dataset

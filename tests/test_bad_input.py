@@ -403,7 +403,7 @@ def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     assert (code, "Run the study first" in said) == (1, True)
     (tmp_path / "stress_drop.partial.nc").touch()
     code, said = called([command, "stress_drop", "--output", str(tmp_path)])
-    assert (code, "stress_drop.partial.nc does" in said) == (1, True)
+    assert (code, "partial.nc does: run the study again" in said) == (1, True)
 
 
 @pytest.mark.parametrize("workers", [-1, 1.5, "two", None, True])

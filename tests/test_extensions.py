@@ -26,6 +26,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots import lines
+from rsfstudy.plots._phase_plane import scene_of
 from rsfstudy.slider import fields, laws
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
@@ -75,7 +76,7 @@ def test_it_is_checked_rerun_and_drawn(name, outside):
     same_numbers(rsfstudy.open(example.file), example.dataset)
     checked = call("check", example.file)
     assert checked.returncode == 0, checked.stderr
-    drawn = call("plot", example.file)
+    drawn = call("plot", example.file, "--study", example.study)
     assert (drawn.returncode, drawn.stderr) == (0, "")
     assert example.file.with_suffix(".png").is_file()
 
@@ -232,16 +233,14 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
         shutil.copy(outside[name].file, tmp_path)
     family, figure = (outside[n].file.name for n in ("law_family", "own_figure"))
     monkeypatch.chdir(tmp_path)
-    outside["own_figure"].study.rename(gone.with_suffix(".kept"))
-    try:
-        drawn = call("plot", figure)
-    finally:
-        gone.with_suffix(".kept").rename(outside["own_figure"].study)
+    drawn = call("plot", figure)
     assert drawn.returncode == 0
-    assert "drawn as lines, because the figure was not found: study = " in drawn.stderr
+    assert "drawn as lines. plot = 'stiffness_map': is no figure of rsfstudy" in drawn.stderr
+    assert "--study" in drawn.stderr
     as_lines = Path(figure).with_suffix(".png").read_bytes()
     assert call("plot", figure, "--study", outside["own_figure"].study).stderr == ""
     assert Path(figure).with_suffix(".png").read_bytes() != as_lines
+    assert call("plot", figure, "--study", gone).stderr.startswith("error: study = ")
     with pytest.raises(InvalidValue, match="'family': is a user's own.*--study FILE.*mine.py"):
         rsfstudy.cell(family, PLACES["law_family"])
     with pytest.raises(InvalidValue, match="declares the study 'stiffness_map'"):
@@ -258,6 +257,14 @@ def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, mon
     assert rsfstudy.check(dataset).empty
     with pytest.raises(InvalidValue, match="law = 'family': is unknown"):
         Scene(law="family")
+
+
+def test_figures_of_rsfstudy_know_the_scenes(outside):
+    for name, place in PLACES.items():
+        study = catalogue.load(str(outside[name].study))
+        cell = outside[name].dataset.sel(place)
+        (ours,) = {c.scene for c in study.cells()} & {scene_of(cell)}
+        assert {n: ours.as_dict()[n] for n in place} == place
 
 
 def test_an_altered_base_is_refused_by_its_path(outside, tmp_path):
@@ -474,6 +481,7 @@ def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
     np.testing.assert_array_equal(here.grip, [np.nan, 5.0, np.nan])
     np.testing.assert_array_equal(here.is_odd, [np.nan, np.nan, 1.0])
     assert here.grip.attrs["units"] == "m"
+    assert here.dynamics.attrs["long_name"] == "what balances the spring besides friction"
     there = run(study, client=cluster, output=tmp_path)
     same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
     same_numbers(there, here)

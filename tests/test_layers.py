@@ -1,10 +1,12 @@
 """A lower floor never imports a higher one; Dask and matplotlib stay where they belong."""
 
 import ast
+import importlib.util
 import sys
 from pathlib import Path
 
 import rsfstudy
+from rsfstudy import slider
 
 ROOT = Path(rsfstudy.__file__).parent
 
@@ -87,3 +89,12 @@ def test_physics_is_plain_python():
         allowed = {"rsfstudy", *sys.stdlib_module_names, *(("numpy", "scipy") if top else ())}
         for name in imports(file):
             assert name.split(".")[0] in allowed, f"{file} imports {name}"
+
+
+def test_the_guide_to_the_physics_names_modules_that_are_there():
+    """Each equation of the paper is said to be in a module, or several."""
+    rows = [line for line in (slider.__doc__ or "").splitlines() if line.startswith("    ")]
+    named = {name.strip() for row in rows for name in row[56:].split(",")}
+    assert len(rows) == 11
+    for name in named:
+        assert importlib.util.find_spec(f"rsfstudy.slider.{name}"), name

@@ -10,6 +10,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fields, laws, steady
 from rsfstudy.slider.equations import evolution_of, relation_of
@@ -83,8 +84,24 @@ def test_everything_follows_from_a_law(law, effects):
     assert values["critical_stiffness_from_growth"] == pytest.approx(
         values["critical_stiffness"], rel=1e-6
     )
-    step = CriticalStep()(scene.with_(load_velocity_ratio=None), Accuracy(1e-5))
-    assert step.status is Status.OK
+    stiffer = scene.with_(load_velocity_ratio=None, stiffness_ratio=1.1)
+    assert CriticalStep()(stiffer, Accuracy(1e-5)).status is Status.OK
+
+
+def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
+    """By the laws of the paper they do; by others they may grow, so that a boundary has to leave
+    open what happens there.
+    """
+    critical = {"normal_stress": "constant", "load_velocity_ratio": 1.05}
+    grown = {}
+    for law in ("perrin_rice_zheng", "slowness", "slip"):
+        outcome = StepResponse(peaks=3)(Scene(law=law, **critical), Accuracy(1e-8))
+        peaks = outcome.values["peak_log10_slip_rate"]
+        grown[law] = peaks[2] - peaks[0]
+    assert grown["perrin_rice_zheng"] > 5e-5
+    assert max(abs(grown["slowness"]), abs(grown["slip"])) < 1e-6
+    of_law = CriticalStep()(Scene(law="perrin_rice_zheng", normal_stress="constant"), Accuracy())
+    assert of_law.status is Status.UNVERIFIED
 
 
 def test_the_faster_a_state_falls_above_steady_sliding_the_smaller_the_critical_step():

@@ -190,3 +190,47 @@ def test_two_lengths(first, second, ratio, expected):
     assert scene.critical_stiffness / a == pytest.approx(expected, rel=2e-5)
     agree_on = LinearStability()(scene.with_(stiffness=0.9 * scene.critical_stiffness), Accuracy())
     assert agree_on.status in (Status.OK, Status.STABLE_AT_ANY_STIFFNESS)
+
+
+@pytest.mark.parametrize(
+    ("b_over_a", "second", "length_ratio", "load"),
+    [
+        (1.4651462863, 0.0138187125, 3.7746346349, 1.3),
+        (2.3188214826, 0.0143733403, 0.1910147365, 1.1),
+    ],
+)
+def test_peaks_of_two_states_may_fall_before_they_rise(b_over_a, second, length_ratio, load):
+    """With three unknowns paths pass each other: only the norm, or rest, decides."""
+    scene = Scene(
+        law=TwoLengths,
+        b_over_a=b_over_a,
+        second=second,
+        length_ratio=length_ratio,
+        stiffness_ratio=0.9,
+        load_velocity_ratio=load,
+        **CONSTANT,
+    )
+    outcome = Triggered()(scene, Accuracy(1e-5, 2_000_000))
+    assert (outcome.status, outcome.values.get("unstable")) == (Status.OK, 1.0)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"b_over_a": 12.0, "length_ratio": 3.0, "second": 0.05 * 12.0 * 0.0145},
+        {"b_over_a": 16.0, "length_ratio": 2.0, "second": 0.05 * 16.0 * 0.0145},
+        {
+            "b_over_a": 1.4658,
+            "length_ratio": 0.4007,
+            "second": 0.3854 * 1.4658 * 0.0145,
+            "inertia": True,
+            "period": 227374.0,
+            "load_velocity_ratio": math.exp(1.6316),
+        },
+    ],
+)
+def test_growth_of_two_states_has_its_threshold_at_the_critical_stiffness(fields):
+    outcome = LinearStability()(Scene(law=TwoLengths, **fields, **CONSTANT), Accuracy())
+    assert outcome.status is Status.OK
+    values = outcome.values
+    assert values["critical_stiffness_error"] < 1e-6 * values["critical_stiffness"]

@@ -17,6 +17,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
 from rsfstudy.motion.recording import SAMPLES, observed
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
@@ -88,9 +89,13 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch = _Watch(start)
+    watch, ahead = _Watch(start), 0 if start else len(scene.segments) - 1
     swings: list[float] = []
     for event in follow(scene, accuracy, meter, _asked(scene), start=start, clock=True):
+        if event.kind is Kind.SEGMENT:
+            watch, ahead = _Watch(None), ahead - 1
+        if ahead:
+            continue
         cycle = watch.see(event)
         if cycle is not None:
             swings.append(cycle.swing)
@@ -186,5 +191,5 @@ class _Watch:
         for fallen, event in enumerate(self._seen):
             if event.kind is Kind.FALL:
                 after = self._seen[fallen:]
-                return next((e.point for e in after if e.regime != "inertial"), None)
+                return next((e.point for e in after if e.regime != IN_RUPTURE), None)
         return None

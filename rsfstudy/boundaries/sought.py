@@ -141,8 +141,8 @@ class RateSteps(Steps):
         """
 
         def misfit(log_size: float, tolerance: float = _LOOSE) -> float:
-            found = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
-            return math.nan if found is None else found
+            higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
+            return math.nan if higher is None else higher
 
         stride = math.log(1.5)
         smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
@@ -167,12 +167,12 @@ class RateSteps(Steps):
 
         def misfit(log_size: float) -> float:
             scene = self.scene_at(math.exp(log_size))
-            found = rate_step_misfit(scene, _LOOSE, meter)
-            if found is None and self.sign > 0:
+            state = rate_step_misfit(scene, _LOOSE, meter)
+            if state is None and self.sign > 0:
                 # far from the boundary there may be no critical path, but an upward step still has
                 # a verdict
                 return -1.0 if swing(scene, Accuracy(_LOOSE), meter).reached else 1.0
-            return math.nan if found is None else found
+            return math.nan if state is None else state
 
         bracket = self._bracket(misfit)
         return None if bracket is None else _root(misfit, *bracket)
@@ -250,7 +250,7 @@ class DisplacementSteps(Steps):
         That is a delay on the same path, but for what the load point moves meanwhile.
         """
         scene = self.scene_at(size)
-        if not scene.inertia:
+        if not scene.has_mass:
             return False
         rate = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
         behind = scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2
@@ -273,10 +273,10 @@ class DisplacementSteps(Steps):
         """
         sizes = []
         for tolerance in tolerances:
-            found = displacement_on_path(self.scene, tolerance, meter, self.sign)
-            if found is None:
+            step = displacement_on_path(self.scene, tolerance, meter, self.sign)
+            if step is None:
                 return None
-            sizes.append(abs(found))
+            sizes.append(abs(step))
         return sizes
 
     def _largest(self) -> float:
@@ -289,7 +289,7 @@ class DisplacementSteps(Steps):
         if self.sign < 0:
             weakest = scene.parts.normal_stress.weakest(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = _RISE_OF_MASS if scene.inertia else 0.0
+        farther = _RISE_OF_MASS if scene.has_mass else 0.0
         friction = steady.stress_after_jump(scene, scene.a * (scene.log_norm_rate + farther))
         if friction is None:
             return _LARGEST_STRESS / scene.stiffness

@@ -13,7 +13,7 @@ from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
 from rsfstudy.motion.regimes import check_start, mass_acts, on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
-from rsfstudy.slider.equations import without_mass
+from rsfstudy.slider.equations import IN_RUPTURE, without_mass
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
@@ -27,6 +27,8 @@ _LINEAR = 0.05
 #: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
 _LEAP, _SHORTEST_LEAP = 1.3, 1.002
 
+#: How much higher in ln V a motion is taken to rise that is followed up to the norm only.
+_HIGHER = 1.0
 #: Part of the farthest distance from steady sliding at which a motion has come to it.
 _CLOSE = 1e-3
 
@@ -89,7 +91,8 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     the one before means that none will ever be higher, and peaks that grow go on growing until they
     reach the norm or a limit cycle. To see which without following a thousand swings, the motion
     leaps to a somewhat larger orbit: if that grows too, and so on up to the norm, so does the orbit
-    inside it. With mass, which acts during ruptures only, the same rules serve. Once the load point
+    inside it. With mass, which acts during ruptures only, the same rules serve; with several states
+    only the norm or steady sliding itself ends a motion. Once the load point
     is held, spring stress can only fall, and the first peak is the last.
 
     Raises
@@ -113,12 +116,27 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     return Swing(reached, max(excess, 1e-12) if reached else min(excess, -1e-12))
 
 
-def orbits_may_close(scene: Scene) -> bool:
-    """Whether every orbit closes at critical stiffness: where friction of one state acts alone,
-    and stress has no effect on it (Gu et al. 1984 for the slip law, Ranjith and Rice 1999 for the
-    slowness law).
+def friction_acts_alone(scene: Scene) -> bool:
+    """Whether only rate and state change friction, and only friction damps: stiffness is then
+    critical at every load point velocity or at none.
     """
-    return scene.parts.law.states == 1 and not set(scene.effects) - {"inertia"}
+    stress_acts = scene.parts.normal_stress.effects or scene.parts.law.state_effect
+    return not stress_acts and not scene.dynamics.damping(0.0)
+
+
+def orbits_may_close(scene: Scene) -> bool:
+    """Whether every orbit closes at critical stiffness."""
+    return scene.parts.law.orbits_close and friction_acts_alone(scene)
+
+
+def neutral(scene: Scene, within: float) -> bool:
+    """Whether stiffness is so close to the critical one, at any load point velocity, that growth
+    and decay cannot be told apart. Where all orbits close at critical stiffness, that is known;
+    with the load point held there are none.
+    """
+    off = abs(scene.stiffness_ratio - 1.0)
+    known = scene.log_load_rate == -math.inf or (off == 0.0 and orbits_may_close(scene))
+    return friction_acts_alone(scene) and off < within and not known
 
 
 def settles(scene: Scene) -> bool:
@@ -161,7 +179,7 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     watches = (_TOP, minimum("log_rate"), rise("log_rate", norm))
     for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):
         if event.kind is Kind.RISE:
-            return norm
+            return norm + _HIGHER
         if event.watch is not None or event.point.log_rate >= norm or event.point.growth == 0.0:
             return event.point.log_rate
     raise AssertionError("a motion never ends by itself")
@@ -209,6 +227,7 @@ def _orbit(
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
     watches += [settling(_CLOSE)] if steady.stable else []
+    planar = scene.parts.law.states == 1
     peaks: list[float] = []
     at_start = -math.inf
     for event in follow(scene, accuracy, meter, watches, start=start):
@@ -222,17 +241,19 @@ def _orbit(
             elif top >= norm and not heavy:
                 return _Orbit((top,), reached=True)
         elif event.kind is Kind.RISE:
-            return _Orbit((*peaks, norm), reached=True)
+            return _Orbit((*peaks, norm + _HIGHER), reached=True)
         elif event.kind is Kind.SETTLED:
             return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
         elif event.kind is Kind.MAXIMUM:
             peaks.append(top)
             if top >= norm:
                 return _Orbit(tuple(peaks), reached=True)
+            if not planar:
+                continue
             if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
                 return _Orbit(tuple(peaks), reached=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady.stable and event.regime != "inertial":
+            if slow and not steady.stable and event.regime != IN_RUPTURE:
                 return _Orbit(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 
@@ -259,12 +280,12 @@ def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
 def _steady(scene: Scene) -> _Steady:
     """Steady sliding at the load point velocity of the scene; `Halt` if there is none."""
     load = scene.log_load_rate
-    found = steady.steady_sliding(scene, load)
-    if found is None:
+    sliding = steady.steady_sliding(scene, load)
+    if sliding is None:
         raise Halt(
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
     critical = steady.critical_stiffness(scene, load)
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    return _Steady(load, found.spring, found.psis, margin)
+    return _Steady(load, sliding.spring, sliding.psis, margin)

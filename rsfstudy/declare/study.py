@@ -30,9 +30,10 @@ from rsfstudy.slider.fields import (
     fields_with,
     named,
     own_named,
+    quantities_with,
     without_meaning,
 )
-from rsfstudy.slider.parts import Part, quantities_of
+from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import QUANTITIES
 
@@ -231,9 +232,8 @@ class Study:
     @property
     def quantities(self) -> dict[str, Quantity]:
         """What its own parts and its measure say of what the vocabulary does not hold, by name."""
-        of_parts = [q for part in self.own_parts.values() for q in quantities_of(part)]
-        of_measure = list(self.measure.quantities)
-        return {q.name: q for q in (*of_parts, *of_measure) if q.name not in FIELDS}
+        stated = *quantities_with(self.own_parts.values()), *self.measure.quantities
+        return {about.name: about for about in stated}
 
     # ---- the lattice ------------------------------------------------------------------------
 
@@ -303,11 +303,10 @@ class Study:
         of_scene, changes = self._split(rows)
         # one row that states both a choice and what has no meaning then is contradictory
         stated = {name for row in rows if set(row) & SLOT_NAMES for name in row}
-        if self.own_parts:
-            of_scene = by_class(of_scene, self.own_parts)
-        parts = self.own_parts.values()
-        meaningless = without_meaning(self.base.as_dict() | of_scene, parts) - stated
-        of_scene = {name: value for name, value in of_scene.items() if name not in meaningless}
+        parts = self.own_parts
+        values = by_class(self.base.as_dict() | of_scene, parts)
+        meaningless = without_meaning(values, parts.values()) - stated
+        of_scene = {name: values[name] for name in of_scene if name not in meaningless}
         try:
             return Cell(self.base.with_(**of_scene), changes)
         except InvalidValue as error:

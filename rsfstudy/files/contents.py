@@ -144,8 +144,12 @@ def declaration(dataset: xr.Dataset) -> Declaration:
     return declared
 
 
-def scene(plain: PlainScene, own: Mapping[str, type[Part]] = MappingProxyType({})) -> Scene:
-    """The scene that all cells share.
+def scene(
+    plain: PlainScene,
+    own: Mapping[str, type[Part]] = MappingProxyType({}),
+    path: str = "declaration.base",
+) -> Scene:
+    """A scene; by default the one that all cells share.
 
     Parameters
     ----------
@@ -153,14 +157,16 @@ def scene(plain: PlainScene, own: Mapping[str, type[Part]] = MappingProxyType({}
         Its fields.
     own : mapping of str to type
         Its parts that are a user's own, by name.
+    path : str
+        Where it stands in its file.
 
     Raises
     ------
     DataError
         Where the fields make no scene, naming the first that does not.
     """
-    path, by_slot = "declaration.base", by_class(plain, own)
-    kinds = kinds_with(part for part in by_slot.values() if isinstance(part, type))
+    parts = [part for part in by_class(plain, own).values() if isinstance(part, type)]
+    kinds = kinds_with(parts)
     values = _fitted(plain, kinds, path)
     for name in plain:
         if name not in kinds:
@@ -264,6 +270,8 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     origin, of = get_origin(kind), get_args(kind)
     if kind is Any or _is_one(value, kind):
         return value
+    if kind is Scene and isinstance(value, dict):
+        return scene(value, path=path)
     if (is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
         return _object(value, kind, path)
     if origin is UnionType:

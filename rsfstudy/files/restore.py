@@ -63,22 +63,22 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
 
 
 def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
-    """The figure that a user wrote for a dataset, from the file that declares the study: the given
-    file, or the one that the dataset names.
+    """The figure that a user wrote for a dataset, from the file that declares the study. The file
+    that the dataset names is not run unasked, because the results may come from a stranger.
 
     Raises
     ------
     InvalidValue
-        Where there is no such file, or it has no such figure.
+        Where no file is given, or it has no such figure.
     """
     name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
-    if not (file or named_in):
-        remedy = "Name the file that declares it: --study FILE."
+    if file is None:
+        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
         raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
-    study = catalogue.load(str(file or named_in))
+    study = catalogue.load(str(file))
     if study.name != results.attrs["id"] or figure_name(study.plot) != name:
         rule = f"does not draw {name!r} of {results.attrs['id']!r}"
-        raise InvalidValue("study", str(file or named_in), rule)
+        raise InvalidValue("study", str(file), rule)
     return None if isinstance(study.plot, str) else study.plot
 
 

@@ -18,7 +18,14 @@ from typing import ClassVar
 from scipy.optimize import toms748
 
 from rsfstudy.boundaries.sought import DisplacementSteps, RateSteps, Steps
-from rsfstudy.boundaries.swing import Swing, orbits_may_close, settles, stability_margin, swing
+from rsfstudy.boundaries.swing import (
+    Swing,
+    neutral,
+    orbits_may_close,
+    settles,
+    stability_margin,
+    swing,
+)
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
@@ -111,7 +118,8 @@ class CriticalStep(Measure):
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        if _neutral(scene, accuracy):
+        below = not orbits_may_close(scene) or scene.stiffness_ratio < 1.0
+        if below and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED,
                 message="stiffness is critical to within the accuracy: ask for a smaller rtol",
@@ -152,10 +160,10 @@ class CriticalStep(Measure):
             if above.reached and not below.reached:
                 relative = width if boundary.by_motions else boundary.relative_error
                 error = steps.error(boundary.size, relative)
-                found = self._values(
+                values = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
-                return Outcome(Status.OK, found)
+                return Outcome(Status.OK, values)
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
@@ -237,16 +245,18 @@ class CriticalStep(Measure):
         """No step up to the largest reached the norm: because nothing is unstable, or because of
         mass.
         """
-        if steps.scene.inertia and _at_light_norm(steps, meter) is not None:
+        if steps.scene.has_mass and _at_light_norm(steps, meter) is not None:
             return Outcome(
                 Status.NORM_UNREACHABLE,
                 self._values(steps, stable=steps.value(largest)),
                 f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
             )
-        if steps.jumps_to_norm and not steps.scene.inertia:
+        if steps.jumps_to_norm and not steps.scene.has_mass and not why:
             value = steps.value(largest)
-            found = self._values(steps, largest, largest * ROUNDING, value, value)
-            return Outcome(Status.OK, found, "the jump of slip rate at the step itself is critical")
+            values = self._values(steps, largest, largest * ROUNDING, value, value)
+            return Outcome(
+                Status.OK, values, "the jump of slip rate at the step itself is critical"
+            )
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
             self._values(steps, stable=steps.value(largest)),
@@ -278,14 +288,6 @@ def _from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boun
     return boundary and replace(boundary, relative_error=5.0 * boundary.relative_error)
 
 
-def _neutral(scene: Scene, accuracy: Accuracy) -> bool:
-    """Whether stiffness lies so little below the critical one that growth cannot be told from none,
-    at any load point velocity.
-    """
-    margin = scene.stiffness_ratio - 1.0
-    return orbits_may_close(scene) and -10.0 * accuracy.rtol < margin < 0.0
-
-
 def _boundary(
     steps: Steps,
     sizes_by: Callable[[Sequence[float], Meter], list[float] | None],
@@ -299,7 +301,7 @@ def _boundary(
     if sizes is None or not steps.smallest <= sizes[0] <= steps.largest:
         return None
     error = error_between(sizes[0], sizes[1], _BY_CHANCE * accuracy.rtol) / sizes[0]
-    if steps.scene.inertia:
+    if steps.scene.has_mass:
         error += error_of_slow_manifold(steps.scene)
     return Boundary(sizes[0], error)
 
@@ -316,7 +318,7 @@ def _smaller_steps_decay(steps: Steps, size: float) -> bool:
 def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
     """Size of the critical step for a norm low enough to leave mass out: close by, and cheap."""
     norm = min(steps.scene.instability_norm, _LIGHT_NORM)
-    massless = type(steps)(steps.scene.with_(inertia=False, instability_norm=norm), steps.sign)
+    massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
     if massless.largest <= massless.smallest or not massless.scene.critical_stiffness:
         return None
     sizes = massless.sizes_on_path((1e-6,), meter)

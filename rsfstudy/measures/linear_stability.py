@@ -18,7 +18,7 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import Steady, critical_stiffness, resolvent, steady_sliding
+from rsfstudy.slider.steady import Steady, critical_stiffness, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
@@ -103,26 +103,33 @@ class LinearStability(Measure):
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
-        found = _threshold(scene, steady, critical, meter)
-        explicit = closed_forms.critical_stiffness(
-            load, scene.mu_star, scene.a, scene.b, _cot_phi(scene), scene.alpha or 0.0
-        )
+        by_growth = _threshold(scene, steady, critical, meter)
         return Outcome(
             Status.OK,
             {
                 "critical_stiffness": critical,
-                "critical_stiffness_error": abs(found - critical) + 1e-15 * critical,
-                "critical_stiffness_from_growth": found,
-                "critical_stiffness_explicit": explicit * (1.0 + rise),
-                "relative_critical_stiffness": critical / scene.critical_stiffness,
+                "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
+                "critical_stiffness_from_growth": by_growth,
+                "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
+                "relative_critical_stiffness": _over(critical, scene.critical_stiffness),
                 "rise_by_dynamics": rise,
                 **values,
             },
         )
 
 
-def _cot_phi(scene: Scene) -> float:
-    return 0.0 if scene.phi is None else 1.0 / math.tan(math.radians(scene.phi))
+def _over(stiffness: float, at_reference: float) -> float:
+    return stiffness / at_reference if at_reference else math.inf
+
+
+def _explicit(scene: Scene) -> float:
+    """The published formula, for scenes it speaks of; NaN for others."""
+    law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
+    if coupling is None or law.resting is not None or law.state_effect is not None:
+        return math.nan
+    return closed_forms.critical_stiffness(
+        scene.log_load_rate, scene.mu_star, scene.a, scene.b, *coupling
+    )
 
 
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
@@ -144,18 +151,8 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
 
 
 def growth(jacobian: np.ndarray) -> float:
-    """What has the sign of the growth of small oscillations: minus the Hurwitz determinant of the
-    characteristic polynomial that vanishes where two roots are imaginary. Of two unknowns it is the
-    trace.
-    """
-    size = len(jacobian)
-    coefficients = resolvent(jacobian)[0][::-1]
-    table = np.zeros((size - 1, size - 1))
-    for row in range(size - 1):
-        for column in range(size - 1):
-            place = 2 * column + 1 - row
-            table[row, column] = coefficients[place] if 0 <= place <= size else 0.0
-    return -float(np.linalg.det(table))
+    """Growth rate of the fastest growing perturbation, per unit of the clock."""
+    return float(np.linalg.eigvals(jacobian).real.max())
 
 
 def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:

@@ -135,23 +135,16 @@ class RigidResponse(Measure):
 
 
 def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> float:
-    """Largest departure of the stress change from the closed forms at constant normal stress, over
-    sigma_*; NaN at variable normal stress.
-
-    Above its steady value (a - b) ln(V/V_*), stress is ``b ln[1 + (V/V_* - 1) exp(-slip/D_c)]`` for
-    the slowness law and ``b ln(V/V_*) exp(-slip/D_c)`` for the slip law (eqs. 17a and 17b of the
-    paper, less mu_* sigma + a sigma ln(V/V_*), which they leave out).
+    """Largest departure of the stress change from the closed form of the law at constant normal
+    stress (eqs. 17a and 17b of the paper, less mu_* sigma + a sigma ln(V/V_*), which they leave
+    out), over sigma_*; NaN where there is none.
     """
-    if scene.parts.normal_stress.effects:
+    stress_left = type(scene.parts.law).stress_left
+    if scene.parts.normal_stress.effects or stress_left is None:
         return math.nan
     rate = scene.log_load_rate
-    evolving = {
-        "slowness": np.log(-np.expm1(-slip) + np.exp(rate - slip)),
-        "slip": rate * np.exp(-slip),
-    }
-    if scene.law not in evolving:
-        return math.nan
-    exact = (scene.a - scene.b) * rate + scene.b * evolving[scene.law]
+    left = np.array([stress_left(rate, at) for at in slip.tolist()])
+    exact = (scene.a - scene.b) * rate + scene.b * left
     return float(np.abs(stress - exact).max())
 
 

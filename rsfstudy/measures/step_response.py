@@ -83,8 +83,8 @@ class StepResponse(Measure):
         peaks, rows = self._follow(scene, accuracy, meter)
         again, _rows = self._follow(scene, accuracy.refined(), meter)
         heights = peaks - scene.log_load_rate / LN10
-        found = np.full(self.peaks, np.nan)
-        found[: len(peaks)] = peaks
+        log_rates = np.full(self.peaks, np.nan)
+        log_rates[: len(peaks)] = peaks
         return Outcome(
             Status.OK,
             {
@@ -93,7 +93,7 @@ class StepResponse(Measure):
                     peaks.max(), again.max(), _BY_CHANCE * accuracy.rtol
                 ),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
-                "peak_log10_slip_rate": found,
+                "peak_log10_slip_rate": log_rates,
                 **along_path(rows, self.phases),
             },
         )

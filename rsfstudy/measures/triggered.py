@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.boundaries.swing import orbits_may_close, swing
+from rsfstudy.boundaries.swing import neutral, swing
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
@@ -38,6 +39,10 @@ class Triggered(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion until the answer is certain, at two tolerances."""
+        if len(scene.segments) > 1:
+            rule = "is no single step, after which a motion decides"
+            remedy = "Read its peaks by step_response, or by simulate."
+            raise InvalidValue("loading", scene.parts.loading.name, rule, remedy=remedy)
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
             return Outcome(
                 Status.NORM_BELOW_LOADING_RATE,
@@ -48,10 +53,7 @@ class Triggered(Measure):
         accuracies = accuracy, accuracy.refined()
         answer, again = (swing(scene, asked, meter).reached for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
-        neutral = orbits_may_close(scene) and (
-            0.0 < abs(scene.stiffness_ratio - 1.0) < 10.0 * accuracy.rtol
-        )
-        if answer != again or neutral:
+        if answer != again or neutral(scene, 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )

@@ -10,6 +10,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import (
     Event,
     Kind,
+    Moment,
     Told,
     Watch,
     Watcher,
@@ -17,10 +18,10 @@ from rsfstudy.motion.events import (
     told_of,
     watchers,
 )
-from rsfstudy.motion.regimes import motion, starting
+from rsfstudy.motion.regimes import check_start, motion, starting
 from rsfstudy.motion.stepping import Meter, Step, steps
 from rsfstudy.motion.timeline import elapsed, moment_in, timed
-from rsfstudy.slider.equations import Equations
+from rsfstudy.slider.equations import RIGID, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
@@ -48,7 +49,7 @@ def follow(
     watches : sequence of Watch
         What to be told of.
     start : Point, optional
-        Where to start instead of from steady sliding at V_*.
+        Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
     clock : bool
         Carry time along: without it, times and slips are NaN, and work is saved.
     samples : int
@@ -65,21 +66,33 @@ def follow(
     Halt
         Where the motion cannot go on; see `regimes.motion`.
     """
-    segments, time, slip = scene.segments, 0.0, 0.0
+    segments = scene.segments if start is None else scene.segments[-1:]
     clock = clock or until < math.inf or len(segments) > 1
-    watching = watchers(watches)
+    origin, before = _Origin(0.0, 0.0, 0.0), None
     for number, (acting, duration) in enumerate(segments):
         if start is None:
             start = starting(acting)
         elif number:
             start = start._replace(spring=start.spring + acting.spring_stress_step)
-        segment = _Segment(acting, watching, samples, meter, _Origin(time, slip, start.spring))
-        end = min(time + duration, until)
+            check_start(acting, start)
+        asked = watches if number == len(segments) - 1 else _without_settling(watches)
+        origin = origin._replace(spring=start.spring)
+        segment = _Segment(acting, watchers(asked), samples, meter, origin)
+        end = min(origin.time + duration, until)
         moving = motion(acting, accuracy, meter, start, clock=clock)
-        last = yield from segment.told(moving, end - time if clock else math.inf, number > 0)
-        if last is None or last.time >= until:
+        lasts = end - origin.time if clock else math.inf
+        last = yield from segment.told(moving, lasts, before)
+        if last is None:
             return
-        start, time, slip = last.point, last.time, last.slip
+        if last.time >= until:
+            yield last
+            return
+        start, before = last.point, Moment(last.point, acting.numbers)
+        origin = _Origin(last.time, last.slip, 0.0)
+
+
+def _without_settling(watches: Sequence[Watch]) -> list[Watch]:
+    return [watch for watch in watches if watch.kind is not Kind.SETTLED]
 
 
 def along(
@@ -114,7 +127,7 @@ def along(
 
 def _of_path(step: Step, told: Told, point: Point) -> Event:
     regime = step.equations.regime
-    slip = told.clock if regime == "rigid" else math.nan
+    slip = told.clock if regime == RIGID else math.nan
     return Event(told.kind, told.watch, math.nan, slip, point, regime, step.meter.spent)
 
 
@@ -141,52 +154,48 @@ class _Segment:
         self._meter, self._origin = meter, origin
 
     def told(
-        self, moving: Iterator[Step], duration: float, later: bool
+        self, moving: Iterator[Step], duration: float, before: Moment | None
     ) -> Generator[Event, None, Event | None]:
         """Events up to the end of the segment, which is returned; None where one ends the motion
-        before.
+        earlier.
         """
         equations: Equations | None = None
-        before: Point | None = None
         for step, begin in timed(self._scene, moving):
             if step.equations is not equations:
+                kind = Kind.REGIME if equations else Kind.SEGMENT if before else Kind.START
                 equations = step.equations
-                yield from self._begins(step, begin, before, later)
+                yield self._event(step, begin, Told(step.start, kind, None), step.before)
+                for told, point in self._jumped(step, before):
+                    yield self._event(step, begin, told, point)
+                    if told.watch is not None and told.watch.ends:
+                        return None
             over = begin + elapsed(self._scene, step, step.end) >= duration
             if over:
                 step = step.until(moment_in(self._scene, step, duration - begin))
             for told in told_of(step, self._watching, self._samples):
-                yield self._event(step, begin, told.clock, told.kind, told.watch)
+                yield self._event(step, begin, told, point_at(step, told.clock))
                 if told.watch is not None and told.watch.ends:
                     return None
-            before = step.after
+            before = Moment(step.after, equations.p)
             if over:
-                last = self._event(step, begin, step.end, Kind.END, None)
-                yield last
-                return last
+                return self._event(step, begin, Told(step.end, Kind.END, None), step.after)
         raise AssertionError("a motion never ends by itself")
 
-    def _begins(
-        self, step: Step, begin: float, before: Point | None, later: bool
-    ) -> Iterator[Event]:
-        """A regime that begins, and what happened on the way to it."""
+    def _jumped(self, step: Step, before: Moment | None) -> Iterator[tuple[Told, Point]]:
+        """What happened on the way from another regime or segment to the first point of a step."""
         if before is None:
-            kind = Kind.SEGMENT if later else Kind.START
-            yield self._event(step, begin, step.start, kind, None)
             return
-        yield self._event(step, begin, step.start, Kind.REGIME, None)
+        after = Moment(step.before, step.equations.p)
         for watcher in self._watching:
-            if watcher.between(before, step.before, step.equations.p):
-                yield self._event(step, begin, step.start, watcher.watch.kind, watcher.watch)
+            point = watcher.between(before, after)
+            if point is not None:
+                yield Told(step.start, watcher.watch.kind, watcher.watch), point
 
-    def _event(
-        self, step: Step, begin: float, clock: float, kind: Kind, watch: Watch | None
-    ) -> Event:
-        scene, origin = self._scene, self._origin
-        point = step.before if clock == step.start else point_at(step, clock)
+    def _event(self, step: Step, begin: float, told: Told, point: Point) -> Event:
+        scene, origin, clock = self._scene, self._origin, told.clock
         passed = begin + elapsed(scene, step, clock)
         # slip follows from the spring: f = f_0 + K (V_0 t - slip)
         slipped = scene.load_velocity * passed - (point.spring - origin.spring) / scene.stiffness
         regime, work = step.equations.regime, self._meter.spent
         time, slip = origin.time + passed, origin.slip + slipped
-        return Event(kind, watch, time, slip, point, regime, work)
+        return Event(told.kind, told.watch, time, slip, point, regime, work)

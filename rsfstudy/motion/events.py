@@ -5,13 +5,14 @@ Who measures a motion asks to be told of
     maximum(of), minimum(of)    an extremum of a quantity
     rise(of, to), fall(of, to)  its crossing of a level, on the way up or down
     settling(part)              how far the slider is from steady sliding has become less than a
-                                part of the farthest so far (told at the end of each step while so)
+                                part of the farthest so far (told at the end of each step while so,
+                                in the segment of loading that goes on for ever)
 
 and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`; extrema are
 told of ``log_rate`` and ``spring``. Beside what was asked for, a motion tells its start, every
 change of regime, every segment of its loading that begins, the samples it was asked for, and its
-end in time. What happens from one regime to the next is told where that begins. A motion that
-cannot go on ends with `Halt`, which says why.
+end in time. What happens from one regime or segment to the next is told where that begins. A
+motion that cannot go on ends with `Halt`, which says why.
 """
 
 from __future__ import annotations
@@ -120,6 +121,13 @@ _SLOPES: dict[str, Quantity] = {
 _UPWARDS = {Kind.RISE: True, Kind.FALL: False, Kind.MINIMUM: True, Kind.MAXIMUM: False}
 
 
+class Moment(NamedTuple):
+    """A point, and the numbers of the equations there."""
+
+    point: Point
+    p: Numbers
+
+
 class Watcher:
     """Finds the events that were asked for by one `Watch`, in one motion."""
 
@@ -130,17 +138,29 @@ class Watcher:
 
     def within(self, step: Step) -> float | None:
         """Clock at which it happens within a step."""
-        p, backward = step.equations.p, step.end < step.start
-        if not self.between(step.before, step.after, p, backward=backward):
+        p = step.equations.p
+        # against the clock, slopes change sign the other way round
+        reverse = self._is_extremum and step.end < step.start
+        ends = self._quantity(step.before, p), self._quantity(step.after, p)
+        if not self._happens(*ends, reverse=reverse):
             return None
         return step.locate(lambda point: self._quantity(point, p))
 
-    def between(self, before: Point, after: Point, p: Numbers, *, backward: bool = False) -> bool:
-        """Whether it happens from one point to the next."""
-        # against the clock, slopes change sign the other way round
-        upwards = _UPWARDS[self.watch.kind] is not (self._is_extremum and backward)
-        sign = 1.0 if upwards else -1.0
-        return sign * self._quantity(before, p) < 0.0 <= sign * self._quantity(after, p)
+    def between(self, before: Moment, after: Moment) -> Point | None:
+        """The point at which it happens where a motion jumps from one to the next: the more extreme
+        one, or the first beyond the level.
+        """
+        if not self._happens(self._quantity(*before), self._quantity(*after), reverse=False):
+            return None
+        x, y = before.point.log_rate, after.point.log_rate
+        kept = (self.watch.kind is Kind.MAXIMUM and x > y) or (
+            self.watch.kind is Kind.MINIMUM and x < y
+        )
+        return before.point if kept and self.watch.of == "log_rate" else after.point
+
+    def _happens(self, before: float, after: float, *, reverse: bool) -> bool:
+        sign = 1.0 if _UPWARDS[self.watch.kind] is not reverse else -1.0
+        return sign * before < 0.0 <= sign * after
 
 
 class _Settling(Watcher):
@@ -152,8 +172,8 @@ class _Settling(Watcher):
         self._farthest = max(self._farthest, away)
         return step.end if away < self.watch.level * self._farthest else None
 
-    def between(self, before: Point, after: Point, p: Numbers, *, backward: bool = False) -> bool:
-        return False
+    def between(self, before: Moment, after: Moment) -> Point | None:
+        return None
 
 
 def watchers(watches: Sequence[Watch]) -> list[Watcher]:

@@ -64,7 +64,7 @@ def motion(
         With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
         the equations end, or as `steps` does.
     """
-    if scene.dynamics.rupture_rate is None:
+    if not scene.has_mass:
         equations, state = without_mass(scene, clock=clock), _unknowns(start, clock)
         yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
         return
@@ -72,7 +72,8 @@ def motion(
     handover = _Handover(scene, slow, accuracy)
     point = handover.slow_point(start)
     rises = handover.slip_of_rise(start, point) > accuracy.landing
-    if handover.weight_of_mass(point) < 1.0 and not rises:
+    slow_start = max(handover.weight_of_mass(point), handover.weight_of_rate(start)) < 1.0
+    if slow_start and not rises:
         point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
     else:
         point = start
@@ -92,7 +93,7 @@ def starting(scene: Scene) -> Point:
     """
     check_start(scene)
     stepped = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.parts.law.states)
-    if scene.dynamics.rupture_rate is None:
+    if not scene.has_mass:
         return stepped
     return stepped._replace(log_rate=0.0, friction=0.0)
 
@@ -124,16 +125,20 @@ class _Handover:
 
     def weight_of_mass(self, point: Point) -> float:
         """How much mass matters: 1 where the slow manifold has to be left."""
-        norm = self._norm(point)
         correction = abs(point.spring - point.friction) / self.scene.a
-        return max(norm / self.switch_norm, correction / self.accuracy.switch_correction)
+        return max(self.weight_of_rate(point), correction / self.accuracy.switch_correction)
+
+    def weight_of_rate(self, point: Point) -> float:
+        """The same by slip rate alone."""
+        return self._norm(point) / self.switch_norm
 
     def slip_of_rise(self, start: Point, point: Point) -> float:
         """Slip in D_c, times the change of ln V, while slip rate rises to a point after a step;
         left out, the state would miss the evolution of that slip.
         """
         rise = abs(point.log_rate - start.log_rate)
-        return self.scene.stiffness / self.scene.a * self._norm(point) ** 2 * rise
+        norm = max(self._norm(point), self._norm(start))
+        return self.scene.stiffness / self.scene.a * norm**2 * rise
 
     def _norm(self, point: Point) -> float:
         return self.scene.inertial_time * math.exp(min(point.log_rate, LARGEST_EXPONENT))
@@ -159,7 +164,7 @@ def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
     """Whether mass matters up to the instability norm, beyond what the slow manifold holds of
     it.
     """
-    return scene.inertia and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
+    return scene.has_mass and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
 
 
 def error_of_slow_manifold(scene: Scene) -> float:
@@ -172,9 +177,11 @@ def error_of_slow_manifold(scene: Scene) -> float:
     return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2
 
 
-def check_start(scene: Scene) -> None:
-    """Refuse a displacement step that leaves no friction of forward slip to integrate."""
-    spring = scene.spring_stress_step
+def check_start(scene: Scene, start: Point | None = None) -> None:
+    """Refuse a displacement step that leaves no friction of forward slip to integrate; it starts
+    from steady sliding at V_*, or leads to a point.
+    """
+    spring = scene.spring_stress_step if start is None else start.spring
     if spring <= scene.parts.normal_stress.weakest(scene):
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     if scene.mu_star + spring <= 0.0:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import LONGEST_STEP, Equations
+from rsfstudy.slider.equations import LONGEST_STEP, RIGID, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.status import Status
@@ -193,7 +193,7 @@ def steps(
         meter.jacobians += solver.njev - jacobians
         jacobians = solver.njev
         if solver.status == "failed":
-            if solver.t == 0.0 or regime == "rigid":  # whose clock is slip
+            if solver.t == 0.0 or regime == RIGID:  # whose clock is slip
                 raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
             solver, jacobians = started(solver.y), 0
             continue

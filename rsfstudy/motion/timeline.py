@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from scipy.optimize import brentq
 
 from rsfstudy.motion.stepping import Step
+from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.scene import Scene
 
 
@@ -45,4 +46,4 @@ def moment_in(scene: Scene, step: Step, time: float) -> float:
 
 
 def _tells_time(step: Step) -> bool:
-    return step.equations.regime == "inertial"
+    return step.equations.regime == IN_RUPTURE

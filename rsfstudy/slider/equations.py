@@ -15,6 +15,9 @@ from rsfstudy.slider.parts import Function, Numbers
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
+#: The regime of the full equations of a scene with mass, and that of a rigid slider.
+IN_RUPTURE, RIGID = "inertial", "rigid"
+
 #: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
 LONGEST_STEP = 1e9
 
@@ -108,7 +111,7 @@ def in_rupture(scene: Scene) -> Equations:
     rate, point = forms["rupture_rate"], forms["rupture_point"]
     others = _states(1, scene.parts.law.states)
     unknowns, scales = ("spring", "log_rate", "friction", *others), (a, 1.0, a, *[a] * len(others))
-    return Equations("inertial", unknowns, scales, rate, point, scene.numbers)
+    return Equations(IN_RUPTURE, unknowns, scales, rate, point, scene.numbers)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:
@@ -116,7 +119,7 @@ def rigid(scene: Scene, log_rate: float) -> Equations:
     forms, p = functions(scene), (*scene.numbers, log_rate)
     unknowns = ("friction", *_states(1, scene.parts.law.states))
     scales = (scene.a,) * len(unknowns)
-    return Equations("rigid", unknowns, scales, forms["rigid_rate"], forms["rigid_point"], p)
+    return Equations(RIGID, unknowns, scales, forms["rigid_rate"], forms["rigid_point"], p)
 
 
 def stride(scene: Scene) -> Callable[[Point], float]:
@@ -136,8 +139,8 @@ def relation_of(scene: Scene) -> Callable[[float], tuple[float, float, float, fl
     relation, p = functions(scene)["strength"], numbers_of_friction(scene)
 
     def at(friction: float) -> tuple[float, float, float, float]:
-        found: tuple[float, float, float, float] = relation(friction, p)
-        return found
+        values: tuple[float, float, float, float] = relation(friction, p)
+        return values
 
     return at
 

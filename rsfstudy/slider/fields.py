@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, NamedTuple, get_type_hints
@@ -179,8 +179,10 @@ def know(parts: Iterable[type[Part]]) -> None:
     """Have the names of parts that were checked stand for them, whatever they stood for."""
     for part in parts:
         slot = next(slot for slot in SLOTS if issubclass(part, slot.base))
-        slot.own[part.name] = part
-        _CHECKED[part] = slot
+        if slot.own.get(part.name) is not part:
+            slot.own[part.name] = part
+            _CHECKED[part] = slot
+            _without_meaning.cache_clear()
 
 
 def named(field: str, value: Any) -> Any:
@@ -204,8 +206,10 @@ def own_named(names: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> dict[s
     return {n: slot.own[n] for slot, n in places if isinstance(n, str) and n in slot.own}
 
 
-def by_class(values: Mapping[str, Any], parts: Mapping[str, type[Part]]) -> dict[str, Any]:
+def by_class(values: Mapping[str, Any], parts: Mapping[str, type[Part]]) -> Mapping[str, Any]:
     """Values of fields, with these parts by their classes instead of their names."""
+    if not parts:
+        return values
     texts = {n: values[n] for n in SLOT_NAMES & set(values) if isinstance(values[n], str)}
     return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
 
@@ -228,6 +232,14 @@ def fields_with(parts: Iterable[type[Part]]) -> tuple[str, ...]:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {part.name}", name, rule)
     return tuple(names)
+
+
+def quantities_with(parts: Iterable[type[Part]]) -> Iterator[Quantity]:
+    """What the fields mean that parts of the user's own add to those of every scene."""
+    for part in parts:
+        slot = _CHECKED[part]
+        stated = (Quantity(slot.name, "", "", slot.long_name), *quantities_of(part))
+        yield from (about for about in stated if about.name not in FIELDS)
 
 
 def kinds_with(parts: Iterable[type[Part]]) -> Mapping[str, Any]:
@@ -255,23 +267,21 @@ def without_meaning(values: Mapping[str, Any], parts: Iterable[type[Part]] = ())
     parts : iterable of type
         Parts of the user's own that may be among those.
     """
-    named = tuple([_by_class(slot, values.get(slot.name)) for slot in SLOTS])
-    return _without_meaning(named, tuple(parts))
+    try:
+        return _without_meaning(tuple(map(values.get, _SLOT_ORDER)), tuple(parts))
+    except TypeError:  # what is no name, and cannot be looked up as one
+        return frozenset()
 
 
-def _by_class(slot: Slot, value: Any) -> type[Part] | None:
-    """The part that a value names in a slot, if it names one."""
-    if isinstance(value, str):
-        return slot.choices.get(value) or slot.own.get(value)
-    return value if isinstance(value, type) else None
+_SLOT_ORDER = tuple(slot.name for slot in SLOTS)
 
 
 @cache
-def _without_meaning(
-    named: tuple[type[Part] | None, ...], parts: tuple[type[Part], ...]
-) -> frozenset[str]:
+def _without_meaning(named: tuple[Any, ...], parts: tuple[type[Part], ...]) -> frozenset[str]:
     names: set[str] = set()
-    for slot, part in zip(SLOTS, named, strict=True):
+    for slot, name in zip(SLOTS, named, strict=True):
+        by_name = slot.choices.get(name) or slot.own.get(name)
+        part = name if isinstance(name, type) else by_name
         others = [other for other in parts if _CHECKED[other] is slot]
         others += slot.choices.values() if part is not None else []
         meant = FIELDS if part is None else names_of(part)
@@ -284,7 +294,7 @@ def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
     value = given.get(slot.name)
     if isinstance(value, type):
         return known(slot, value)
-    if isinstance(value, str) and value in slot.own:
+    if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
     if slot.name in SLOT_FIELDS:
         name = given.get(slot.name, slot.default)

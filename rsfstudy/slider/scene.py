@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
+from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fields import (
     SLOT_NAMES,
     SLOTS,
@@ -159,6 +160,17 @@ class Scene:
         return self.parts.dynamics
 
     @property
+    def has_mass(self) -> bool:
+        """Whether mass acts in ruptures."""
+        return self.parts.dynamics.rupture_rate is not None
+
+    def without_mass(self) -> Scene:
+        """The same slider in quasi-static motion, if it has mass."""
+        if not self.has_mass:
+            return self
+        return self._with_parts(self.parts._replace(dynamics=QuasiStatic()))
+
+    @property
     def b(self) -> float:
         """Evolution effect parameter."""
         return float(self.a * self.b_over_a)
@@ -217,9 +229,12 @@ class Scene:
         step = Step(
             load_velocity_ratio=segment.load_velocity, displacement_step=segment.displacement
         )
-        made = [self._slider, *self.parts._replace(loading=step)]
+        return self._with_parts(self.parts._replace(loading=step))
+
+    def _with_parts(self, parts: Parts) -> Scene:
+        """A copy with other parts in the slots."""
         scene = Scene.__new__(Scene)
-        scene._fill(layout_of(tuple(type(part) for part in made[1:])), made)
+        scene._fill(layout_of(tuple(type(part) for part in parts)), [self._slider, *parts])
         return scene
 
     @property

@@ -37,8 +37,11 @@ if TYPE_CHECKING:
 _STRONGEST = 1e9
 #: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
 #: States take a part of it, over b, because each of several may have a small part of b.
-_STEP, _PART = 0.05, 0.1
+_STEP, _PART = 0.05, 0.05
 _WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+
+#: Critical stiffness over a that rounding leaves where there is none.
+_ROUNDING = 1e-12
 
 Polynomial = list[float]
 
@@ -171,7 +174,7 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
         elastic = squared * _value(turns, squared) / _value(size, squared)
         inertial = 1.0 - norm**2 * squared
         critical = max(critical, elastic / inertial if inertial > 0.0 else math.inf)
-    return critical
+    return critical if critical > _ROUNDING * scene.a else 0.0
 
 
 def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
@@ -242,8 +245,8 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
         scene.stiffness * scene.dynamics.norm(scene, log_rate) ** 2,
     ]
     polynomial = _sum(_product(spring, below), [0.0, *above])
-    found = np.roots(polynomial[::-1])
-    return np.asarray(found[np.argsort(-found.real)])
+    roots = np.roots(polynomial[::-1])
+    return np.asarray(roots[np.argsort(-roots.real)])
 
 
 def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
@@ -254,11 +257,11 @@ def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def _product(first: Polynomial, second: Polynomial) -> Polynomial:
-    found = [0.0] * (len(first) + len(second) - 1)
+    product = [0.0] * (len(first) + len(second) - 1)
     for i, x in enumerate(first):
         for j, y in enumerate(second):
-            found[i + j] += x * y
-    return found
+            product[i + j] += x * y
+    return product
 
 
 def _sum(first: Polynomial, second: Polynomial) -> Polynomial:
@@ -277,6 +280,6 @@ def _positive_roots(polynomial: Polynomial) -> list[float]:
     if len(polynomial) == 2:
         roots = [-polynomial[0] / polynomial[1]]
     else:
-        found = np.roots(polynomial[::-1])
-        roots = found.real[np.abs(found.imag) <= 1e-12 * np.abs(found)].tolist()
+        every = np.roots(polynomial[::-1])
+        roots = every.real[np.abs(every.imag) <= 1e-12 * np.abs(every)].tolist()
     return [root for root in roots if root > 0.0]

@@ -25,8 +25,8 @@ JOBS = 4
 
 def main(study: str, cluster: type = SLURMCluster, jobs: int = JOBS, **job: object) -> None:
     """Start a cluster, run a study on it, and say what came out."""
-    with cluster(**{**JOB, **job}) as found, distributed.Client(found) as client:
-        found.scale(jobs=jobs)
+    with cluster(**{**JOB, **job}) as nodes, distributed.Client(nodes) as client:
+        nodes.scale(jobs=jobs)
         client.wait_for_workers(1)
         dataset = rsfstudy.run(study, client=client)
     print(rsfstudy.check(dataset)[["id", "claim", "published", "ours", "verdict"]].to_string())

@@ -40,13 +40,28 @@ class Law(Part):
         rule="must be greater than 0",
     )
 
+    #: How many states the law has.
     states: ClassVar[int] = 1
+    #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
+    #: effect on it: where evolution changes with its own state in proportion to itself.
+    orbits_close: ClassVar[bool] = False
+    #: ``stress_left(rate, slip)``: the stress in units of b that is left above its steady value
+    #: after so much slip at constant ln(V/V_*), at constant normal stress; closed forms only.
+    stress_left: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
     resting: ClassVar[Function | None] = None
     #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
     #: state variable, and its derivative with respect to friction; none for most laws.
     state_effect: ClassVar[Function | None] = None
+
+    def __init_subclass__(cls) -> None:
+        """A law with an evolution of its own does not inherit what is known of another's."""
+        super().__init_subclass__()
+        if {"evolution", "evolutions"} & vars(cls).keys():
+            for name, unknown in (("orbits_close", False), ("stress_left", None)):
+                if name not in vars(cls) and getattr(cls, name) != unknown:
+                    setattr(cls, name, unknown)
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:

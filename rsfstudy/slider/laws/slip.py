@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import Law
@@ -37,9 +38,16 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return -(state + p[OWN] * log_rate)
 
 
+def stress_left(rate: float, slip: float) -> float:
+    """``ln(V/V_*) exp(-slip/D_c)`` (eq. 17b of the paper, less its steady value)."""
+    return rate * math.exp(-slip)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SlipLaw(Law):
     """The slip law."""
 
     name = "slip"
     evolution = staticmethod(evolution)
+    stress_left = staticmethod(stress_left)
+    orbits_close = True  # Gu et al. (1984)

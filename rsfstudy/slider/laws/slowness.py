@@ -43,9 +43,16 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return b * math.expm1(min(-(state / b + log_rate), LARGEST_EXPONENT))
 
 
+def stress_left(rate: float, slip: float) -> float:
+    """``ln[1 + (V/V_* - 1) exp(-slip/D_c)]`` (eq. 17a of the paper, less its steady value)."""
+    return math.log(-math.expm1(-slip) + math.exp(rate - slip))
+
+
 @dataclass(frozen=True, kw_only=True)
 class SlownessLaw(Law):
     """The slowness law."""
 
     name = "slowness"
     evolution = staticmethod(evolution)
+    stress_left = staticmethod(stress_left)
+    orbits_close = True  # Ranjith and Rice (1999)

@@ -30,6 +30,11 @@ class NormalStress(Part):
         """
         return None
 
+    @property
+    def coupling(self) -> tuple[float, float] | None:
+        """d sigma/d tau, and the effect alpha of normal stress on the state, if that is all."""
+        return None
+
     def weakest(self, scene: Scene) -> float:
         """Deviation of frictional stress, over sigma_*, at which normal stress vanishes."""
         return -math.inf

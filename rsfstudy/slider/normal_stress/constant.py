@@ -14,6 +14,7 @@ class Constant(NormalStress):
     """Constant normal stress: nothing to add to the friction relation."""
 
     name = "constant"
+    coupling = (0.0, 0.0)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

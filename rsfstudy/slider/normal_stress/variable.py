@@ -93,6 +93,10 @@ class Variable(NormalStress):
         return 1.0 / math.tan(math.radians(self.phi))
 
     @property
+    def coupling(self) -> tuple[float, float]:
+        return self.cot_phi, self.alpha
+
+    @property
     def state_effect(self) -> Function | None:
         return linker_dieterich if self.alpha else None
 

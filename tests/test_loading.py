@@ -1,0 +1,178 @@
+"""A loading is a sequence of segments; their motion is one, told as it is wherever it is cut."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import pytest
+
+from rsfstudy import Scene, simulate
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.equations import IN_RUPTURE
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import number
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSegments(Loading):
+    first_velocity: float = number(1.0, "", "1", "load point velocity of the first segment")
+    first_displacement: float = number(0.0, "", "1", "displacement at its beginning")
+    first_duration: float = number(1.0, "", "1", "how long it lasts")
+    then_velocity: float = number(1.0, "", "1", "load point velocity afterwards")
+    then_displacement: float = number(0.0, "", "1", "displacement at its beginning")
+
+    name = "two_segments"
+
+    @property
+    def segments(self):
+        return (
+            Segment(self.first_velocity, self.first_displacement, self.first_duration),
+            Segment(self.then_velocity, self.then_displacement),
+        )
+
+
+def scene(first=(1.0, 0.0, 1.0), then=(1.0, 0.0), **fields) -> Scene:
+    names = ("first_velocity", "first_displacement", "first_duration")
+    loading = dict(zip(names, first, strict=True))
+    loading |= dict(zip(("then_velocity", "then_displacement"), then, strict=True))
+    usual = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 0.8}
+    return Scene(**{**usual, **fields}, loading=TwoSegments, **loading)
+
+
+def told(of: Scene, *watches, until: float, rtol: float = 1e-7) -> list:
+    return list(follow(of, Accuracy(rtol), Meter(10**6), watches, until=until))
+
+
+@pytest.mark.parametrize(
+    "fields", [{"stiffness_ratio": 1.5}, {"stiffness_ratio": 0.5, "inertia": True}]
+)
+@pytest.mark.parametrize("cut", [0.3, 11.0, 11.019738, 30.0])
+def test_a_cut_changes_nothing(fields, cut):
+    """The same load in two segments is the same motion, be the cut in a rupture or not."""
+    one = Scene(
+        law="slowness",
+        normal_stress="constant",
+        load_velocity_ratio=1.0,
+        displacement_step=0.1,
+        **fields,
+    )
+    two = scene((1.0, 0.1, cut), **fields)
+    watches = (maximum("log_rate"), fall("log_rate", 0.0), rise("log_rate", 0.0))
+    whole = [e for e in told(one, *watches, until=40.0) if e.watch is not None]
+    parts = [e for e in told(two, *watches, until=40.0) if e.watch is not None]
+    assert [e.watch for e in parts] == [e.watch for e in whole]
+    for event, again in zip(whole, parts, strict=True):
+        assert again.time == pytest.approx(event.time, rel=2e-6)
+        assert again.slip == pytest.approx(event.slip, rel=2e-6)
+        assert again.point.spring == pytest.approx(event.point.spring, abs=2e-6)
+
+
+def test_a_cut_in_the_second_half_of_a_rupture_keeps_its_momentum():
+    """Stress has dropped, and the slider is still fast."""
+    fields = {"stiffness_ratio": 0.5, "inertia": True}
+    whole = told(scene((1.0, 0.1, 20.0), **fields), minimum("spring"), until=19.0)
+    arrest = next(e for e in whole if e.kind is Kind.MINIMUM and e.point.spring < -0.4)
+    fast = next(
+        e
+        for e in follow(scene((1.0, 0.1, 20.0), **fields), Accuracy(), Meter(10**6), samples=4)
+        if e.regime == IN_RUPTURE and e.point.spring < 0.9 * arrest.point.spring
+    )
+    cut = told(scene((1.0, 0.1, fast.time), **fields), minimum("spring"), until=19.0)
+    again = next(e for e in cut if e.kind is Kind.MINIMUM and e.point.spring < -0.4)
+    assert again.slip == pytest.approx(arrest.slip, rel=1e-5)
+    assert again.point.spring == pytest.approx(arrest.point.spring, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "first", [(0.0, 0.0, 1e4), (1.0, 0.1, 120.0), (3.0, 0.0, 60.0), (1e-6, 0.0, 1e4)]
+)
+def test_the_limit_cycle_is_that_of_the_last_segment(first):
+    """Whatever was before: a hold, or cycles at another velocity."""
+    outcome = LimitCycle(phases=10)(scene(first, inertia=True), Accuracy(1e-6))
+    assert outcome.status is Status.OK
+    assert outcome.values["recurrence_interval"] == pytest.approx(49.1365, rel=2e-6)
+    assert outcome.values["slip_per_event"] == pytest.approx(49.1365, rel=2e-6)
+
+
+def test_a_hold_does_not_count_as_far_from_steady_sliding():
+    response = StepResponse(peaks=4, phases=10)(
+        scene((0.0, 0.0, 100.0), stiffness_ratio=1.5), Accuracy(1e-6)
+    )
+    slow = StepResponse(peaks=4, phases=10)(
+        scene((1e-9, 0.0, 100.0), stiffness_ratio=1.5), Accuracy(1e-6)
+    )
+    peaks = response.values["peak_log10_slip_rate"]
+    assert peaks == pytest.approx(slow.values["peak_log10_slip_rate"], abs=1e-5)
+
+
+def test_jumps_between_segments_are_told():
+    """A displacement takes slip rate past a level at once; a change of velocity ends the rise of
+    the spring.
+    """
+    jump = told(
+        scene((1.0, 0.0, 5.0), (1.0, 1.2), stiffness_ratio=4.0),
+        rise("log_rate", 4.0),
+        fall("log_rate", 4.0),
+        maximum("log_rate"),
+        until=8.0,
+    )
+    kinds = [event.kind for event in jump]
+    assert kinds[:4] == [Kind.START, Kind.SEGMENT, Kind.RISE, Kind.FALL]
+    assert [event.time for event in jump[1:3]] == [5.0, 5.0]
+    assert kinds.count(Kind.END) == 1
+    held = told(scene((10.0, 0.0, 0.05), (0.0, 0.0)), maximum("spring"), until=1.0)
+    (highest,) = (event for event in held if event.kind is Kind.MAXIMUM)
+    assert highest.time == pytest.approx(0.05)
+    assert highest.point.spring == max(event.point.spring for event in held)
+
+
+def test_what_ends_a_motion_ends_it_between_regimes_too():
+    """From rupture to slow slip the rate falls past the level at once."""
+    of = scene((1.0, 0.1, 1e3), stiffness_ratio=0.5, inertia=True)
+    *_before, last = told(of, fall("log_rate", 8.0, ends=True), until=500.0)
+    assert (last.kind, last.regime) == (Kind.FALL, "slow_manifold")
+    assert last.point.log_rate <= 8.0
+
+
+def test_events_come_in_order_and_take_turns():
+    of = scene((2.0, 0.2, 30.0), (5.0, -0.1), inertia=True)
+    watches = (
+        maximum("log_rate"), minimum("log_rate"), rise("log_rate", 2.0), fall("log_rate", 2.0),
+        settling(1e-9),
+    )  # fmt: skip
+    events = told(of, *watches, until=60.0)
+    assert all(b.time >= a.time and b.work >= a.work for a, b in pairwise(events))
+    for pair in ({Kind.MAXIMUM, Kind.MINIMUM}, {Kind.RISE, Kind.FALL}):
+        turns = [event.kind for event in events if event.kind in pair]
+        assert len(turns) > 4
+        assert all(a is not b for a, b in pairwise(turns))
+
+
+def test_a_step_that_takes_all_stress_is_refused_wherever_it_stands():
+    of = scene((1.0, 0.0, 1.0), (1.0, -100.0), stiffness_ratio=1.5)
+    with pytest.raises(Halt) as halt:
+        told(of, until=5.0)
+    assert halt.value.status is Status.SHEAR_STRESS_REVERSED
+    motion = simulate(of, duration=5.0)
+    assert motion.attrs["status"] == "shear_stress_reversed"
+    assert float(motion.time[-1]) == pytest.approx(1.0)
+
+
+def test_whether_a_step_triggers_is_asked_of_one_step():
+    with pytest.raises(InvalidValue, match="two_segments.*is no single step.*step_response"):
+        Triggered().find(scene(), Accuracy(), Meter(10))
+
+
+def test_time_without_a_clock_is_not_known():
+    motion = follow(Scene(load_velocity_ratio=1.5), Accuracy(), Meter(10**4), [maximum("log_rate")])
+    event = next(event for event in motion if event.watch is not None)
+    assert math.isnan(event.time)
+    assert math.isnan(event.slip)
