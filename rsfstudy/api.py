@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,25 +14,17 @@ import xarray as xr
 from rich import progress as bars
 
 from rsfstudy.compute import own_code, provenance, runner
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Mapper, Task, sendable, serial
+from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
 from rsfstudy.compute.runner import Keeping, Progress
-from rsfstudy.compute.workers import on_client, on_local_cluster, threads
+from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.axis import check_text
 from rsfstudy.declare.claims import verdicts
-from rsfstudy.declare.study import Study, figure_name
-from rsfstudy.errors import DataError, InvalidValue, brief
-from rsfstudy.files import contents, restore, store
+from rsfstudy.declare.study import Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
-from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Outcome
 from rsfstudy.slider.scene import Scene
-
-OUTPUT = Path("outputs")
-#: No cell takes three years, and no clock of ours goes much further than `WAITING` times that.
-_LONGEST = 1e8
-#: Most worker processes for each core, and what any machine may have.
-_A_CORE, _ANYWHERE = 4, 8
 
 
 def studies() -> dict[str, Study]:
@@ -46,7 +37,7 @@ def run(
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = OUTPUT,
+    output: str | Path | None = places.DEFAULT,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
@@ -72,16 +63,16 @@ def run(
     progress : bool
         Show a progress bar.
     fresh : bool
-        Compute every cell anew.
+        Forget the finished cells and compute all again.
     rtol : float, optional
         Accuracy of the cells.
     time_limit : float
-        CPU time in s after which a worker gives a cell up, or ten times as long on the clock where
-        the cell sleeps or waits; it does not bind in this process.
+        CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
+        times as much wall time. There is no limit in this process (``workers=0``).
     keep_going : bool
-        Go on where the first cells all fail, instead of stopping early.
+        Go on if the first cells all fail, instead of stopping early.
     despite_failures : bool
-        Reduce what there is where cells failed; the results say so.
+        Leave failed cells out of the reductions; the results say so.
     format : {"netcdf", "zarr"}
         One NetCDF file, or a Zarr store written in pieces, for lattices that do not fit in memory.
     command : str
@@ -98,20 +89,21 @@ def run(
     Raises
     ------
     InvalidValue
-        For a declaration or an override that makes no sense, before anything is computed.
+        For a wrong declaration or override, before anything is computed.
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
     declared = declaration(study, rtol, overrides)
     keeping = Keeping(
-        output=directory(output),
+        output=places.directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
         despite_failures=despite_failures,
         command=command,
     )
-    return prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
+    where = Workers(workers, client, time_limit)
+    return prepared(declared, keeping, where, progress)()
 
 
 def declaration(
@@ -124,86 +116,26 @@ def declaration(
     return declared.with_(**overrides) if overrides else declared
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Where cells are computed, and whether a bar shows how far it is."""
-
-    processes: int = 2
-    client: Any = None
-    time_limit: float = DEFAULT_TIME_LIMIT
-    progress: bool = True
-
-    def __post_init__(self) -> None:
-        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
-        if not whole or self.processes < 0:
-            raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
-        most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
-        if self.client is None and self.processes > most:
-            rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
-            remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
-            raise InvalidValue("workers", self.processes, rule, remedy=remedy)
-        if self.client is not None and not hasattr(self.client, "submit"):
-            raise InvalidValue("client", self.client, "must be a distributed.Client")
-        limit: object = self.time_limit
-        if not isinstance(limit, int | float) or not 0.0 < limit <= _LONGEST:
-            rule = f"must be a number greater than 0, up to {_LONGEST:g} s"
-            raise InvalidValue("time_limit", limit, rule)
-
-    def threads(self) -> int:
-        """How many cells are computed at a time."""
-        at_a_time = self.processes if self.client is None else threads(self.client)
-        return max(1, at_a_time)
-
-    def mapper(self, log: Path | None = None) -> Mapper:
-        """What computes batches of cells there; `log` is for what processes of ours say when they
-        end.
-        """
-        if self.client is not None:
-            return on_client(self.client)
-        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
-
-
-def directory(output: str | Path | None) -> Path | None:
-    """Where results go: a directory, which need not be there yet, or nowhere.
+def prepared(
+    study: Study, keeping: Keeping, workers: Workers, progress: bool = True
+) -> Callable[[], xr.Dataset]:
+    """A function that runs the study, once everything has been checked; `progress` shows a bar.
 
     Raises
     ------
     InvalidValue
-        For what cannot be the path of one.
-    """
-    if output is None:
-        return None
-    if not isinstance(output, str | Path):
-        raise InvalidValue("output", output, "must be a path, or None")
-    check_text("output", str(output))
-    if output == "":
-        remedy = "Name a directory; . is the one you are in."
-        raise InvalidValue("output", output, "is empty", remedy=remedy)
-    try:
-        Path(output).exists()
-    except OSError as error:
-        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
-    return Path(output)
-
-
-def prepared(study: Study, keeping: Keeping, workers: Workers) -> Callable[[], xr.Dataset]:
-    """A run that only has to be called.
-
-    Raises
-    ------
-    InvalidValue
-        For whatever is wrong with it.
+        For anything wrong with the study or the options.
     """
     parts = tuple(study.own_parts.values())
     digest = own_code.digest(type(study.measure), *parts)
     task = Task(study.measure, study.accuracy, workers.time_limit, parts=parts, own_code=digest)
     if workers.mapper() is not serial:
-        sendable(task)  # told before any work, if it is not
+        sendable(task)  # raises before any work if it cannot be sent
     ready = runner.Run(study, keeping, task, workers.threads())
 
     def run() -> xr.Dataset:
-        with _bar(study.name, workers.progress) as told:
-            return ready(workers.mapper(ready.worker_log), told)
+        with _bar(study.name, progress) as show:
+            return ready(workers.mapper(ready.worker_log), show)
 
     return run
 
@@ -224,17 +156,17 @@ def _bar(name: str, show: bool) -> Iterator[Progress]:
     bar = bars.Progress(*columns)
     task = bar.add_task(name, total=None)
 
-    def told(done: int, total: int) -> None:
-        bar.start()  # not before there is something to tell
+    def update(done: int, total: int) -> None:
+        bar.start()  # only now, because a run may fail before its first report
         bar.update(task, completed=done, total=total)
 
     try:
-        yield told
+        yield update
     finally:
         bar.stop()
 
 
-def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
     Raises
@@ -244,37 +176,11 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
-    path = Path(name)
-    if path.suffix not in (".nc", ".zarr"):
-        study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
-        try:
-            path = _results(study, directory(output) or OUTPUT)
-        except OSError as error:
-            raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
-    return store.read(path)
-
-
-def _results(name: str, output: Path) -> Path:
-    """The results of a study, by its name."""
-    file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
-    if file.exists() and in_pieces.exists():
-        raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
-    if file.exists() or in_pieces.exists():
-        return file if file.exists() else in_pieces
-    partial = output / f"{name}.partial.nc"
-    if partial.exists():
-        raise DataError(
-            f"{file} does not exist, but {partial} does: run the study again, or name it."
-        )
-    there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
-    if not there and name not in catalogue.names():
-        rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
-        raise InvalidValue("study", name, rule, choices=catalogue.names(), remedy=remedy)
-    return file
+    return store.read(places.results(name, output))
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
-    """Hold a dataset (or a named study's results, or a file) against the claims its study makes.
+    """Compare a dataset (or a named study's results, or a file) with the claims of its study.
 
     Returns
     -------
@@ -297,7 +203,7 @@ def rerun(
     progress: bool = True,
     time_limit: float = DEFAULT_TIME_LIMIT,
 ) -> pd.DataFrame:
-    """Compute a results file anew from what it says of itself, and hold the numbers against it.
+    """Compute the cells of a results file again, from its own declaration, and compare the numbers.
 
     Parameters
     ----------
@@ -323,8 +229,8 @@ def rerun(
         Where the file is damaged, or the run cannot finish.
     """
     theirs = open(file)
-    declared = study_of(theirs, study)
-    place = directory(output)
+    declared = restore.study_of(theirs, study)
+    place = places.directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
             rule = f"holds {taken.name}, which this would take the place of"
@@ -336,69 +242,15 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    ours = prepared(declared, keeping, Workers(workers, client, time_limit, progress))()
+    where = Workers(workers, client, time_limit)
+    ours = prepared(declared, keeping, where, progress)()
     return compared(theirs, ours)
-
-
-def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
-    """The study that made a dataset: from its own declaration, or, where that does not suffice,
-    from the file that declares it.
-    """
-    declared = contents.declaration(results)
-    if file is None:
-        about = contents.provenance(results)
-        if about["fingerprint"]["own_code"] != "none":
-            rule = "is a user's own, and code is never taken from a results file"
-            remedy = "Name the file that declares it: --study FILE (study=)."
-            if about["declared_in"]:
-                remedy += f" It was {brief(about['declared_in'])}."
-            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
-            raise InvalidValue(name, value, rule, remedy=remedy)
-        study = restore.study(declared)
-    else:
-        named = catalogue.load(str(file))
-        if named.name != declared.name:
-            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
-            raise InvalidValue("study", str(file), rule)
-        study = restore.study(declared, of_its_own=named)
-    _check_lattice(study, results)
-    return study
-
-
-def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
-    """What draws a dataset with a figure of the user's own, from the file that declares the study;
-    the code that results name is not run unasked, because they may be a stranger's.
-
-    Raises
-    ------
-    InvalidValue
-        Where no file is given, or it has no such figure.
-    """
-    name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
-    if file is None:
-        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
-        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
-    study = catalogue.load(str(file))
-    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
-        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
-        raise InvalidValue("study", str(file), rule)
-    return None if isinstance(study.plot, str) else study.plot
-
-
-def _check_lattice(study: Study, results: xr.Dataset) -> None:
-    """Refuse results whose cells are not those of their own declaration."""
-    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
-    if dims != study.dimensions:
-        raise contents.refused("status", f"lies along {dims}, not the axes of the declaration")
-    for name in study.dimensions:
-        if ours[name].values.tolist() != results[name].values.tolist():
-            raise contents.refused(name, "is not that axis of the declaration")
 
 
 def cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Compute one cell of a results file alone, in this process, letting it raise what it raises.
+    """Compute one cell of a results file alone, in this process; what it raises is not caught.
 
     Parameters
     ----------
@@ -421,11 +273,11 @@ def cell(
     Warns
     -----
     UserWarning
-        Where what decides its numbers is not what it was for the file.
+        Where something that decides its numbers has changed since the file was made.
     """
     results = open(file)
     number = cell_number(results, place)
-    declared = study_of(results, study)
+    declared = restore.study_of(results, study)
     now = provenance.fingerprint(declared)
     then = contents.provenance(results)["fingerprint"]
     for name, (theirs, ours) in differences(then, now).items():

@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import shlex
 import sys
 import time
 import warnings
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 import xarray as xr
 from rich.table import Table
 
-from rsfstudy import api, terminal
+from rsfstudy import api, assignments, terminal
 from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT
+from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import FORMATS, Keeping
-from rsfstudy.compute.workers import existing_cluster
+from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, brief
-from rsfstudy.files import contents
+from rsfstudy.files import contents, places, restore
 from rsfstudy.terminal import FAILED, OK, Ended
 
 WRONG_USAGE = 2
-_SPACED = "must read start:stop:count, two finite numbers and a count"
-_MOST_POINTS = 1_000_000
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 RESULTS = (".nc", ".zarr")
 
@@ -39,14 +36,14 @@ _all = click.option("--all", "every", is_flag=True, help="Every named study.")
 
 
 def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
-    return api.directory(value)
+    return places.directory(value)
 
 
 _output = click.option(
     "--output",
     type=click.Path(file_okay=False),
     callback=_directory,
-    default=api.OUTPUT,
+    default=places.DEFAULT,
     show_default=True,
     help="Directory of the results.",
 )
@@ -97,7 +94,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
-    # not to the console of errors, which would not know of a progress bar
+    # not by `_stderr`, which knows nothing of a progress bar and would write over it
     warnings.showwarning = lambda message, *_place: print(
         terminal.spelt(f"warning: {message}"), file=sys.stderr
     )
@@ -182,8 +179,8 @@ def run(
     command = shlex.join(["rsfstudy", *sys.argv[1:]])
     keeping = Keeping(output=output, command=command, **choices)
     with _client(scheduler, serial) as client:
-        where = api.Workers(0 if serial else workers, client, time_limit, not quiet)
-        ready = [(study, api.prepared(study, keeping, where)) for study in studies]
+        where = Workers(0 if serial else workers, client, time_limit)
+        ready = [(study, api.prepared(study, keeping, where, not quiet)) for study in studies]
         for study in studies if rtol is not None else ():
             terminal.announce(study)
         if every:
@@ -204,7 +201,7 @@ def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping) -> E
 
 
 def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: Keeping) -> int:
-    """One study after the other, whatever becomes of each; only Ctrl-C ends them all."""
+    """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
     ends: list[Ended] = []
     try:
         for study, compute in ready:
@@ -255,9 +252,9 @@ def rerun(
 ) -> int:
     """Compute a results file anew from what it says of itself, and compare every number."""
     if place:
-        with warnings.catch_warnings(record=True) as told:
-            scene, found = api.cell(file, dict(map(_place, place)), study=study)
-        return terminal.outcome(scene, found, [str(warning.message) for warning in told])
+        with warnings.catch_warnings(record=True) as caught:
+            scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+        return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
     with _client(scheduler, serial) as client:
         table = api.rerun(
             file,
@@ -279,14 +276,14 @@ def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
     if not every:
         return terminal.checked(api.open(_results(name, every)[0], output))
-    status, found = OK, []
+    status, datasets = OK, []
     for what in catalogue.names():
         if (output / f"{what}.nc").exists():
-            found.append(api.open(what, output))
+            datasets.append(api.open(what, output))
         else:
             terminal.console.print(f"{what}: not run yet", style="red")
             status = FAILED
-    return max([status, terminal.all_claims(found), *map(terminal.failures, found)])
+    return max([status, terminal.all_claims(datasets), *map(terminal.failures, datasets)])
 
 
 @cli.command()
@@ -311,7 +308,7 @@ def plot(name: str | None, every: bool, output: Path, study: Path | None) -> int
     return status
 
 
-# ---- what was asked for ---------------------------------------------------------------------
+# ---- arguments ------------------------------------------------------------------------------
 
 
 def _results(name: str | None, every: bool) -> list[str]:
@@ -321,66 +318,7 @@ def _results(name: str | None, every: bool) -> list[str]:
 
 
 def _declared(study: Study, settings: tuple[str, ...], rtol: float | None) -> Study:
-    return api.declaration(study, rtol, _overrides(study, settings))
-
-
-def _overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
-    labels = {label for axis in study.axes for label in axis.labels or ()}
-    found: dict[str, Any] = {}
-    for text in settings:
-        name, values = _setting(text, labels)
-        if name in found:
-            raise InvalidValue("--set", text, f"sets {name} twice")
-        found[name] = values
-    return found
-
-
-def _place(text: str) -> tuple[str, str]:
-    """One ``AXIS=VALUE``, the value as it is."""
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise InvalidValue("--cell", text, "must read AXIS=VALUE, as in b_over_a=2")
-    return name, value
-
-
-def _setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
-    """One ``AXIS=VALUES``: a label, a single value, a comma list, or start:stop:count."""
-    name, equals, values = text.partition("=")
-    if not equals or not name.strip() or not values.strip():
-        raise InvalidValue("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
-    if values.strip() in labels:
-        return name.strip(), [values.strip()]
-    parts = [part.strip() for part in values.split(",")]
-    if len(parts) > 1:
-        if not all(parts):
-            raise InvalidValue("--set", text, "leaves a value out")
-        return name.strip(), [_value(part) for part in parts]
-    if values.count(":") == 2:
-        return name.strip(), _spaced(text, *values.split(":"))
-    if ":" in values:
-        raise InvalidValue("--set", text, _SPACED)
-    return name.strip(), _value(parts[0])
-
-
-def _spaced(text: str, start: str, stop: str, count: str) -> list[float]:
-    try:
-        first, last, points = float(start), float(stop), int(count)
-    except ValueError as error:
-        raise InvalidValue("--set", text, _SPACED) from error
-    if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
-        raise InvalidValue("--set", text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
-    spaced: list[float] = np.linspace(first, last, points).tolist()
-    return spaced
-
-
-def _value(text: str) -> Any:
-    flags = {"true": True, "false": False}
-    if text.lower() in flags:
-        return flags[text.lower()]
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return api.declaration(study, rtol, assignments.overrides(study, settings))
 
 
 @contextlib.contextmanager
@@ -395,7 +333,7 @@ def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
 
 
 def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
-    """What draws results whose figure is none of ours: what their study file says, or lines."""
+    """What draws a figure that is not part of rsfstudy: the study file's own, or plain lines."""
     from rsfstudy import plots
     from rsfstudy.plots import lines
 
@@ -404,7 +342,7 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
             catalogue.load(str(study))  # for the parts of its scenes
         return None
     try:
-        return api.own_figure(dataset, study)
+        return restore.own_figure(dataset, study)
     except RsfStudyError as error:
         if study is not None:
             raise

@@ -61,15 +61,15 @@ class InvalidValue(RsfStudyError, ValueError):
         self.value = value
 
     def at(self, place: str) -> InvalidValue:
-        """The same error, with the place it was met at."""
-        found = InvalidValue.__new__(InvalidValue)
-        Exception.__init__(found, f"{brief(place)}: {self}")
-        found.name, found.value = self.name, self.value
-        return found
+        """The same error, with the place where it arose."""
+        placed = InvalidValue.__new__(InvalidValue)
+        Exception.__init__(placed, f"{brief(place)}: {self}")
+        placed.name, placed.value = self.name, self.value
+        return placed
 
 
 class DataError(RsfStudyError):
-    """A file that is missing, damaged, or not what it is taken for."""
+    """A file that is missing, damaged, or not a results file of rsfstudy."""
 
 
 class RunError(RsfStudyError):
@@ -81,6 +81,6 @@ class Interrupted(RunError):
 
 
 def brief(text: object, most: int = _MOST_CHARACTERS) -> str:
-    """A text, such as a name a user gave, without its middle where it is too long for a message."""
+    """A text without its middle where it is too long for a message."""
     whole, half = str(text), most // 2
     return whole if len(whole) <= most else f"{whole[:half]}...{whole[-half:]}"

@@ -18,7 +18,7 @@ from rich.text import Text
 
 from rsfstudy import api
 from rsfstudy.compute import runner
-from rsfstudy.compute.plan import Plan
+from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study, settings, short
 from rsfstudy.errors import RunError
@@ -35,8 +35,8 @@ _A_NUMBER = 10
 
 
 class Plain(Console):
-    """A console that prints what a user, a cell or a file wrote as it is, brackets and all, but
-    for what would steer the terminal.
+    """A console that prints any text literally, brackets included; only control characters, which
+    would steer the terminal, are spelt out.
     """
 
     def render_str(self, text: str, **options: Any) -> Text:
@@ -44,7 +44,7 @@ class Plain(Console):
         return super().render_str(spelt(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print, or say why not: what is printed may go to a file on a full disk."""
+        """Print; the output may go to a file on a full disk, which is a `RunError`."""
         try:
             super().print(*objects, **options)
         except OSError as error:
@@ -52,9 +52,9 @@ class Plain(Console):
 
 
 def spelt(text: str) -> str:
-    """Text with what would steer the terminal spelt out."""
-    found = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-    return "".join(c if isinstance(c, str) else c.decode() for c in found)
+    """Text with its control characters spelt out."""
+    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+    return "".join(c if isinstance(c, str) else c.decode() for c in characters)
 
 
 console = Plain(markup=False, emoji=False)
@@ -80,7 +80,7 @@ def declaration(study: Study) -> None:
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
     table.add_row("cells", f"{study.size}, of which {len(Plan(study).different)} differ")
-    work, seconds = runner.estimated_cost(study)
+    work, seconds = estimated_cost(study)
     rtol = study.accuracy.rtol
     cost = f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {rtol:g}"
     table.add_row("cost", cost)
@@ -88,8 +88,8 @@ def declaration(study: Study) -> None:
 
 
 def announce(study: Study) -> None:
-    """Say what an accuracy will cost, before it does."""
-    work, seconds = runner.estimated_cost(study)
+    """Print what a run at this accuracy will cost, before it starts."""
+    work, seconds = estimated_cost(study)
     ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
     console.print(
         f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
@@ -109,7 +109,7 @@ class Ended:
     seconds : float
         Time it took.
     wrong : str
-        What is not as it should be; empty where all is.
+        What went wrong; empty if nothing did.
     verdicts : str
         How many claims had which verdict.
     """
@@ -183,17 +183,17 @@ def results(dataset: xr.Dataset, file: str) -> int:
     return failures(dataset, file)
 
 
-def outcome(scene: Scene, found: Outcome, warned: Sequence[str] = ()) -> int:
-    """One cell: what there was to warn of, its scene, its numbers and how it ended."""
+def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
+    """Print one cell: warnings, its scene, its numbers and how it ended."""
     for text in warned:
         console.print(text, style="yellow")
     fields = {name: value for name, value in scene.as_dict().items() if value is not None}
     console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()))
-    for name, value in found.values.items():
+    for name, value in ending.values.items():
         console.print(f"{name} = {value!r}")
-    text = f"{found.status.label}{': ' * bool(found.message)}{found.message}"
-    console.print(f"{text} ({found.rhs_evaluations:,} right-hand sides)")
-    return OK if found.status.is_answer else FAILED
+    text = f"{ending.status.label}{': ' * bool(ending.message)}{ending.message}"
+    console.print(f"{text} ({ending.rhs_evaluations:,} right-hand sides)")
+    return OK if ending.status.is_answer else FAILED
 
 
 def agreement(frame: pd.DataFrame) -> int:

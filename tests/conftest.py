@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from rsfstudy import Scene
-from rsfstudy.compute import workers
+from rsfstudy.compute import clusters, workers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.regimes import motion, starting
 from rsfstudy.motion.stepping import Meter, Step
@@ -61,5 +61,5 @@ def variable() -> Scene:
 def cluster(tmp_path_factory):
     """A Dask client of two worker processes."""
     log = tmp_path_factory.mktemp("cluster") / "workers.log"
-    with workers.local_cluster(2, log) as client:
+    with clusters.local_cluster(2, log) as client:
         yield client

@@ -297,7 +297,11 @@ def test_a_declaration_that_was_meddled_with(small, data):
         )
     place[key] = data.draw(JSON)
     meddled = dataset.assign_attrs(declaration=json.dumps(declared))
-    for use in (rsfstudy.check, plots.figure, lambda d: restore.study(contents.declaration(d))):
+    for use in (
+        rsfstudy.check,
+        plots.figure,
+        lambda d: restore.from_declaration(contents.declaration(d)),
+    ):
         try:
             use(meddled)
         except RsfStudyError:

@@ -13,7 +13,7 @@ from running import SMALL as LATTICE
 from running import call, named_results
 
 import rsfstudy
-from rsfstudy import cli
+from rsfstudy import assignments, cli
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim
 from rsfstudy.files import store
@@ -178,7 +178,7 @@ def test_results_that_are_not_there_are_status_1(tmp_path):
     ],
 )
 def test_settings(text, values):
-    assert cli._setting(text, ())[1] == values
+    assert assignments.setting(text, ())[1] == values
 
 
 def test_help_needs_no_results():

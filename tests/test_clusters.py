@@ -19,7 +19,7 @@ from faulty import declared
 from running import FAULTY, HANGS, SMALL, command, ended, run, same_numbers, until, until_kept
 
 import rsfstudy
-from rsfstudy.compute import provenance, workers
+from rsfstudy.compute import clusters, provenance
 from rsfstudy.errors import RunError
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
@@ -102,7 +102,7 @@ def separate(started):
 
 def test_the_same_bits_as_in_this_process(separate, tmp_path):
     """The workers write nothing, neither where they are nor where the results go."""
-    with workers.existing_cluster(separate.address, timeout=HANGS) as client:
+    with clusters.existing_cluster(separate.address, timeout=HANGS) as client:
         client.wait_for_workers(2)
         same_numbers(run(SMALL, client=client, output=tmp_path / "results"), run())
     assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
@@ -163,7 +163,7 @@ def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
 def test_a_scheduler_that_does_not_answer_is_named(address):
     with (
         pytest.raises(RunError, match=re.escape(f"no Dask scheduler answers at {address!r}")),
-        workers.existing_cluster(address, timeout=0.3),
+        clusters.existing_cluster(address, timeout=0.3),
     ):
         pass
 
@@ -173,7 +173,7 @@ def test_a_port_that_listens_and_says_nothing(tmp_path):
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
             pytest.raises(RunError, match="no Dask scheduler answers"),
-            workers.existing_cluster(address, timeout=0.3),
+            clusters.existing_cluster(address, timeout=0.3),
         ):
             pass
 
@@ -258,7 +258,7 @@ def test_the_kubernetes_file_starts_a_cluster(tmp_path):
                     start_new_session=True,
                 )
             )
-        with workers.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=HANGS) as client:
+        with clusters.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=HANGS) as client:
             same_numbers(run(client=client), run())
     finally:
         for process in started:

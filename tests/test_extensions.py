@@ -20,6 +20,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
@@ -278,7 +279,7 @@ def test_an_altered_base_is_refused_by_its_path(outside, tmp_path):
         other = {**declared, "base": {**declared["base"], **change}}
         altered = dataset.assign_attrs(declaration=json.dumps(other))
         with pytest.raises(DataError, match=complaint):
-            rsfstudy.api.study_of(altered, outside["law_family"].study)
+            restore.study_of(altered, outside["law_family"].study)
 
 
 def test_edited_code_is_refused_with_the_journal(tmp_path):

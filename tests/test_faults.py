@@ -16,9 +16,9 @@ from faulty import declared
 from running import FAULTY, HANGS, call, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli, terminal
-from rsfstudy.compute import runner, worker_log, workers
-from rsfstudy.compute.runner import Run
+from rsfstudy import Axis, Scene, Study, assignments, terminal
+from rsfstudy.compute import clusters, runner, worker_log, workers
+from rsfstudy.compute.plan import Batches
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
@@ -94,7 +94,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
 def sturdy(tmp_path_factory):
     """A worker that is started again when a cell kills it."""
     log = tmp_path_factory.mktemp("sturdy") / "workers.log"
-    with workers.local_cluster(1, log) as client:
+    with clusters.local_cluster(1, log) as client:
         yield client, log
 
 
@@ -109,7 +109,7 @@ def lost(*words, **options):
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     """One batch holds the killer and its neighbours: only the killer is recorded."""
-    monkeypatch.setattr(Run, "_batch_size", lambda *_args: 4)
+    monkeypatch.setattr(Batches, "size", lambda _self: 4)
     dataset = lost(declared("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]
@@ -294,7 +294,7 @@ def test_cells_with_awkward_labels_alone(tmp_path):
     for number, label in enumerate(AWKWARD):
         place = {"study": label, "inertia": dataset.inertia.values[1]}
         words = shlex.split(terminal._reproducing(dataset, str(tmp_path / "awkward.nc"), place))
-        cells = dict(cli._place(text) for text in words if "=" in text)
+        cells = dict(assignments.place(text) for text in words if "=" in text)
         scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
         assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
 

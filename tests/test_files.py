@@ -311,7 +311,9 @@ def test_git_tells_the_commit_and_whether_it_was_clean():
 def test_every_declaration_restores_its_study(name):
     study = catalogue.load(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = restore.study(contents.fit(described, contents.Declaration, "declaration"))
+    restored = restore.from_declaration(
+        contents.fit(described, contents.Declaration, "declaration")
+    )
     assert json.loads(json.dumps(restored.describe())) == described
     assert set(restored.scenes()) == set(study.scenes())
 

@@ -28,6 +28,7 @@ FLOORS = {
     "trajectory": 10,
     "one_scene": 10,
     "api": 10,
+    "assignments": 10,
     "terminal": 10,
     "cli": 10,
     "__init__": 10,
@@ -35,13 +36,13 @@ FLOORS = {
 }
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"compute/workers", "files/store"},
-    "distributed": {"compute/workers", "compute/worker_log"},
+    "dask": {"compute/clusters", "files/store", "files/pieces"},
+    "distributed": {"compute/clusters", "compute/workers", "compute/worker_log"},
     "matplotlib": {"plots"},
     "click": {"cli"},
     "rich": {"api", "cli", "terminal"},
     "sqlite3": {"files/journal"},
-    "zarr": {"files/pieces"},
+    "zarr": set(),  # xarray writes and reads it
 }
 
 

@@ -28,7 +28,7 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy.compute import cells, workers
+from rsfstudy.compute import cells, clusters
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.files import journal
 from rsfstudy.status import Status
@@ -195,7 +195,7 @@ def test_ctrl_c_waits_until_the_workers_are_there():
     arrived = signal.set_wakeup_fd(write)
     other.start()
 
-    @workers._interrupts_held()
+    @clusters._interrupts_held()
     def pressed(times):
         for press in range(times):
             signal.pthread_kill(other.ident, signal.SIGINT)

@@ -13,7 +13,7 @@ from running import HANGS, SMALL, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Scene, Study
-from rsfstudy.compute import runner
+from rsfstudy.compute import plan
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
@@ -24,7 +24,7 @@ def test_serial_workers_and_any_grouping_give_identical_bits(cluster, monkeypatc
     serial = run()
     same_numbers(run(client=cluster), serial)
     for size in (1, 4, 100):
-        monkeypatch.setattr(runner.Run, "_batch_size", lambda *_args, size=size: size)
+        monkeypatch.setattr(plan.Batches, "size", lambda _self, size=size: size)
         same_numbers(run(client=cluster), serial)
         same_numbers(run(), serial)
 

@@ -13,7 +13,7 @@ from scale import apart
 
 import rsfstudy
 from rsfstudy import Axis, Study, plots
-from rsfstudy.compute import plan, runner
+from rsfstudy.compute import plan
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import pieces
 from rsfstudy.slider.scene import Scene
@@ -49,7 +49,7 @@ def test_a_plan_holds_no_scenes(monkeypatch):
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     """However many cells: what waits there fills its memory."""
-    monkeypatch.setattr(runner.Run, "_batch_size", lambda *_args: 1)
+    monkeypatch.setattr(plan.Batches, "size", lambda _self: 1)
     waiting, most = set(), []
     submit = cluster.submit
 
@@ -65,12 +65,21 @@ def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     assert max(most) <= 4 + 2 * 2
 
 
-def test_batches_are_small_enough_to_lose():
-    study = declared(cells=100_000)
-    assert study.size > runner._LARGEST_BATCH * 3
-    ready = runner.Run.__new__(runner.Run)
-    ready.study, ready.workers = study, 2
-    assert ready._batch_size(study.size) == runner._LARGEST_BATCH
+@pytest.mark.parametrize(
+    ("seconds", "size"), [(0.1, 3), (60.0, 1), (1e-6, plan.LARGEST_BATCH), (np.nan, 1), (0.0, 1)]
+)
+def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
+    """A fraction of a second each, and small enough to lose."""
+    batches = plan.Batches(None, np.arange(100_000), workers=2)
+    assert batches.size() == 1
+    batches.learn(seconds)
+    assert batches.size() == size
+
+
+def test_every_worker_has_several_batches_of_a_small_study():
+    batches = plan.Batches(None, np.arange(40), workers=2)
+    batches.learn(1e-6)
+    assert batches.size() == 5
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])

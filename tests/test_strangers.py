@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from running import FAULTY, HANGS, called, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, api, terminal
+from rsfstudy import Axis, Scene, Study, terminal
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
-from rsfstudy.files import contents, store
+from rsfstudy.files import contents, restore, store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status
@@ -173,7 +173,7 @@ def used(dataset):
         contents.check(dataset)
         terminal.results(dataset, "tiny.nc")
         terminal.checked(dataset)
-        api.study_of(dataset)
+        restore.study_of(dataset)
 
 
 def test_whatever_is_missing(tiny, capsys):
@@ -471,7 +471,7 @@ def test_an_output_that_can_be_no_directory(output):
 @pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])
 def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    monkeypatch.setattr("rsfstudy.api.prepared", lambda _study, _keeping, workers: workers.threads)
+    monkeypatch.setattr("rsfstudy.api.prepared", lambda _s, _k, workers, _p: workers.threads)
     assert run(workers=most) == most
     for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
         with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):

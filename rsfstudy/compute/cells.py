@@ -1,4 +1,4 @@
-"""One cell after the other: what is computed in each, and what becomes of one that goes wrong."""
+"""Computes cells one after the other; a cell that fails becomes an outcome as well."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from rsfstudy.status import Status
 
 #: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0
-#: A cell that sleeps or waits has no more than this many times its limit, on the clock.
+#: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
 WAITING = 10.0
-#: How often finished cells are handed over, in s: in one process, and by a worker.
-_TELL, _TELL_DRIVER = 0.2, 0.5
-#: Tells this process from others.
+#: Seconds after which finished cells are handed over: in this process, and by a worker.
+_HAND_OVER, _WORKER_HANDS_OVER = 0.2, 0.5
+#: Identifies this process.
 _HERE = uuid.uuid4().hex
-#: What Dask may compute beside the cells of a worker, as a share of their CPU time.
+#: CPU time that Dask itself may use on a worker, over that of the cells.
 _BESIDE = 0.25
 #: Characters of a message that are kept.
 _LONGEST_MESSAGE = 2000
 
 #: Cells by their names.
 Batch = Sequence[tuple[bytes, Cell]]
-Found = list[tuple[bytes, Finished]]
+FinishedCells = list[tuple[bytes, Finished]]
 
 
 @dataclass(frozen=True)
@@ -79,31 +79,32 @@ class Task:
 
 
 #: Takes a task and batches, and yields the finished cells, in any order.
-Mapper = Callable[[Task, Iterable[Batch]], Generator[Found]]
+Mapper = Callable[[Task, Iterable[Batch]], Generator[FinishedCells]]
 
 
-def serial(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
-    """In this process, one cell after the other; they are handed over every now and then, because
-    keeping each for itself may cost more than computing it.
+def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
+    """Compute in this process, one cell after the other. Finished cells are handed over in groups,
+    because recording each on its own may cost more than computing it: each group is as large as all
+    before it, unless it takes too long.
     """
-    found: Found = []
-    began = told = time.monotonic()
+    finished: FinishedCells = []
+    handed_over, since = 0, time.monotonic()
     for key, cell in itertools.chain.from_iterable(batches):
-        found.append((key, computed(task, cell, let_through=(KeyboardInterrupt,))))
-        now = time.monotonic()
-        if now - told > min(_TELL, 0.5 * (told - began)):
-            yield found
-            found, told = [], time.monotonic()
-    yield found
+        finished.append((key, computed(task, cell, let_through=(KeyboardInterrupt,))))
+        if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER:
+            yield finished
+            handed_over += len(finished)
+            finished, since = [], time.monotonic()
+    yield finished
 
 
 def sendable(task: Task) -> bytes:
-    """A task as workers are given it: with all that they cannot import.
+    """A task as bytes, with all the code that workers cannot import.
 
     Raises
     ------
     InvalidValue
-        Where the measure, or a part, holds what cannot be sent.
+        Where the measure or a part of the slider cannot be serialized.
     """
     for part in task.parts:
         _dumped(part, "part", part.name)
@@ -121,12 +122,12 @@ def _dumped(value: object, what: str, name: str) -> bytes:
 
 @functools.lru_cache(maxsize=4)
 def _received(sent: bytes) -> Task:
-    """A task in a worker process, which must have the code it was made with.
+    """The task, in a worker process, which must run the same code as the process that sent it.
 
     Raises
     ------
     RunError
-        Where the worker has not.
+        Where the worker runs other code.
     """
     try:
         task: Task = cloudpickle.loads(sent)
@@ -154,8 +155,8 @@ def _received(sent: bytes) -> Task:
 
 
 def packed(batch: Batch) -> bytes:
-    """A batch as little as can be: Dask's scheduler holds on to what it has passed on. Scenes go
-    as what they are made of: a worker has their parts from the task.
+    """A batch in as few bytes as possible, because Dask's scheduler keeps what it has passed on.
+    Scenes are sent as plain values; a worker has their parts from the task.
     """
     cells = [(key, scene.as_dict(), changes) for key, (scene, changes) in batch]
     return zlib.compress(pickle.dumps(cells), level=1)
@@ -166,30 +167,30 @@ def _unpacked(batch: bytes) -> Iterator[tuple[bytes, Cell]]:
         yield key, Cell(Scene(**values), changes)
 
 
-def on_worker(sent: bytes, batch: bytes) -> Found:
-    """A packed batch in a worker process, which ends at a cell that is over its time limit.
+def on_worker(sent: bytes, batch: bytes) -> FinishedCells:
+    """Compute a packed batch in a worker process; a cell over its time limit ends the process.
 
     Returns
     -------
     list
-        Its first cells: as many as were finished when it was time to hand them over.
+        Its first cells: those that were finished when it was time to hand them over.
 
     Raises
     ------
     RunError
-        Where the worker cannot load the task, or runs other code than it was made with.
+        Where the worker cannot load the task, or runs other code than the sender.
     """
     task = _received(sent)
-    found: Found = []
+    finished: FinishedCells = []
     began = time.monotonic()
     ours = task.home == _HERE  # a worker may be a thread of the user's own process
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
         fields.know(task.parts)
         for key, cell in _unpacked(batch):
-            found.append((key, computed(task, cell)))
-            if time.monotonic() - began > _TELL_DRIVER:
+            finished.append((key, computed(task, cell)))
+            if time.monotonic() - began > _WORKER_HANDS_OVER:
                 break
-    return found
+    return finished
 
 
 def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()) -> Finished:
@@ -197,25 +198,25 @@ def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...
     begin = time.perf_counter()
     with Overhearing() as heard:
         try:
-            found = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
+            outcome = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
         except let_through:
             raise
         except BaseException as error:  # a cell may raise SystemExit or CancelledError too
             # not str(error), which may raise as well
             text = traceback.format_exception_only(error)[-1].strip()
-            found = Outcome(Status.CELL_RAISED, message=text)
-    message = brief("; ".join(filter(None, [found.message, *heard])), _LONGEST_MESSAGE)
+            outcome = Outcome(Status.CELL_RAISED, message=text)
+    message = brief("; ".join(filter(None, [outcome.message, *heard])), _LONGEST_MESSAGE)
     message = message.encode(errors="backslashreplace").decode()
-    return replace(found, message=message.replace("\0", "\\0")), time.perf_counter() - begin
+    return replace(outcome, message=message.replace("\0", "\\0")), time.perf_counter() - begin
 
 
 class _Limits:
-    """Has the system end this process where a thread takes too long over a cell.
+    """Has the operating system end this process when a thread takes too long over a cell.
 
-    CPU time is what counts: on a slow or busy machine a cell takes longer and computes no more. It
-    is that of the whole process, so as many threads as compute have as many times the limit. The
-    system acts even where a cell holds the interpreter's lock. The limit is set once a batch: all
-    of its cells but the last take no longer than `_TELL_DRIVER`.
+    CPU time is limited, because a slow or busy machine takes longer for the same computation. The
+    system counts it for the whole process, so the limit is multiplied by the number of threads that
+    compute. The system acts even while a cell holds the interpreter's lock. The limit is set once
+    for each batch: all cells but the last take no longer than `_WORKER_HANDS_OVER` together.
     """
 
     def __init__(self) -> None:
@@ -238,13 +239,13 @@ class _Limits:
 
     @staticmethod
     def _set(seconds: float) -> None:
-        """The worker's log says where each thread was; 0 s sets no limit."""
+        """Set the limit, or none for 0 s. Beyond it, the worker's log shows each thread."""
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
-            faulthandler.dump_traceback_later(WAITING * seconds + _TELL_DRIVER, exit=True)
+            faulthandler.dump_traceback_later(WAITING * seconds + _WORKER_HANDS_OVER, exit=True)
             faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
-            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _TELL_DRIVER)
+            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _WORKER_HANDS_OVER)
 
 
 _limits = _Limits()

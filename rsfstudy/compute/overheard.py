@@ -1,5 +1,5 @@
-"""What threads and destructors raise while a cell is computed. Python would print it, over the
-progress bar or on a worker where nobody looks; here the cell is told, for its message.
+"""Errors in threads and destructors while a cell is computed. Python would print them, over the
+progress bar or on a worker where nobody looks; here they become part of the cell's message.
 """
 
 from __future__ import annotations

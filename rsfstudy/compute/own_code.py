@@ -1,10 +1,10 @@
-"""The code of a user's own measure and parts: a digest of all they draw on, as it is in memory.
+"""A digest of the code of a user's own measure and parts, with all the code and constants they use.
 
-Files tell no more than what was there when they were last written; here the functions themselves
-are followed, from their classes through every name they use, so that the digest is the
-same for the same code, be it a study file, a script, a notebook or a worker, and another as soon as
-a function, a constant or a helper is. Modules that a function imports when it runs are not
-followed. Python, installed packages and rsfstudy itself have versions, and end the search.
+It is taken from the objects in memory, because files may have changed since they were imported. The
+search starts at the classes and follows every name that a function uses, so that the same code has
+the same digest in a study file, a script, a notebook or a worker, and any change of a function, a
+constant or a helper changes it. Modules that a function imports when it runs are not followed. The
+search ends at Python, installed packages and rsfstudy itself, which have versions.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _INSTALLED = tuple(
         site.getusersitepackages(),
     }
 )
-#: Made for every class, or every dataclass, and deciding no number.
+#: Attributes that Python makes for classes and dataclasses, which decide no number.
 _MADE = {
     *("__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__"),
     *("__annotate__", "__annotate_func__", "__annotations_cache__", "__firstlineno__"),
@@ -44,25 +44,25 @@ _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 
 
 def digest(*classes: type) -> str:
-    """Digest of classes and of all they draw on; "none" where all are of rsfstudy."""
+    """Digest of classes and of all they use; "none" where all of them are part of rsfstudy."""
     own = [kind for kind in classes if _is_own(kind.__module__)]
     if not own:
         return "none"
-    found, walk = hashlib.sha256(), _Walk()
+    sha256, walk = hashlib.sha256(), _Walk()
     for kind in own:
         for part in walk.parts(kind, ()):
-            found.update(part.encode(errors="surrogatepass") + b"\0")
-    return found.hexdigest()[:16]
+            sha256.update(part.encode(errors="surrogatepass") + b"\0")
+    return sha256.hexdigest()[:16]
 
 
 class _Walk:
-    """Texts that tell one state of the code from another; each object is met once."""
+    """Texts that differ wherever the code differs; each object is visited once."""
 
     def __init__(self) -> None:
         self._met: dict[Hashable, Any] = {}
 
     def parts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
-        """What tells a value from others, for code that uses these names."""
+        """The texts for a value, given the names that the code around it uses."""
         if isinstance(value, _PLAIN):
             yield repr(value)
             return
@@ -100,7 +100,7 @@ class _Walk:
             yield from self.parts(value, names)
 
     def _module(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
-        """A module counts for what is used of it."""
+        """Only what is used of a module counts."""
         if not _is_own(module.__name__):
             yield module.__name__
             return

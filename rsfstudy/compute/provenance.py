@@ -1,5 +1,5 @@
-"""What decided the numbers of a run: versions, the code of the physics, the machine, the
-command.
+"""What decides the numbers of a run: versions and the code of the physics; and who made it, where
+and how: machine, time, command.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def physics_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-#: What runs is what was imported, whatever becomes of the files.
+#: Taken at import, because later changes to the files do not change the code that runs.
 _PHYSICS_AS_IMPORTED = physics_digest()
 
 
 @functools.cache
 def code() -> dict[str, str]:
-    """Versions of everything that decides the number of a cell, whatever the study."""
+    """Versions of everything that decides the numbers of a cell in every study."""
     return {
         "physics": _PHYSICS_AS_IMPORTED,
         "numpy": version("numpy"),
@@ -48,7 +48,7 @@ def code() -> dict[str, str]:
 
 
 def fingerprint(study: Study) -> dict[str, Any]:
-    """All that decides the number of a cell but its scene and the plain fields of its measure."""
+    """All that decides the numbers of a cell, except its scene and its measure's plain fields."""
     plain = study.measure.plain_fields
     return {
         "study": f"{study.name} version {study.version}",

@@ -1,11 +1,10 @@
-"""Runs a study: plans its cells, has those computed that are not known yet, keeps what is
-finished, and assembles, reduces and writes the dataset.
+"""Runs a study: plans its cells, has the missing ones computed, records them as they finish, and
+assembles, reduces and writes the dataset.
 """
 
 from __future__ import annotations
 
 import contextlib
-import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -15,22 +14,20 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.compute import provenance
-from rsfstudy.compute.cells import Found, Mapper, Task
-from rsfstudy.compute.plan import Plan, scattered
+from rsfstudy.compute.cells import FinishedCells, Mapper, Task
+from rsfstudy.compute.plan import Batches, Plan, scattered
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import pieces, store
 from rsfstudy.files.journal import Columns, Journal, Layout
 from rsfstudy.files.lattice import assemble
+from rsfstudy.measures import Outcome
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
 
-#: Typical time of one right-hand side in s, the time a task should last, and the most cells it may
-#: hold: as many are lost with the machine.
-_SECONDS_PER_RHS, _SECONDS_PER_TASK, _LARGEST_BATCH = 6e-6, 0.3, 2000
-#: How a cell ends that ends its worker.
+#: Statuses of cells that ended their worker.
 _LOST = (Status.WORKER_LOST, Status.TIME_LIMIT_SPENT)
-#: A run ends early where so many cells have failed before any is answered.
+#: A run ends early when this many cells have failed and none has succeeded.
 _HOPELESS = 10
 
 FORMATS = ("netcdf", "zarr")
@@ -40,7 +37,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Keeping:
-    """What a run keeps, and what it does about failures.
+    """What a run writes, and what it does about failed cells.
 
     Parameters
     ----------
@@ -51,9 +48,9 @@ class Keeping:
     fresh : bool
         Forget the journal and compute every cell anew.
     keep_going : bool
-        Go on where the first cells all fail.
+        Go on even if the first cells all fail.
     despite_failures : bool
-        Reduce what there is where cells failed.
+        Reduce the other cells where some failed.
     command : str
         What the user typed, for the history.
     """
@@ -100,8 +97,8 @@ class Run:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Apply the reductions to the lattice as it is before anything is computed; where it is as
-        declared, the claims must speak of what comes out.
+        """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
+        Unless values were overridden, each claim must name a variable and a place of the result.
         """
         pending = Columns.pending(self.study.size, Layout(self.study.measure).width)
         lattice = assemble(self.study, pending, self.about)
@@ -123,18 +120,18 @@ class Run:
 
     @property
     def worker_log(self) -> Path | None:
-        """What worker processes say when they end, if anything is kept."""
+        """The file for the last words of worker processes, if anything is written."""
         return None if self.keeping.output is None else self.path(".workers.log")
 
     def __call__(self, mapper: Mapper, progress: Progress) -> xr.Dataset:
-        """Compute the cells that are not known yet, and assemble, reduce and write the dataset.
+        """Compute the missing cells, then assemble, reduce and write the dataset.
 
         Parameters
         ----------
         mapper : callable
             Where cells are computed: `cells.serial`, or what `workers.on_client` gives.
         progress : callable
-            Told the number of finished cells and of all.
+            Called with the number of finished cells and of all cells.
 
         Raises
         ------
@@ -169,25 +166,22 @@ class Run:
             self.worker_log.unlink(missing_ok=True)  # of an earlier run
         if not len(missing):
             return
-        batches = self.plan.batches(missing, self._batch_size(len(missing)))
+        batches = Batches(self.plan, missing, self.workers)
         with contextlib.closing(mapper(self.task, batches)) as arriving:
-            for found in arriving:
-                journal.add(found)
-                self._tell_lost(found)
-                lost = [outcome for _key, (outcome, _s) in found if not outcome.status.is_answer]
-                failed, done = failed + len(lost), done + len(found)
+            for finished in arriving:
+                journal.add(finished)
+                self._tell_lost(finished)
+                for _key, (outcome, seconds) in finished:
+                    batches.learn(seconds)
+                    failed += not outcome.status.is_answer
+                done += len(finished)
                 progress(done, total)
                 if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
-                    first = lost[0]
-                    raise RunError(
-                        f"the first {done} cells all failed, the last with {first.status.label}"
-                        f"{': ' * bool(first.message)}{first.message}. "
-                        "Mend that, or go on all the same with --keep-going (keep_going=True)"
-                    )
+                    raise _hopeless(done, outcome)
 
-    def _tell_lost(self, found: Found) -> None:
-        """Name the cells that ended their worker, as soon as they have."""
-        for key, (outcome, _seconds) in found:
+    def _tell_lost(self, finished: FinishedCells) -> None:
+        """Warn of cells that ended their worker."""
+        for key, (outcome, _seconds) in finished:
             if outcome.status in _LOST:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
@@ -196,28 +190,21 @@ class Run:
                     stacklevel=2,
                 )
 
-    def _batch_size(self, cells: int) -> int:
-        """Cells per task: long enough to be worth sending, short enough to balance the workers."""
-        work = self.study.measure.expected_work(self.study.accuracy)
-        worthwhile = _SECONDS_PER_TASK / (_SECONDS_PER_RHS * work)
-        balanced = cells / (4 * self.workers)
-        return max(1, math.ceil(min(worthwhile, balanced, _LARGEST_BATCH)))
-
-    # ---- what is made of the cells --------------------------------------------------------------
+    # ---- from cells to results ------------------------------------------------------------------
 
     def _finished(self, journal: Journal) -> xr.Dataset:
         zarr = self.keeping.format == "zarr"
         with self._reducing(journal):
-            found = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
+            results = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
         if self.keeping.output is None:
-            return store.sealed(found)
-        written = found if zarr else store.write(found, self.path(".nc"))
+            return store.sealed(results)
+        written = results if zarr else store.write(results, self.path(".nc"))
         for stale in (".partial.nc", ".partial.png", ".unreduced.nc", ".unreduced.png"):
             self.path(stale).unlink(missing_ok=True)
         return written
 
     def lattice(self, journal: Journal) -> xr.Dataset:
-        """What is known, as a dataset without reductions."""
+        """The dataset of the cells in the journal, without reductions."""
         return assemble(self.study, journal.read(self.plan.keys), self.about)
 
     def _reduced(self, lattice: xr.Dataset) -> xr.Dataset:
@@ -232,7 +219,7 @@ class Run:
 
     @contextlib.contextmanager
     def _reducing(self, journal: Journal) -> Iterator[None]:
-        """Keep the cells where they are all there but cannot be reduced."""
+        """Write the cells without reductions where a reduction raises."""
         try:
             yield
         except RsfStudyError:
@@ -246,7 +233,7 @@ class Run:
             raise DataError(f"{text}; its cells are in {path}, without reductions.") from error
 
     def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
-        """The error of a run that ended early, once what is finished has been kept."""
+        """Write what is finished, and give the error for a run that ended early."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.keeping.output is not None and self.keeping.format == "netcdf":
             lattice = self.lattice(journal)
@@ -260,7 +247,7 @@ class Run:
         return kind(why + self._resumable(journal))
 
     def _resumable(self, journal: Journal) -> str:
-        """How much is finished, where it is, and how to go on."""
+        """A sentence: how many cells are finished, where they are, and how to go on."""
         known = int((journal.ended(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.keeping.output is None:
@@ -269,12 +256,12 @@ class Run:
         return f"{text} and kept in {where}; the same command goes on from there."
 
 
-def estimated_cost(study: Study) -> tuple[int, float]:
-    """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
-    core.
-    """
-    work = len(Plan(study).different) * study.measure.expected_work(study.accuracy)
-    return round(work), work * _SECONDS_PER_RHS
+def _hopeless(cells: int, last: Outcome) -> RunError:
+    return RunError(
+        f"the first {cells} cells all failed, the last with {last.status.label}"
+        f"{': ' * bool(last.message)}{last.message}. "
+        "Mend that, or go on all the same with --keep-going (keep_going=True)"
+    )
 
 
 def counts(dataset: xr.Dataset) -> Mapping[str, int]:

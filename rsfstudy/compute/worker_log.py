@@ -1,5 +1,5 @@
-"""A file for what worker processes, and what they stand on, say when something ends them: dumps of
-threads, tracebacks of Dask, objects that multiprocessing found left behind.
+"""A file for the last words of worker processes and of the libraries below them: stacks of threads,
+tracebacks of Dask, objects that multiprocessing finds left behind.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from distributed import WorkerPlugin
 from rsfstudy.errors import DataError
 
 _ERRORS = 2
-#: What Dask logs with in this process, and what it stands on.
+#: Loggers in this process of Dask and of the libraries below it.
 _LOGGERS = ("distributed", "tornado", "asyncio")
 
 
 @contextlib.contextmanager
 def kept(log: Path | None) -> Iterator[Path]:
-    """The file, ready to be written to; a temporary one where none is named. It does not stay where
-    nothing was said.
+    """The file, ready for writing; a temporary one where no name is given. It is removed if
+    it stays empty.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def kept(log: Path | None) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _logged(log: Path) -> Iterator[None]:
-    """Errors that are logged in this process are written there, and nowhere else."""
+    """Write errors that are logged in this process to the file, and nowhere else."""
     handler = logging.FileHandler(log, delay=True)
     handler.setLevel(logging.ERROR)
     handler.setFormatter(logging.Formatter("%(asctime)s - %(name)s - %(message)s"))
@@ -71,12 +71,12 @@ def _logged(log: Path) -> Iterator[None]:
 
 
 def start_tracker(log: Path) -> None:
-    """See that multiprocessing's resource tracker runs: where this starts it, it writes there."""
+    """Start multiprocessing's resource tracker if it does not run; its errors go to `log`."""
     terminal = os.dup(_ERRORS) if _has_errors() else None
     try:
         _redirect(log)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # somebody may have killed the one before
+            warnings.simplefilter("ignore")  # an earlier one may have been killed
             resource_tracker.ensure_running()
     finally:
         if terminal is not None:
@@ -101,7 +101,7 @@ class WritesTo(WorkerPlugin):
 
 
 def _redirect(log: Path) -> None:
-    """Write errors of this process there, if it has any and there is such a place."""
+    """Send the standard error of this process to the file, if both can be opened."""
     if not _has_errors():
         return
     with contextlib.suppress(OSError):
@@ -111,5 +111,5 @@ def _redirect(log: Path) -> None:
 
 
 def _has_errors() -> bool:
-    """False where they were closed before: their number is that of another file by now."""
+    """Whether standard error is open; if not, its number may belong to another file by now."""
     return sys.__stderr__ is not None

@@ -1,52 +1,111 @@
-"""Dask workers: batches of cells are sent to them, and a cell that kills its worker is found.
+"""Sends batches of cells to Dask workers, and finds a cell that kills its worker.
 
-A worker that dies takes its whole batch with it, and may take others that waited there. The cells
-of all these are then sent one at a time while nothing else runs, so that only the cell that dies
-alone is blamed.
+When a worker dies, its batch is lost, and perhaps others that were waiting there. All these cells
+are then sent one at a time, while nothing else runs, so that only the cell that kills a worker on
+its own is blamed.
 """
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import itertools
-import logging
 import math
-import signal
-import sys
-import threading
+import os
 import time
 import warnings
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rsfstudy.compute.cells import WAITING, Batch, Found, Mapper, Task, on_worker, packed, sendable
-from rsfstudy.errors import RunError, brief
+from rsfstudy.compute.cells import (
+    DEFAULT_TIME_LIMIT,
+    WAITING,
+    Batch,
+    FinishedCells,
+    Mapper,
+    Task,
+    on_worker,
+    packed,
+    sendable,
+    serial,
+)
+from rsfstudy.compute.clusters import local_cluster
+from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-#: Time in s after which a process of this machine that does not answer never will.
-_HANGS = 600
-#: Time in s without any worker after which a run says so, and after which it ends.
+#: Longest time limit in s, three years; the system's timers take `WAITING` times that, and not
+#: much more.
+_LONGEST = 1e8
+#: Most worker processes for each core, and most on a machine with few cores.
+_A_CORE, _ANYWHERE = 4, 8
+#: Time in s without any worker after which a run warns, and after which it ends.
 TELL, PATIENCE = 30.0, 600.0
 _LOOK = 2.0
 #: How often a cell may kill its worker before it is recorded as the culprit.
 _TRIES = 2
 
 
+@dataclass(frozen=True)
+class Workers:
+    """Where cells are computed.
+
+    Parameters
+    ----------
+    processes : int
+        Worker processes started on this machine; with 0, cells are computed in this process.
+    client : distributed.Client, optional
+        A Dask cluster to use instead.
+    time_limit : float
+        CPU time in s that a cell may take on a worker.
+    """
+
+    processes: int = 2
+    client: Any = None
+    time_limit: float = DEFAULT_TIME_LIMIT
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
+        if not whole or self.processes < 0:
+            raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
+        most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
+        if self.client is None and self.processes > most:
+            rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
+            remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
+            raise InvalidValue("workers", self.processes, rule, remedy=remedy)
+        if self.client is not None and not hasattr(self.client, "submit"):
+            raise InvalidValue("client", self.client, "must be a distributed.Client")
+        limit: object = self.time_limit
+        if not isinstance(limit, int | float) or not 0.0 < limit <= _LONGEST:
+            rule = f"must be a number greater than 0, up to {_LONGEST:g} s"
+            raise InvalidValue("time_limit", limit, rule)
+
+    def threads(self) -> int:
+        """Number of cells that are computed at the same time."""
+        at_a_time = self.processes if self.client is None else threads(self.client)
+        return max(1, at_a_time)
+
+    def mapper(self, log: Path | None = None) -> Mapper:
+        """What computes batches of cells there; `log` is where processes of this machine write
+        errors.
+        """
+        if self.client is not None:
+            return on_client(self.client)
+        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
+
+
 def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
-    """On the workers of a Dask client; they need no shared file system.
+    """Compute on the workers of a Dask client, which need no shared file system.
 
     Parameters
     ----------
     client : distributed.Client
     log : str
-        Where a worker that ends says why, for messages.
+        Where workers write errors, for messages.
     """
 
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         sent, waiting = sendable(task), _Waiting(batches)
         running: dict[Any, Batch] = {}
         suspects: list[Any] = []
@@ -57,12 +116,12 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                 if running:
                     for future in _finished(client, running):
                         batch = running.pop(future)
-                        found = _result(future)
-                        if found is None:
+                        finished = _result(future)
+                        if finished is None:
                             suspects += batch
                         else:
-                            waiting.back(batch[len(found) :])
-                            yield found
+                            waiting.back(batch[len(finished) :])
+                            yield finished
                 elif suspects:
                     warnings.warn(
                         f"a worker ended: the cells it held ({len(suspects)}) are computed again, "
@@ -81,7 +140,7 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
 
 
 class _Waiting(Iterator[Batch]):
-    """Batches that are not sent yet; what a worker left of one is the next."""
+    """Batches that are not sent yet; the rest of one that a worker returned comes first."""
 
     def __init__(self, batches: Iterable[Batch]) -> None:
         self._new = iter(batches)
@@ -91,19 +150,19 @@ class _Waiting(Iterator[Batch]):
         return self._left.pop() if self._left else next(self._new)
 
     def back(self, rest: Batch) -> None:
-        """Take what is left of a batch."""
+        """Put the rest of a batch back."""
         self._left += [rest] if rest else []
 
 
 def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]) -> None:
-    """Keep the workers busy, and little more: what waits fills the scheduler's memory."""
+    """Send just enough batches to keep the workers busy: more would fill the scheduler's memory."""
     enough = 4 + 2 * threads(client)
     for batch in itertools.islice(waiting, max(0, enough - len(running))):
         running[client.submit(on_worker, sent, packed(batch), pure=False)] = batch
 
 
 def threads(client: Any) -> int:
-    """How many cells the workers of a client compute at a time."""
+    """Number of cells that the workers of a client compute at the same time."""
     if client.status == "connecting":  # again
         raise RunError("the Dask scheduler is lost")
     if client.status != "running":
@@ -115,16 +174,16 @@ def threads(client: Any) -> int:
 
 
 def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
-    """Futures that are finished, once there are any.
+    """Wait for futures to finish, and give those that have.
 
     Raises
     ------
     RunError
-        If the scheduler is lost, or there has been no worker for a while.
+        If the scheduler is lost, or there has been no worker for `PATIENCE` seconds.
     """
     from distributed import wait
 
-    seen, told = time.monotonic(), False
+    seen, warned = time.monotonic(), False
     while True:
         try:
             done: Iterable[Any] = wait(
@@ -134,9 +193,9 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
         except TimeoutError:
             waited = time.monotonic() - seen
             if threads(client):
-                seen, told = time.monotonic(), False
-            elif waited > TELL and not told:
-                told = True
+                seen, warned = time.monotonic(), False
+            elif waited > TELL and not warned:
+                warned = True
                 warnings.warn(
                     f"the Dask cluster has no worker: waiting {PATIENCE:g} s for one", stacklevel=2
                 )
@@ -148,14 +207,18 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
             raise RunError("the Dask scheduler is lost") from error
 
 
-def _result(future: Any) -> Found | None:
-    """What a batch gave, or None where its worker died; anything else is a failure of the
-    cluster.
+def _result(future: Any) -> FinishedCells | None:
+    """The finished cells of a batch, or None where its worker died.
+
+    Raises
+    ------
+    RunError
+        If the cluster failed in any other way.
     """
     from distributed import KilledWorker
 
     try:
-        found: Found = future.result()
+        finished: FinishedCells = future.result()
     except KilledWorker:
         return None
     except RunError:
@@ -167,22 +230,22 @@ def _result(future: Any) -> Found | None:
             f"the Dask cluster gave up ({type(error).__name__}: {error}). "
             "Its workers need the same rsfstudy"
         ) from error
-    return found
+    return finished
 
 
-def _alone(client: Any, task: Task, batch: Batch) -> Found:
-    """A suspect by itself; the culprit where its worker dies again."""
+def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
+    """Compute a suspect cell alone; if its worker dies again, the cell is recorded as lost."""
     for _ in range(_TRIES):
         _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
         began = time.monotonic()
         future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
         try:
             _finished(client, [future])
-            found = _result(future)
+            finished = _result(future)
         finally:
             client.cancel([future])
-        if found is not None:
-            return found
+        if finished is not None:
+            return finished
         seconds = time.monotonic() - began
         if seconds > task.time_limit:
             text = (
@@ -198,153 +261,12 @@ def _alone(client: Any, task: Task, batch: Batch) -> Found:
 
 
 def on_local_cluster(processes: int, log: Path | None) -> Mapper:
-    """On worker processes of this machine, started when there is something to compute."""
+    """Compute on worker processes of this machine, started when the first cell is needed."""
 
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[Found]:
+    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         from rsfstudy.compute import worker_log
 
         with worker_log.kept(log) as file, local_cluster(processes, file) as client:
             yield from on_client(client, str(file))(task, batches)
 
     return mapper
-
-
-@contextlib.contextmanager
-def _script_not_imported() -> Iterator[None]:
-    """Keep worker processes from importing the user's script again, which would start workers of
-    its own.
-
-    Multiprocessing finds the script by these two names; what a script defines reaches the workers
-    by value all the same.
-    """
-    main = sys.modules["__main__"]
-    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
-    for name in hidden:
-        setattr(main, name, None)
-    try:
-        yield
-    finally:
-        for name, value in hidden.items():
-            setattr(main, name, value)
-
-
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits until this is over, and never reaches a process that is started within: on
-    Ctrl-C it is the driver that ends a run, and its workers. Pressed twice, it does not wait.
-    """
-    held: list[int] = []
-
-    def hold(number: int, _frame: object) -> None:
-        if held:
-            raise KeyboardInterrupt
-        held.append(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, hold)
-    # threads that are started now, and their processes, keep what is blocked now
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        signal.signal(signal.SIGINT, handler)
-    if held:
-        raise KeyboardInterrupt
-
-
-@contextlib.contextmanager
-def local_cluster(workers: int, log: Path) -> Iterator[Any]:
-    """A Dask client of worker processes on this machine, with one thread each.
-
-    Parameters
-    ----------
-    workers : int
-        How many.
-    log : Path
-        Where they write errors.
-
-    Raises
-    ------
-    RunError
-        If they cannot be started.
-    """
-    import dask
-    from distributed import Client, LocalCluster
-
-    from rsfstudy.compute import worker_log
-
-    quiet = {
-        "distributed.scheduler.allowed-failures": 0,
-        # nothing but a time limit ends a worker that is slow, or held up by its cell
-        "distributed.scheduler.worker-ttl": None,
-        # Dask closes for good a worker that died and happens to be starting again this long after
-        "distributed.deploy.lost-worker-timeout": "1000 days",
-        # what each process does beside its cells: 50 ticks and 100 looks at the stack a second
-        "distributed.admin.tick.interval": "1s",
-        "distributed.worker.profile.enabled": False,
-        "distributed.comm.timeouts.connect": f"{_HANGS}s",
-        "distributed.nanny.pre-spawn-environ": dict.fromkeys(
-            ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
-        ),
-    }
-    with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
-        worker_log.start_tracker(log)  # first: it unblocks signals that `_interrupts_held` blocks
-        started = stack.enter_context(contextlib.ExitStack())
-        started.enter_context(_interrupts_held())
-        try:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=":0",
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.ERROR,
-                plugins=(worker_log.WritesTo(log.resolve()),),
-            )
-        except Exception as error:
-            why = str(error).rstrip(".")
-            raise RunError(f"a worker process could not be started ({why})") from error
-        stack.enter_context(cluster)
-        started.close()
-        client = stack.enter_context(Client(cluster))
-        stack.callback(worker_log.start_tracker, log)  # if it was killed
-        yield client
-
-
-async def _greeting(address: str) -> None:
-    """What Dask says first; its client would wait for ever where something else listens."""
-    from distributed.comm.core import connect
-
-    comm = await connect(address)
-    comm.abort()
-
-
-@contextlib.contextmanager
-def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
-    """A client of a Dask scheduler that is already running.
-
-    Raises
-    ------
-    RunError
-        If none answers at the address.
-    """
-    from distributed import Client
-    from distributed.utils import silence_logging_cmgr
-
-    # what goes wrong with a cluster is told once, by the run; Dask's client has more to say until
-    # it is closed
-    with silence_logging_cmgr(logging.CRITICAL + 1):
-        try:
-            asyncio.run(asyncio.wait_for(_greeting(address), timeout))
-            client = Client(address, timeout=timeout)
-        except Exception as error:  # what Dask makes of an address that is none has no end
-            raise RunError(
-                f"no Dask scheduler answers at {brief(address)!r}: "
-                f"{brief(error) or 'it took too long'}. "
-                "Start one with `dask scheduler`, or leave --scheduler out."
-            ) from error
-        with client:
-            yield client

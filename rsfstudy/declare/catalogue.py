@@ -21,8 +21,8 @@ _PACKAGE = "rsfstudy.named_studies"
 def names() -> tuple[str, ...]:
     """Names of the studies, in alphabetical order; files that start with _ are shared by them."""
     package = importlib.import_module(_PACKAGE)
-    found = (module.name for module in pkgutil.iter_modules(package.__path__))
-    return tuple(sorted(name for name in found if not name.startswith("_")))
+    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
+    return tuple(sorted(name for name in modules if not name.startswith("_")))
 
 
 def load(name: str) -> Study:

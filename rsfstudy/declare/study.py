@@ -214,11 +214,11 @@ class Study:
         """Parts of the slider that are the user's own, by name, as they were when the study was
         declared.
         """
-        found: dict[str, type[Part]] = {}
+        parts: dict[str, type[Part]] = {}
         for axis in self.axes:
-            found |= own_named(axis.fields, axis.rows)
-        found |= {part.name: part for part in self.base.own_parts}
-        return dict(sorted(found.items()))
+            parts |= own_named(axis.fields, axis.rows)
+        parts |= {part.name: part for part in self.base.own_parts}
+        return dict(sorted(parts.items()))
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:

@@ -1,1 +1,1 @@
-"""What is kept and read back: finished cells, results files, and what they may hold."""
+"""Finished cells and results files: written, checked and read back."""

@@ -1,4 +1,4 @@
-"""One results dataset held against another, and a cell found by its place."""
+"""Compares one results dataset with another, and finds a cell by its place on the axes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     -------
     pandas.DataFrame
         ``variable``, ``values``, ``identical`` and ``largest_difference``; in ``attrs["differs"]``
-        what decides a number and is not the same in both. Times, which no two runs share, are left
-        out.
+        what decides a number and differs between them. Measured times, which no two runs share, are
+        left out.
     """
     pending = [d["status"] == int(Status.PENDING) for d in (theirs, ours)]
     both = ~(pending[0] | pending[1])
@@ -34,15 +34,15 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         if name in MEASURED_TIMES:
             continue
         if name not in ours or not _comparable(theirs[name], ours[name]):
-            gone = {"values": theirs[name].size, "identical": 0, "largest_difference": np.nan}
-            rows.append({"variable": name, **gone})
+            missing = {"values": theirs[name].size, "identical": 0, "largest_difference": np.nan}
+            rows.append({"variable": name, **missing})
             continue
         a, b = theirs[name], ours[name]
         known = np.broadcast_to(True, a.shape)
         if set(both.dims) <= set(a.dims):
             known = np.asarray(both.broadcast_like(a).transpose(*a.dims))
         elif not bool(both.all()):
-            continue  # a reduction over cells that one of them has not
+            continue  # a reduction that draws on cells missing in one of them
         rows.append({"variable": name, **_agreement(a.values[known], b.values[known])})
     frame = pd.DataFrame(rows)
     frame.attrs["differs"] = differences(*(provenance(d)["fingerprint"] for d in (theirs, ours)))
@@ -50,7 +50,7 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
 
 
 def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
-    """Whether values of the same kind lie in the same way."""
+    """Whether two variables have the same shape, and both or neither hold real numbers."""
     return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
 
 
@@ -65,8 +65,8 @@ def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
 
 
 def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """What decides numbers and is not the same in two fingerprints, be they read from a file or
-    not: theirs and ours.
+    """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
+    file.
     """
     theirs, ours = (json.loads(json.dumps(fingerprint)) for fingerprint in (theirs, ours))
     return {
@@ -96,16 +96,16 @@ def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
                 raise InvalidValue("cell", dict(place), f"leaves {dimension} open")
             index.append(0)
             continue
-        found = _on_axis(values, place[dimension])
-        if found is None:
+        number = _on_axis(values, place[dimension])
+        if number is None:
             rule = "is not on its axis"
             raise InvalidValue(dimension, place[dimension], rule, choices=map(str, values))
-        index.append(found)
+        index.append(number)
     return int(np.ravel_multi_index(index, status.shape))
 
 
 def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
-    """Where a value stands on an axis: the label itself, or the nearest number that is close."""
+    """Index of a value on an axis: an equal label, or the nearest number if it is close enough."""
     if values.dtype.kind in "iuf":
         try:
             number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
@@ -116,5 +116,5 @@ def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
         gaps = np.abs(values - number)
         nearest = int(np.argmin(gaps))
         return nearest if gaps[nearest] <= 1e-5 * abs(number) else None
-    found = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
-    return int(found[0]) if found.size else None
+    places = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
+    return int(places[0]) if places.size else None

@@ -1,8 +1,8 @@
-"""What a results file holds: each part, and what it must be. It is checked here before anything
-else uses it, and what is refused is named by its path, as in ``declaration.claims[3].id``.
+"""The parts of a results file, and what each must be. A file is checked here before anything else
+uses it; an error names the part that is wrong by its path, as in ``declaration.claims[3].id``.
 
-The classes are the layout. Nothing that is missing is filled in: with a default in its place, the
-results would be those of another study.
+The classes describe the layout. A missing part is never replaced by a default: the results would
+then be those of another study.
 """
 
 from __future__ import annotations
@@ -107,12 +107,12 @@ _OF_EVERY_LATTICE = {
 
 
 def check(dataset: xr.Dataset) -> None:
-    """Hold all that rsfstudy uses of a results file against what it must be.
+    """Check every part of a results file that rsfstudy uses.
 
     Raises
     ------
     DataError
-        Naming the first part that is missing or something else.
+        Names the first part that is missing or wrong.
     """
     attrs = fit({"reduced_despite": "", **dataset.attrs}, Attributes, "")
     name = declaration(dataset).name
@@ -124,7 +124,7 @@ def check(dataset: xr.Dataset) -> None:
             raise refused(variable, "is missing")
     digests = fit(_from_json(dataset, "digests"), Mapping[str, str], "digests")
     for variable in map(str, dataset.variables):
-        if variable in digests or variable in _OF_EVERY_LATTICE:  # others are of a notebook's
+        if variable in digests or variable in _OF_EVERY_LATTICE:  # a notebook may have added others
             _check_kind(variable, dataset[variable])
     _check_lattice(dataset)
 
@@ -138,10 +138,10 @@ def declaration(dataset: xr.Dataset) -> Declaration:
         If the dataset carries none, or not as rsfstudy writes it.
     """
     plain = _from_json(dataset, "declaration")
-    found: Declaration = fit(plain, Declaration, "declaration")
+    declared: Declaration = fit(plain, Declaration, "declaration")
     if provenance(dataset)["fingerprint"]["own_code"] == "none":
-        scene(found.base)
-    return found
+        scene(declared.base)
+    return declared
 
 
 def scene(
@@ -178,7 +178,7 @@ def scene(
 
 
 def own_part(declared: Declaration) -> tuple[str, str] | None:
-    """The slot, and the name, of a part of the user's own that cells have, if there is any."""
+    """Slot and name of a part that the user wrote, if any cell has one."""
     rows: list[Mapping[str, Any]] = [declared.base]
     for axis in declared.axes:
         dimension, values = axis["dimension"], axis["values"]
@@ -201,8 +201,8 @@ def provenance(dataset: xr.Dataset) -> Provenance:
     DataError
         If the dataset does not say, or not as rsfstudy writes it.
     """
-    found: Provenance = fit(_from_json(dataset, "provenance"), Provenance, "provenance")
-    return found
+    origin: Provenance = fit(_from_json(dataset, "provenance"), Provenance, "provenance")
+    return origin
 
 
 def _from_json(dataset: xr.Dataset, name: str) -> Any:
@@ -215,7 +215,7 @@ def _from_json(dataset: xr.Dataset, name: str) -> Any:
 
 
 def _check_kind(name: str, values: xr.DataArray) -> None:
-    """Refuse what holds neither numbers nor texts, or not those it must."""
+    """Refuse a variable that does not hold the kind of numbers or texts it must hold."""
     kinds, wanted = _OF_EVERY_LATTICE.get(name, _KINDS)
     kind = values.dtype.kind
     if kind not in kinds:
@@ -225,7 +225,7 @@ def _check_kind(name: str, values: xr.DataArray) -> None:
 
 
 def _check_lattice(dataset: xr.Dataset) -> None:
-    """Refuse cells that have no place, or no status we know."""
+    """Refuse cells without coordinates, and status codes that are unknown."""
     dims = dataset["status"].dims
     for name in _OF_EVERY_LATTICE:
         if dataset[name].dims != dims:
@@ -238,7 +238,7 @@ def _check_lattice(dataset: xr.Dataset) -> None:
         raise refused("status", f"is {unknown[0]} in a cell, which is the code of none")
 
 
-# ---- plain data, held against what it must be ----------------------------------------------------
+# ---- plain data, checked against annotations -----------------------------------------------------
 
 
 def refused(path: str, why: str) -> DataError:
@@ -250,13 +250,13 @@ def refused(path: str, why: str) -> DataError:
 
 
 def fit(value: Any, kind: Any, path: str) -> Any:
-    """Plain data as what an annotation says it must be: a dataclass from a mapping of all its
-    fields, a tuple from a list.
+    """Convert plain data to the type that an annotation names: a mapping of all its fields to a
+    dataclass, a list to a tuple.
 
     Parameters
     ----------
     value : object
-        What JSON gives; or an object of a dataclass, made already.
+        What JSON gives, or an object of a dataclass that exists already.
     kind : type
         A type, or another annotation of a field.
     path : str
@@ -265,7 +265,7 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     Raises
     ------
     DataError
-        Where it is something else, naming the path.
+        Where it cannot be converted; the text names the path.
     """
     origin, of = get_origin(kind), get_args(kind)
     if kind is Any or _is_one(value, kind):
@@ -342,7 +342,7 @@ def _object(value: Mapping[str, Any], kind: Any, path: str) -> Any:
 
 
 def _fitted(value: Mapping[str, Any], kinds: Mapping[str, Any], path: str) -> dict[str, Any]:
-    """The parts of a mapping that must be there."""
+    """The required parts of a mapping, each converted to its type."""
     for name in kinds:
         if name not in value:
             raise refused(_inside(path, name), "is missing")

@@ -41,7 +41,7 @@ _REMEDY = "Choose another --output, or start over with --fresh."
 
 
 class Layout:
-    """Where the numbers of a measure stand in one row of float64."""
+    """The position of each number of a measure in a row of float64."""
 
     def __init__(self, measure: Measure) -> None:
         sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
@@ -73,7 +73,7 @@ class Columns:
 
     @classmethod
     def pending(cls, cells: int, width: int) -> Columns:
-        """Cells of which nothing is known."""
+        """Cells that are not computed yet."""
         return cls(
             np.full(cells, int(Status.PENDING), dtype=np.int8),
             np.full(cells, "", dtype=object),
@@ -91,7 +91,7 @@ class Journal:
     path : Path or None
         The SQLite file; None keeps them in memory.
     fingerprint : mapping
-        All that decides the numbers of a cell but what names it, as plain data.
+        All that decides the numbers of a cell, except what its key holds, as plain data.
     layout : Layout
         The numbers of a cell.
     fresh : bool
@@ -175,17 +175,17 @@ class Journal:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
     def ended(self, keys: np.ndarray) -> np.ndarray:
-        """The status of each cell, `pending` where none is kept."""
+        """The status of each cell; `pending` for a cell that is not in the journal."""
         codes = {status.name: int(status) for status in Status}
-        found = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
+        statuses = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
         for start, rows in self._rows(keys, "status"):
             for cell, key in enumerate(keys[start : start + _AT_A_TIME], start):
                 (name,) = rows.get(key.tobytes(), (Status.PENDING.name,))
-                found[cell] = codes.get(name, int(Status.PENDING))
-        return found
+                statuses[cell] = codes.get(name, int(Status.PENDING))
+        return statuses
 
     def read(self, keys: np.ndarray) -> Columns:
-        """What is known of some cells, in this order.
+        """What is known of these cells, in the order of `keys`.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class Journal:
         return columns
 
     def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[int, dict[bytes, Any]]]:
-        """Rows by key, for some keys at a time, with the place where those begin."""
+        """Rows by key, a group of keys at a time, each with the index at which its group starts."""
         for start in range(0, len(keys), _AT_A_TIME):
             wanted = {key.tobytes() for key in keys[start : start + _AT_A_TIME]}
             marks = ", ".join("?" * len(wanted))
@@ -226,7 +226,7 @@ class Journal:
 
 
 def _alone(path: Path | str) -> sqlite3.Connection:
-    """A database that nobody else may use until it is closed, or this process ends."""
+    """Open a database for this process alone, until it is closed or the process ends."""
     db = sqlite3.connect(path, timeout=_WAIT)
     try:
         db.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -243,8 +243,8 @@ def _is_taken(error: Exception) -> bool:
 
 
 def _forget(path: Path) -> None:
-    """Remove a journal that no other run uses, and what SQLite left beside it of a write that was
-    cut short.
+    """Remove a journal, unless another run uses it, and the rollback file that an interrupted write
+    left beside it.
     """
     if path.exists():
         try:
@@ -263,7 +263,7 @@ def _checksum(row: Iterable[Any]) -> int:
 
 
 def _brief(value: object) -> str:
-    """A value of a fingerprint as a message has room for it."""
+    """A value of a fingerprint, shortened for a message."""
     return textwrap.shorten(str(value), 70, placeholder="...")
 
 

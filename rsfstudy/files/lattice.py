@@ -1,4 +1,4 @@
-"""From what is known of the cells to one self-describing dataset."""
+"""Assembles finished cells into one self-describing dataset."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _COMMENT = (
     "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
     "V_*; the attribute scale of a variable says which."
 )
-#: What only the one who runs a study can say, in the environment: RSFSTUDY_LICENSE and so on.
+#: Attributes that the user sets in the environment: RSFSTUDY_LICENSE and so on.
 _CREDITS = ("creator_name", "creator_email", "institution", "license", "acknowledgement")
 
 
@@ -47,7 +47,7 @@ def _known(columns: Columns) -> int:
 def variables(
     study: Study, columns: Columns, shape: tuple[int, ...]
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """Variables of some cells: those of the measure, and how each cell ended.
+    """Variables for a block of cells: the numbers of the measure, and how each cell ended.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def variables(
     columns : Columns
         What is known of the cells, in row-major order.
     shape : tuple of int
-        Lengths of the dimensions the cells fill.
+        Shape of the block.
     """
     layout, dims, own = Layout(study.measure), study.dimensions, study.quantities
-    found = {}
+    described = {}
     for name, inner in study.measure.variables.items():
         values = columns.numbers[:, layout.places[name]].reshape(shape + layout.shapes[name])
-        found[name] = ((*dims, *inner), values, _about(name, own))
+        described[name] = ((*dims, *inner), values, _about(name, own))
     kept = {
         "status": columns.status,
         "rhs_evaluations": columns.work,
@@ -69,18 +69,18 @@ def variables(
         "message": columns.message,
     }
     for name, values in kept.items():
-        found[name] = (dims, values.reshape(shape), _about(name, {}))
-    found["status"][2].update(
+        described[name] = (dims, values.reshape(shape), _about(name, {}))
+    described["status"][2].update(
         flag_values=np.array([int(s) for s in Status], dtype=np.int8),
         flag_meanings=" ".join(s.label for s in Status),
         comment="; ".join(f"{s.label}: {s.meaning}" for s in Status),
     )
-    for name, (_dims, _values, about) in found.items():
+    for name, (_dims, _values, about) in described.items():
         about["coverage_content_type"] = coverage(name)
     for name in study.measure.variables:
-        companions = [n for n in (f"{name}_error", "status") if n in found and n != name]
-        found[name][2]["ancillary_variables"] = " ".join(companions)
-    return found
+        companions = [n for n in (f"{name}_error", "status") if n in described and n != name]
+        described[name][2]["ancillary_variables"] = " ".join(companions)
+    return described
 
 
 def coordinates(study: Study) -> dict[Any, Any]:
@@ -95,7 +95,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
         if axis.labels is not None:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
-        # an axis bears its own values, even where a first cell has no use for them
+        # an axis shows its own values, even where its first cells make no use of them
         points = [
             {**study.measure.plain_fields, **scene.as_dict(), **row}
             for row, scene in zip(axis.rows, along, strict=True)
@@ -119,8 +119,8 @@ def coordinates(study: Study) -> dict[Any, Any]:
 
 
 def _array(values: list[Any]) -> np.ndarray:
-    """Values of one field as NetCDF can hold them: text, flags as int8, numbers with NaN for
-    none.
+    """Values of one field as NetCDF can hold them: text, flags as int8, numbers with NaN where a
+    value is missing.
     """
     if isinstance(_first(values), str):
         return np.array([value or "" for value in values], dtype=object)
@@ -130,13 +130,13 @@ def _array(values: list[Any]) -> np.ndarray:
 
 
 def _first(values: list[Any]) -> Any:
-    """The first value there is."""
+    """The first value that is not None, if any."""
     return next((value for value in values if value is not None), None)
 
 
 def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[str, Any]:
-    """Attributes of a quantity, be it one of the study's own; of a coordinate whose values are like
-    this one.
+    """Attributes of a variable, whether the vocabulary or the study (`own`) describes it; `value`
+    is an example of what a coordinate holds.
     """
     about = quantity(name, own)
     attrs: dict[str, Any] = {"long_name": about.long_name}
@@ -152,12 +152,12 @@ def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[st
 
 
 def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Root attributes of a lattice of which so many cells are known: what it is, where it comes
-    from, whether it is complete, and the whole declaration.
+    """Root attributes: what the lattice is, where it comes from, how many of its cells are `known`,
+    and the whole declaration.
     """
     complete = known == study.size
     when, version = provenance["time"], provenance["versions"]["rsfstudy"]
-    found = {
+    texts = {
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
@@ -178,4 +178,4 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
     }
     # a command, or the environment, may hold bytes that are no text
-    return {name: text.encode(errors="backslashreplace").decode() for name, text in found.items()}
+    return {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}

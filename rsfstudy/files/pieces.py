@@ -1,7 +1,7 @@
-"""Zarr stores: a lattice too large for one piece of memory, written slab by slab.
+"""Zarr stores: for a lattice that does not fit in memory, written slab by slab.
 
-Needs the extra ``zarr``. A store is written beside, read back, and then moved into place; one that
-is there already is never replaced, because whoever has it open reads its chunks one by one.
+Needs the extra ``zarr``. A store is written under a temporary name, read back, and then renamed. An
+existing store is never replaced: a reader that has it open would mix old chunks with new ones.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ import xarray as xr
 
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files.journal import Columns
+from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.files.lattice import attributes, coordinates, variables
 from rsfstudy.files.store import ZARR, Digests
 from rsfstudy.status import Status
 
 #: Numbers in one piece: 32 MB of float64.
 _NUMBERS = 4_000_000
+#: How stores are written; consolidated metadata have no specification in Zarr's format 3.
+_STORE: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: What is known of the cells from one number to another, in row-major order.
 Read = Callable[[int, int], Columns]
@@ -33,7 +35,7 @@ Reduce = Callable[[xr.Dataset], xr.Dataset]
 
 
 def check_installed() -> None:
-    """Refuse a Zarr store where nothing can write one."""
+    """Refuse the format where the package zarr is missing."""
     if importlib.util.find_spec("zarr") is None:
         raise InvalidValue(
             "format", "zarr", "needs a package", remedy="pip install 'rsfstudy[zarr]'."
@@ -52,7 +54,7 @@ def check_free(path: Path) -> None:
 def write(
     study: Study, read: Read, provenance: Mapping[str, Any], reduce: Reduce, path: Path
 ) -> xr.Dataset:
-    """Write the lattice of a study piece by piece, then its reductions, and open it.
+    """Write the lattice of a study slab by slab, then its reductions, and open it.
 
     Raises
     ------
@@ -62,22 +64,16 @@ def write(
     beside = path.with_name(f".{path.name}.new")
     try:
         shutil.rmtree(beside, ignore_errors=True)
-        coords = _as_objects(xr.Dataset(coords=coordinates(study)))
-        coords.to_zarr(beside, mode="w", consolidated=False, zarr_format=3)
         digests = Digests()
-        for name in coords.variables:
-            digests.add(str(name), coords[name].values)
-            digests.describe(str(name), coords[name].sizes, coords[name].attrs)
-        known = _lattice(study, read, beside, digests)
+        finished = _write_lattice(study, read, beside, digests)
         lattice = xr.open_dataset(beside, **ZARR)
-        made = reduce(lattice)
-        new = made.drop_vars([name for name in made.variables if name in lattice.variables])
-        for name in new.variables:
-            digests.add(str(name), new[name].values)
-            digests.describe(str(name), new[name].sizes, new[name].attrs)
-        about = {**attributes(study, known, provenance), **made.attrs, **_named(lattice)}
-        sealed = digests.sealing(_as_objects(new).assign_attrs(about))
-        sealed.to_zarr(beside, mode="a", consolidated=False)
+        results = reduce(lattice)
+        reductions = _as_objects(results.drop_vars(list(lattice.variables)))
+        digests.add(reductions)
+        digests.describe(reductions)
+        about = {**attributes(study, finished, provenance), **results.attrs}
+        sealed = digests.sealing(reductions.assign_attrs(about))
+        sealed.to_zarr(beside, mode="a", **_STORE)
         digests.check(xr.open_dataset(beside, **ZARR), str(path))
         beside.rename(path)
     except OSError as error:
@@ -87,55 +83,50 @@ def write(
     return xr.open_dataset(path, **ZARR)
 
 
-def _named(lattice: xr.Dataset) -> dict[str, str]:
-    """The attribute that tells xarray which variables are coordinates, as it writes it itself."""
-    return {"coordinates": " ".join(str(n) for n in lattice.coords if n not in lattice.dims)}
-
-
 def _as_objects(dataset: xr.Dataset) -> xr.Dataset:
     """Text of any length, which Zarr has a specification for, in place of that of a fixed one."""
     texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
-def _lattice(study: Study, read: Read, path: Path, digests: Digests) -> int:
-    """Write the variables of the lattice; the number of cells that are known."""
-    import zarr
-
-    group = zarr.open_group(path, mode="a")
-    chunk = _chunk(study.shape, _NUMBERS // read(0, 1).numbers.shape[1])
-    arrays: dict[str, Any] = {}
-    known = 0
+def _write_lattice(study: Study, read: Read, path: Path, digests: Digests) -> int:
+    """Write the variables of the lattice; the number of cells that are finished."""
+    width = Layout(study.measure).width
+    chunk = _chunk(study.shape, _NUMBERS // width)
+    template = _template(study, Columns.pending(1, width), chunk)
+    template.to_zarr(path, mode="w-", compute=False, **_STORE)
+    digests.describe(template)
+    digests.add(template.coords.to_dataset())
+    finished = 0
     for region in _regions(study.shape, chunk):
         shape = tuple(part.stop - part.start for part in region)
         start = int(np.ravel_multi_index([part.start for part in region], study.shape))
         columns = read(start, start + math.prod(shape))
-        known += int((columns.status != int(Status.PENDING)).sum())
-        for name, (dims, values, about) in variables(study, columns, shape).items():
-            if name not in arrays:
-                inner = values.shape[len(shape) :]
-                arrays[name] = group.create_array(
-                    name,
-                    shape=study.shape + inner,
-                    chunks=chunk + inner,
-                    dtype=str if values.dtype == object else values.dtype,
-                    # a chunk that is lost must not read as the status ok
-                    fill_value=_FILL.get(values.dtype.kind, int(Status.PENDING)),
-                    dimension_names=dims,
-                    attributes={k: _json(v) for k, v in about.items()},
-                )
-            arrays[name][region] = values
-            digests.add(name, values)
-            sizes = dict(zip(dims, arrays[name].shape, strict=True))
-            digests.describe(name, sizes, about)
-    return known
+        slab = xr.Dataset(variables(study, columns, shape))
+        slab.to_zarr(path, region=dict(zip(study.dimensions, region, strict=True)), **_STORE)
+        digests.add(slab)
+        finished += int((columns.status != int(Status.PENDING)).sum())
+    return finished
 
 
-_FILL: Mapping[str, Any] = {"f": np.nan, "O": ""}
+def _template(study: Study, pending: Columns, chunk: tuple[int, ...]) -> xr.Dataset:
+    """The lattice without its numbers: each variable holds one, that of a pending cell, as often
+    as it takes. A chunk of the store that is lost reads as pending too.
+    """
+    import dask.array
 
-
-def _json(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    one_cell = variables(study, pending, (1,) * len(chunk))
+    lattice = {}
+    for name, (dims, values, about) in one_cell.items():
+        inner = values.shape[len(chunk) :]
+        full = dask.array.full(
+            study.shape + inner,
+            values.flat[0],
+            chunks=chunk + inner,
+            dtype="T" if values.dtype == object else values.dtype,
+        )
+        lattice[name] = (dims, full, about, {"fill_value": values.flat[0]})
+    return _as_objects(xr.Dataset(lattice, coordinates(study)))
 
 
 def _chunk(shape: tuple[int, ...], most: int) -> tuple[int, ...]:

@@ -1,5 +1,5 @@
-"""A study from the declaration that its results carry: plain data in, and no code of the file's is
-run.
+"""Rebuilds a study from the declaration in its results. A declaration is plain data: no code from
+the results file is run.
 """
 
 from __future__ import annotations
@@ -8,13 +8,17 @@ import importlib
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict
 
+import xarray as xr
+
 from rsfstudy import measures, reduce
+from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import Axis
-from rsfstudy.declare.study import Study
-from rsfstudy.errors import InvalidValue
+from rsfstudy.declare.study import Study, figure_name
+from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.files import contents
 from rsfstudy.files.contents import (
     Declaration,
@@ -24,6 +28,7 @@ from rsfstudy.files.contents import (
     fit,
     refused,
 )
+from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
@@ -32,8 +37,63 @@ from rsfstudy.slider.parts import Part
 from rsfstudy.status import Status
 
 
-def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
-    """The study that describes itself by this declaration.
+def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
+    """The study that made a dataset, from the declaration in it; where it uses code of the user,
+    from the file that declares the study.
+    """
+    declared = contents.declaration(results)
+    if file is None:
+        about = contents.provenance(results)
+        if about["fingerprint"]["own_code"] != "none":
+            rule = "is a user's own, and code is never taken from a results file"
+            remedy = "Name the file that declares it: --study FILE (study=)."
+            if about["declared_in"]:
+                remedy += f" It was {brief(about['declared_in'])}."
+            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
+            raise InvalidValue(name, value, rule, remedy=remedy)
+        study = from_declaration(declared)
+    else:
+        named = catalogue.load(str(file))
+        if named.name != declared.name:
+            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+            raise InvalidValue("study", str(file), rule)
+        study = from_declaration(declared, of_its_own=named)
+    _check_lattice(study, results)
+    return study
+
+
+def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
+    """The figure that a user wrote for a dataset, from the file that declares the study. The file
+    that the dataset names is not run unasked, because the results may come from a stranger.
+
+    Raises
+    ------
+    InvalidValue
+        Where no file is given, or it has no such figure.
+    """
+    name, named_in = contents.declaration(results).plot, contents.provenance(results)["declared_in"]
+    if file is None:
+        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
+        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
+    study = catalogue.load(str(file))
+    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
+        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
+        raise InvalidValue("study", str(file), rule)
+    return None if isinstance(study.plot, str) else study.plot
+
+
+def _check_lattice(study: Study, results: xr.Dataset) -> None:
+    """Refuse results whose axes differ from those in their declaration."""
+    ours, dims = xr.Dataset(coords=coordinates(study)), results["status"].dims
+    if dims != study.dimensions:
+        raise refused("status", f"lies along {dims}, not the axes of the declaration")
+    for name in study.dimensions:
+        if ours[name].values.tolist() != results[name].values.tolist():
+            raise refused(name, "is not that axis of the declaration")
+
+
+def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> Study:
+    """The study with this declaration.
 
     Parameters
     ----------
@@ -72,8 +132,8 @@ def study(declared: Declaration, of_its_own: Study | None = None) -> Study:
 
 
 def _own_parts(study: Study | None) -> Mapping[str, type[Part]]:
-    """Parts of a user's own, by name: those that a study has, and others of the files it comes
-    from, which are known since it was loaded.
+    """Parts that a user wrote, by name: those of the study, and all others defined in the files
+    that were loaded with it.
     """
     others = {name: part for slot in SLOTS for name, part in slot.own.items()}
     return {} if study is None else {**others, **study.own_parts}
@@ -87,15 +147,15 @@ def _axis(described: PlainAxis, own: Mapping[str, type[Part]]) -> Axis:
 
 
 def measure(described: PlainMeasure, path: str) -> Measure:
-    """The measure that describes itself so, at a path in a file."""
+    """The measure with this description, which stands at `path` in a file."""
     values: dict[str, Any] = dict(described)
     name, kinds = values.pop("name"), _kinds(Measure, measures)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
     if "problems" in values:
         values["problems"] = _problems(values["problems"], f"{path}.problems")
-    found: Measure = fit(values, kinds[name], path)
-    return found
+    restored: Measure = fit(values, kinds[name], path)
+    return restored
 
 
 class _PlainProblem(TypedDict):
@@ -120,8 +180,8 @@ def _problem(described: _PlainProblem, path: str) -> Problem:
         "status": statuses[described["status"]],
         "scale": described["scale"] or 0.0,
     }
-    found: Problem = fit({**described, **made}, Problem, path)
-    return found
+    problem: Problem = fit({**described, **made}, Problem, path)
+    return problem
 
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
@@ -132,12 +192,12 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
         raise InvalidValue(
             "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
         )
-    found: Reduction = fit(values, kinds[wanted], path)
-    return found
+    restored: Reduction = fit(values, kinds[wanted], path)
+    return restored
 
 
 def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
-    """The classes of a package that are derived from one, by what they call themselves."""
+    """The classes of a package that are derived from `base`, by their names in declarations."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     within = f"{package.__name__}."
@@ -149,7 +209,7 @@ def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
 
 
 def _members(base: Any) -> Iterator[Any]:
-    """Classes derived from one, that are not for others to derive from."""
+    """The concrete classes derived from `base`: those with a name in declarations."""
     for kind in base.__subclasses__():
         yield from _members(kind)
         if "name" in vars(kind) or "kind" in vars(kind):

@@ -1,9 +1,9 @@
-"""NetCDF files: written beside, read back, compared, and only then put in place; what they hold is
-sealed with digests, so that damage is noticed and named.
+"""NetCDF files: written under a temporary name, read back, compared, and only then renamed. They
+carry digests, so that damage is noticed, and the damaged variable named.
 
-A digest of all bytes stands behind the end of the HDF5 file, where its readers do not look: on
-damaged bytes HDF5 may never return, so they are told before it sees them. A digest of each variable
-is an attribute, which stays with the dataset wherever a notebook saves it.
+A digest of all bytes is appended to the HDF5 file, where HDF5 ignores it. It is checked before HDF5
+opens the file, because HDF5 may hang on damaged bytes. The digests of the variables are an
+attribute, which stays with the dataset when a notebook saves it elsewhere.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import xarray as xr
 from rsfstudy.errors import DataError, brief
 from rsfstudy.files import contents
 
-#: Root attributes that a verdict or a rerun turns on.
+#: Root attributes that verdicts and reruns depend on.
 _SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
 #: Variables that every results file has. Those that a user added have no digests.
 _OF_EVERY_LATTICE = ("status", "message", "rhs_evaluations", "wall_time")
@@ -35,7 +35,7 @@ ZARR: Mapping[str, Any] = {
     "cache": False,
     "zarr_format": 3,
 }
-#: Codecs of our Zarr stores. Others may run code of the store's own.
+#: Codecs of our Zarr stores. Any other might run code that the store names.
 _CODECS = {"bytes", "vlen-utf8", "zstd"}
 _MARK = b"\nrsfstudy sha256 "
 _TRAILER = len(_MARK) + 64
@@ -48,37 +48,41 @@ class Digests:
         self._of: dict[str, Any] = {}
         self._about: dict[str, str] = {}
 
-    def add(self, name: str, values: np.ndarray) -> None:
-        """The next values of a variable, in row-major order."""
-        digest = self._of.setdefault(name, hashlib.sha256())
-        if values.dtype.kind in "OUST":
-            digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
-        else:
-            little = values.dtype.newbyteorder("<")
-            digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
+    def add(self, dataset: xr.Dataset) -> None:
+        """Add the values of each variable; if they come in pieces, in row-major order."""
+        for name in dataset.variables:
+            values = dataset[name].values
+            digest = self._of.setdefault(str(name), hashlib.sha256())
+            if values.dtype.kind in "OUST":
+                digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
+            else:
+                little = values.dtype.newbyteorder("<")
+                digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
 
-    def describe(self, name: str, sizes: Mapping[Any, int], attrs: Mapping[Any, Any]) -> None:
-        """The dimensions of a variable and its attributes, as they are written."""
-        plain = {str(key): np.asarray(value).tolist() for key, value in attrs.items()}
-        self._about[f"{name}()"] = json.dumps([[str(d), int(n)] for d, n in sizes.items()])
-        self._about[f"{name}:"] = json.dumps(plain, sort_keys=True)
+    def describe(self, dataset: xr.Dataset) -> None:
+        """Add the dimensions and attributes of each variable, as they are written."""
+        for name, variable in dataset.variables.items():
+            sizes = [[str(d), int(n)] for d, n in variable.sizes.items()]
+            attrs = {str(key): np.asarray(v).tolist() for key, v in variable.attrs.items()}
+            self._about[f"{name}()"] = json.dumps(sizes)
+            self._about[f"{name}:"] = json.dumps(attrs, sort_keys=True)
 
     def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The dataset with these digests, and those of its attributes."""
+        """The dataset with these digests, and those of its root attributes, as an attribute."""
         return dataset.assign_attrs({_DIGESTS: json.dumps(self._all(dataset.attrs))})
 
     def _all(self, attrs: Mapping[Any, Any]) -> dict[str, str]:
         texts = {f":{name}": str(attrs[name]) for name in _SEALED if name in attrs} | self._about
-        found = self._of | {name: hashlib.sha256(t.encode()) for name, t in texts.items()}
-        return {name: digest.hexdigest()[:16] for name, digest in found.items()}
+        digests = self._of | {name: hashlib.sha256(t.encode()) for name, t in texts.items()}
+        return {name: digest.hexdigest()[:16] for name, digest in digests.items()}
 
     def check(self, dataset: xr.Dataset, where: str) -> None:
-        """Hold a dataset against the digests it carries.
+        """Check a dataset against the digests it carries.
 
         Raises
         ------
         DataError
-            Where it carries none, or what they were made of is missing or changed.
+            Where it carries none, or a variable or attribute is missing or was changed.
         """
         try:
             carried = dict(json.loads(dataset.attrs[_DIGESTS]))
@@ -109,23 +113,22 @@ def _named(name: str) -> str:
 
 def _digests_of(dataset: xr.Dataset) -> Digests:
     digests = Digests()
-    for name in dataset.variables:
-        digests.add(str(name), dataset[name].values)
-        digests.describe(str(name), dataset[name].sizes, dataset[name].attrs)
+    digests.add(dataset)
+    digests.describe(dataset)
     return digests
 
 
 def sealed(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset as a file holds it: with attributes NetCDF does not change, and digests."""
+    """The dataset as it is written: with attributes that NetCDF keeps unchanged, and digests."""
     clean = clean_attributes(dataset)
     return _digests_of(clean).sealing(clean)
 
 
 def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
-    """Write a dataset so that `path` holds the old file or the whole new one, whatever happens.
+    """Write a dataset so that `path` always holds either the old file or the complete new one.
 
-    A reader that has the old file open keeps its data. What a write that was killed left beside is
-    written over by the next.
+    A reader that has the old file open keeps its data. If a write is killed, the next one
+    overwrites the temporary file it left.
 
     Returns
     -------
@@ -142,7 +145,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove(beside)  # were it a link or a pipe, writing would go elsewhere
-        # a lock that xarray would ask the Dask cluster for is of no use, and may never come
+        # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
         with dask.config.set(scheduler="synchronous"):
             clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
         with open(beside, "ab") as file:
@@ -175,7 +178,7 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
 
 
 def _check_bytes(path: Path) -> None:
-    """Hold a file against the digest of its bytes, if it has one behind its end."""
+    """Check a file against the digest of its bytes, if one is appended to it."""
     size = path.stat().st_size - _TRAILER
     if size < 0:
         return
@@ -190,7 +193,7 @@ def _remove(path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError:
-        return  # the directory itself is no directory; the error on its way says so
+        return  # its directory is not a directory; the error that is being raised says so
 
 
 def read(path: Path) -> xr.Dataset:
@@ -213,7 +216,9 @@ def read(path: Path) -> xr.Dataset:
         Digests().check(dataset, where)
     except DataError:
         raise
-    except Exception as error:  # damage makes HDF5, Zarr, netCDF4 and xarray raise almost anything
+    except (
+        Exception
+    ) as error:  # HDF5, Zarr, netCDF4 and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
     try:
         contents.check(dataset)
@@ -223,7 +228,7 @@ def read(path: Path) -> xr.Dataset:
 
 
 def _check_there(path: Path, where: str) -> None:
-    """Refuse what is no file and no Zarr store: whoever opens a pipe may wait for ever."""
+    """Refuse anything but a file or a Zarr store: opening a pipe could wait for ever."""
     if not path.exists():
         raise DataError(f"{where} does not exist. Run the study first, or name another file.")
     if path.is_dir() and not (path / "zarr.json").is_file():
@@ -234,7 +239,7 @@ def _check_there(path: Path, where: str) -> None:
 
 
 def _check_codecs(path: Path) -> None:
-    """Refuse a Zarr store that is to be decoded by anything but what ours are."""
+    """Refuse a Zarr store with a codec that our stores do not use."""
     for file in path.rglob("zarr.json"):
         about = json.loads(file.read_text())
         for codec in about.get("codecs", []):
@@ -246,8 +251,8 @@ def _check_codecs(path: Path) -> None:
 
 
 def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with attributes NetCDF holds without changing them: text, numbers, arrays of more
-    than one.
+    """The dataset with attributes of the types that NetCDF keeps unchanged: text, numbers, and
+    arrays of two or more.
     """
     clean = dataset.copy()
     clean.attrs = _clean(dataset.attrs)

@@ -47,7 +47,7 @@ class Outcome:
     values : mapping of str to float or 1-d array
         The named numbers; names that are missing become NaN in the lattice.
     message : str
-        What there is to say of the status.
+        More about the status, in words.
     rhs_evaluations : int
         Right-hand sides spent.
     """
@@ -58,7 +58,7 @@ class Outcome:
     rhs_evaluations: int = 0
 
 
-#: Names that are there whatever is measured.
+#: Names that every lattice uses already.
 TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
 
 
@@ -126,7 +126,7 @@ class Measure:
         Raises
         ------
         InvalidValue
-            For a name that is none, a value of another kind, and one the measure refuses.
+            For an unknown name, a value of another type, or one that the measure refuses.
         """
         if not changes:
             return self
@@ -217,36 +217,37 @@ class Measure:
         return self.metered(scene, accuracy)[0]
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
-        """The same, with what it spent."""
+        """The outcome of `__call__`, and the meter with the work that was spent."""
         meter = Meter(accuracy.budget, dict(accuracy.methods))
         try:
-            found = self._checked(self.find(scene, accuracy, meter))
+            outcome = self._checked(self.find(scene, accuracy, meter))
         except Halt as halt:
-            found = Outcome(halt.status, message=str(halt))
-        return Outcome(found.status, found.values, found.message, _count(meter.spent)), meter
+            outcome = Outcome(halt.status, message=str(halt))
+        return Outcome(outcome.status, outcome.values, outcome.message, _count(meter.spent)), meter
 
-    def _checked(self, found: Outcome) -> Outcome:
-        """What was found, if it is what was declared; an answer without a finite number is none.
+    def _checked(self, outcome: Outcome) -> Outcome:
+        """The outcome, if it is as declared; ok without a finite headline becomes `not_finite`.
 
         Raises
         ------
         InvalidValue
-            For what is no outcome, and a number that is not declared or real, or has another shape.
+            For anything but an outcome, and for a number that is not declared, not real, or of
+            another shape.
         """
-        if not isinstance(found, Outcome) or not isinstance(found.status, Status):
-            raise InvalidValue("measured", found, "must be an Outcome with a Status")
-        if not isinstance(found.values, Mapping):
-            raise InvalidValue("measured", found.values, "must map names to numbers")
-        if not isinstance(found.message, str):
-            raise InvalidValue("message", type(found.message).__name__, "must be a text")
-        if found.status is Status.PENDING:
-            raise InvalidValue("measured", found, "must say what became of the cell")
-        values = {name: self._number(name, value) for name, value in found.values.items()}
-        if found.status is not Status.OK:
-            return Outcome(found.status, values, found.message)
+        if not isinstance(outcome, Outcome) or not isinstance(outcome.status, Status):
+            raise InvalidValue("measured", outcome, "must be an Outcome with a Status")
+        if not isinstance(outcome.values, Mapping):
+            raise InvalidValue("measured", outcome.values, "must map names to numbers")
+        if not isinstance(outcome.message, str):
+            raise InvalidValue("message", type(outcome.message).__name__, "must be a text")
+        if outcome.status is Status.PENDING:
+            raise InvalidValue("measured", outcome, "must say what became of the cell")
+        values = {name: self._number(name, value) for name, value in outcome.values.items()}
+        if outcome.status is not Status.OK:
+            return Outcome(outcome.status, values, outcome.message)
         headline = np.asarray(values.get(self.headline, np.nan), dtype=float)
         if np.isfinite(headline).any():
-            return Outcome(Status.OK, values, found.message)
+            return Outcome(Status.OK, values, outcome.message)
         return Outcome(Status.NOT_FINITE, values, f"{self.headline} = {headline}")
 
     def _number(self, name: str, value: Any) -> Value:

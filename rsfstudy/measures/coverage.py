@@ -112,35 +112,35 @@ class Coverage(Measure):
         asked = replace(accuracy, rtol=10.0**-self.requested_digits)
         rtol = max(_TIGHTER * asked.rtol, TIGHTEST_RTOL)
         tighter = replace(asked, rtol=rtol, budget=_PATIENCE * asked.budget)
-        (found, spent), (truth, more) = (measure.metered(drawn, a) for a in (asked, tighter))
+        (outcome, spent), (truth, more) = (measure.metered(drawn, a) for a in (asked, tighter))
         meter.by_regime["asked"], meter.by_regime["tighter"] = spent.spent, more.spent
         meter.spent = spent.spent + more.spent
         values: dict[str, Any] = {
-            "ended_as": float(found.status),
+            "ended_as": float(outcome.status),
             "status_kept_error": 0.0,
             # a failure claims nothing, and nothing is known where the tighter run fails
             "status_kept": float(
-                found.status is truth.status
-                or not (found.status.is_answer and truth.status.is_answer)
+                outcome.status is truth.status
+                or not (outcome.status.is_answer and truth.status.is_answer)
             ),
         }
-        if found.status is truth.status is Status.OK:
-            values |= _compared(found.values, truth.values, asked.rtol)
+        if outcome.status is truth.status is Status.OK:
+            values |= _compared(outcome.values, truth.values, asked.rtol)
         return Outcome(Status.OK, values)
 
 
 def _compared(
-    found: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
+    measured: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
 ) -> dict[str, np.ndarray]:
     """Errors beyond what the truth itself is uncertain by, over their estimates, and over the
     accuracy asked for.
     """
     over_estimate, over_request = (np.full(len(_ESTIMATED), math.nan) for _ in range(2))
     for i, name in enumerate(_ESTIMATED):
-        if f"{name}_error" in found:
+        if f"{name}_error" in measured:
             uncertain = truth[f"{name}_error"]
-            error = max(abs(found[name] - truth[name]) - uncertain, 0.0)
-            over_estimate[i] = error / found[f"{name}_error"]
+            error = max(abs(measured[name] - truth[name]) - uncertain, 0.0)
+            over_estimate[i] = error / measured[f"{name}_error"]
             over_request[i] = error / (rtol * abs(truth[name]))
     return {"error_over_estimate": over_estimate, "error_over_request": over_request}
 

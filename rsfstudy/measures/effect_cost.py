@@ -94,13 +94,13 @@ class EffectCost(Measure):
         """The cycle under this meter; the forms of the equations on their own."""
         costs = _costs(scene)
         try:
-            found = _CYCLE.find(scene, accuracy, meter)
+            cycle = _CYCLE.find(scene, accuracy, meter)
         except Halt as halt:
             return Outcome(halt.status, costs, str(halt))
         spent = meter.by_regime.get("inertial", 0)
         costs["share_in_rupture"] = spent / meter.spent if meter.spent else math.nan
-        kept = {name: found.values[name] for name in _KEPT if name in found.values}
-        return Outcome(found.status, {**kept, **costs}, found.message)
+        kept = {name: cycle.values[name] for name in _KEPT if name in cycle.values}
+        return Outcome(cycle.status, {**kept, **costs}, cycle.message)
 
 
 def _costs(scene: Scene) -> dict[str, float]:

@@ -61,15 +61,15 @@ class HardCase(Measure):
         problem = posed_by(scene, self.problems)
         outcome, spent = problem.measure.metered(scene, accuracy)
         meter.by_regime, meter.spent = spent.by_regime, spent.spent
-        found = {"ended_as": float(outcome.status)}
+        numbers = {"ended_as": float(outcome.status)}
         if outcome.status is not problem.status:
             why = f"ended as {outcome.status.label}, not {problem.status.label}: {outcome.message}"
-            return Outcome(Status.UNVERIFIED, found, why)
+            return Outcome(Status.UNVERIFIED, numbers, why)
         if problem.answer is None:
             exact = {"measured_error": 0.0, "measured_error_error": 0.0}
-            return Outcome(Status.OK, found | exact, outcome.message)
+            return Outcome(Status.OK, numbers | exact, outcome.message)
         error, estimate = problem.error_of(outcome), problem.estimate_of(outcome)
-        found |= {
+        numbers |= {
             "measured_error": error,
             "measured_error_error": problem.uncertainty,
             "error_estimate": estimate,
@@ -77,5 +77,5 @@ class HardCase(Measure):
         }
         if not error <= estimate + problem.uncertainty or math.isnan(error):
             why = f"error {error:.2g} beyond its estimate {estimate:.2g}"
-            return Outcome(Status.UNVERIFIED, found, why)
-        return Outcome(Status.OK, found)
+            return Outcome(Status.UNVERIFIED, numbers, why)
+        return Outcome(Status.OK, numbers)

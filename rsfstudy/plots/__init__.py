@@ -52,13 +52,13 @@ def figure(dataset: xr.Dataset, own: Any = None) -> Figure:
     panels, size = getattr(module, "PANELS", (None,)), getattr(module, "PANEL", _PANEL)
     columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
     rows = -(-len(panels) // columns)
-    found = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     for number, panel in enumerate(panels, start=1):
-        _draw(dataset, module, found.add_subplot(rows, columns, number), panel or module.draw)
+        _draw(dataset, module, figure.add_subplot(rows, columns, number), panel or module.draw)
     overrides = declaration(dataset).overrides
     if overrides:
-        found.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
-    return found
+        figure.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
+    return figure
 
 
 def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:

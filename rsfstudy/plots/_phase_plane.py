@@ -52,8 +52,8 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 def _stresses(scene: Scene, excesses: np.ndarray) -> np.ndarray:
     """Shear stress at each friction coefficient, less mu_*."""
-    found = (stress_at(scene, excess) for excess in excesses.tolist())
-    return np.array([math.nan if g is None else scene.mu_star + g for g in found])
+    stresses = (stress_at(scene, excess) for excess in excesses.tolist())
+    return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 
 def label_axes(axes: Axes) -> None:

@@ -113,15 +113,15 @@ def _cells(dataset: xr.Dataset, law: int) -> list[tuple[xr.Dataset, str]]:
     chosen = dataset.isel(law=law) if "law" in dataset.dims else dataset
     dims = [str(d) for d in chosen["status"].dims]
     stacked = chosen.stack(cell=dims) if dims else chosen.expand_dims("cell")
-    found: list[tuple[xr.Dataset, str]] = []
+    cells: list[tuple[xr.Dataset, str]] = []
     seen: set[tuple[float, ...]] = set()
     for number in range(stacked.sizes["cell"]):
         cell = stacked.isel(cell=number)
         numbers = tuple(cell["frictional_stress"].values.tolist())
         if int(cell["status"]) == 0 and numbers not in seen:
             seen.add(numbers)
-            found.append((cell, ", ".join(_place(cell, d) for d in dims if _counts(cell, d))))
-    return found
+            cells.append((cell, ", ".join(_place(cell, d) for d in dims if _counts(cell, d))))
+    return cells
 
 
 def _counts(cell: xr.Dataset, dimension: str) -> bool:

@@ -49,7 +49,7 @@ class Boundary(Reduction):
         """
         dimension = dimension_of(dataset, self.on)
         values = dataset[self.of].where(~refused(dataset, self.of, dimension))
-        found = xr.apply_ufunc(
+        edges = xr.apply_ufunc(
             self._bracket,
             values,
             dataset[self.on].astype(float),
@@ -57,7 +57,7 @@ class Boundary(Reduction):
             output_core_dims=[[], [], []],
             vectorize=True,
         )
-        stable, unstable, crossings = found
+        stable, unstable, crossings = edges
         once = crossings == 1
         note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
         result = xr.Dataset(
@@ -131,7 +131,7 @@ class Inverse(Reduction):
         if dataset.sizes[dimension] < 4:
             return xr.Dataset()
         values = dataset[self.of].where(~refused(dataset, self.of, dimension))
-        found, error = xr.apply_ufunc(
+        crossing, error = xr.apply_ufunc(
             _inverse,
             values,
             dataset[self.on].astype(float),
@@ -144,7 +144,7 @@ class Inverse(Reduction):
         note = f"{self.on} at which {self.of} reaches {self.levels}"
         return xr.Dataset(
             {
-                self.name: found.assign_attrs(comment=note),
+                self.name: crossing.assign_attrs(comment=note),
                 f"{self.name}_error": error.assign_attrs(comment=note),
             }
         )

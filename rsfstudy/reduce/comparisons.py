@@ -48,10 +48,10 @@ class _Against(Reduction):
         values = dataset[self.of]
         if self.along not in values.dims or self.reference not in dataset[self.along].values:
             return xr.Dataset()
-        found = self.compare(values, values.sel({self.along: self.reference}, drop=True))
+        compared = self.compare(values, values.sel({self.along: self.reference}, drop=True))
         place = f"{self.along} = {self.reference}"
         note = self.formula.format(of=self.of, reference=f"its value at {place}")
-        return xr.Dataset({self.name: found.assign_attrs(comment=note)})
+        return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class Covered(Reduction):
         numbers = known.sum(over)
         with np.errstate(divide="ignore"):
             tightness = (1.0 / ratios).median(over)
-        found = {
+        statistics = {
             "share": (ratios <= 1.0).sum(over) / numbers.where(numbers > 0),
             "worst": ratios.max(over),
             "typical": tightness,
@@ -48,5 +48,5 @@ class Covered(Reduction):
         }
         note = f"{self.of} over {', '.join(map(str, over))}"
         return xr.Dataset(
-            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in found.items()}
+            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in statistics.items()}
         )

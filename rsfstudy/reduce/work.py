@@ -51,7 +51,7 @@ class Cheapest(Reduction):
         wanted = xr.DataArray(
             np.array(self.digits), dims="digits", coords={"digits": list(self.digits)}
         )
-        found = {
+        interpolated = {
             name: xr.apply_ufunc(
                 _at_digits,
                 dataset[self.of],
@@ -63,9 +63,11 @@ class Cheapest(Reduction):
             )
             for name, values in numbers.items()
         }
-        work = np.exp(found["work"])
+        work = np.exp(interpolated["work"])
         least = work.min("integrator")
-        default = {name: values.sel(integrator=self.default) for name, values in found.items()}
+        default = {
+            name: values.sel(integrator=self.default) for name, values in interpolated.items()
+        }
         known = work.notnull().any("integrator")
         cheapest = work.fillna(np.inf).argmin("integrator")
         note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"

@@ -1,0 +1,158 @@
+"""Dask clusters: worker processes started on this machine, or a scheduler that runs elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rsfstudy.errors import RunError, brief
+
+#: Time in s to wait for a process of this machine that does not answer.
+_HANGS = 600
+
+
+@contextlib.contextmanager
+def _script_not_imported() -> Iterator[None]:
+    """Keep worker processes from importing the user's script, which would start the study again.
+
+    Multiprocessing finds the script by these two names. What the script defines still reaches the
+    workers, by value.
+    """
+    main = sys.modules["__main__"]
+    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+    for name in hidden:
+        setattr(main, name, None)
+    try:
+        yield
+    finally:
+        for name, value in hidden.items():
+            setattr(main, name, value)
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Delay Ctrl-C until the end of this block, and keep it from processes that are started in it:
+    on Ctrl-C the driver ends the run, and then its workers. A second Ctrl-C is not delayed.
+    """
+    held: list[int] = []
+
+    def hold(number: int, _frame: object) -> None:
+        if held:
+            raise KeyboardInterrupt
+        held.append(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, hold)
+    # threads and processes inherit the signals that are blocked when they are started
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        signal.signal(signal.SIGINT, handler)
+    if held:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int, log: Path) -> Iterator[Any]:
+    """A Dask client of worker processes on this machine, with one thread each.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+    log : Path
+        Where they write errors.
+
+    Raises
+    ------
+    RunError
+        If they cannot be started.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
+    from rsfstudy.compute import worker_log
+
+    quiet = {
+        "distributed.scheduler.allowed-failures": 0,
+        # a worker that is slow, or busy with its cell, is ended by the time limit only
+        "distributed.scheduler.worker-ttl": None,
+        # when a worker has died, Dask would close it for good if it were not back after this time
+        "distributed.deploy.lost-worker-timeout": "1000 days",
+        # by default each process ticks 50 times and samples its stack 100 times a second
+        "distributed.admin.tick.interval": "1s",
+        "distributed.worker.profile.enabled": False,
+        "distributed.comm.timeouts.connect": f"{_HANGS}s",
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(
+            ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
+        ),
+    }
+    with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
+        worker_log.start_tracker(log)  # before `_interrupts_held`, because it unblocks signals
+        started = stack.enter_context(contextlib.ExitStack())
+        started.enter_context(_interrupts_held())
+        try:
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.ERROR,
+                plugins=(worker_log.WritesTo(log.resolve()),),
+            )
+        except Exception as error:
+            why = str(error).rstrip(".")
+            raise RunError(f"a worker process could not be started ({why})") from error
+        stack.enter_context(cluster)
+        started.close()
+        client = stack.enter_context(Client(cluster))
+        stack.callback(worker_log.start_tracker, log)  # in case the tracker was killed
+        yield client
+
+
+async def _greeting(address: str) -> None:
+    """Check that Dask answers; its client would wait for ever if another program listens there."""
+    from distributed.comm.core import connect
+
+    comm = await connect(address)
+    comm.abort()
+
+
+@contextlib.contextmanager
+def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
+    """A client of a Dask scheduler that is already running.
+
+    Raises
+    ------
+    RunError
+        If none answers at the address.
+    """
+    from distributed import Client
+    from distributed.utils import silence_logging_cmgr
+
+    # the run reports a failure of the cluster once; Dask's client would log more until it is
+    # closed
+    with silence_logging_cmgr(logging.CRITICAL + 1):
+        try:
+            asyncio.run(asyncio.wait_for(_greeting(address), timeout))
+            client = Client(address, timeout=timeout)
+        except Exception as error:  # Dask raises errors of many kinds for a wrong address
+            raise RunError(
+                f"no Dask scheduler answers at {brief(address)!r}: "
+                f"{brief(error) or 'it took too long'}. "
+                "Start one with `dask scheduler`, or leave --scheduler out."
+            ) from error
+        with client:
+            yield client

@@ -1,0 +1,72 @@
+"""Where results are: the directory of a run, and the file or store of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.axis import check_text
+from rsfstudy.errors import DataError, InvalidValue, brief
+
+DEFAULT = Path("outputs")
+
+
+def directory(output: str | Path | None) -> Path | None:
+    """Where results go: a directory, which need not be there yet, or nowhere.
+
+    Raises
+    ------
+    InvalidValue
+        For what cannot be the path of one.
+    """
+    if output is None:
+        return None
+    if not isinstance(output, str | Path):
+        raise InvalidValue("output", output, "must be a path, or None")
+    check_text("output", str(output))
+    if output == "":
+        remedy = "Name a directory; . is the one you are in."
+        raise InvalidValue("output", output, "is empty", remedy=remedy)
+    try:
+        Path(output).exists()
+    except OSError as error:
+        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
+    return Path(output)
+
+
+def results(name: str | Path, output: str | Path | None) -> Path:
+    """The results of a named study, or of the study that a file declares, in a directory; or the
+    results file that is named itself.
+
+    Raises
+    ------
+    DataError, InvalidValue
+        If there are none.
+    """
+    path = Path(name)
+    if path.suffix in (".nc", ".zarr"):
+        return path
+    study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
+    try:
+        return _of_study(study, directory(output) or DEFAULT)
+    except OSError as error:
+        raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
+
+
+def _of_study(name: str, output: Path) -> Path:
+    """The results of a study, by its name."""
+    file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
+    if file.exists() and in_pieces.exists():
+        raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
+    if file.exists() or in_pieces.exists():
+        return file if file.exists() else in_pieces
+    partial = output / f"{name}.partial.nc"
+    if partial.exists():
+        raise DataError(
+            f"{file} does not exist, but {partial} does: run the study again, or name it."
+        )
+    there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
+    if not there and name not in catalogue.names():
+        rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
+        raise InvalidValue("study", name, rule, choices=catalogue.names(), remedy=remedy)
+    return file
