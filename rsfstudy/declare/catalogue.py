@@ -45,15 +45,15 @@ def load(name: str) -> Study:
 
 
 def _run(given: Path) -> ModuleType:
-    """The module a file makes.
+    """The module that a file defines.
 
-    It is taken out of the list of modules again, and so are those beside it that it imports: worker
-    processes, which cannot import them, then get what they define by value, and another file may
-    have others of the same names.
+    It is removed from `sys.modules` again, and so are the modules in its directory that it imports.
+    Worker processes, which cannot import them, then receive their contents by value, and another
+    file may import other modules of the same names.
     """
     try:
         path = given.resolve(strict=True)
-        if not path.is_file():  # a pipe or a device may never end
+        if not path.is_file():  # reading a pipe or a device may never end
             raise InvalidValue("study", str(given), "is no file, but a directory or the like")
         path.read_bytes()
     except (OSError, RuntimeError) as error:  # links in a circle are a RuntimeError

@@ -106,8 +106,8 @@ class Claim:
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
 
     def check_place(self, dataset: xr.Dataset) -> None:
-        """Raise InvalidValue where the claim speaks of what a dataset does not have: its verdict
-        would always be that it is not applicable.
+        """Raise InvalidValue where a dataset has no such variable or place: the claim would never
+        be applicable.
         """
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
         for variable in filter(None, (self.variable, self.minus_variable)):

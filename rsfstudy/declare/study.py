@@ -167,7 +167,7 @@ class Study:
                     raise InvalidValue("axis", name, "is the name of something measured")
 
     def _check_own_fields(self) -> None:
-        """Refuse parts whose fields are called as something that is no field of theirs."""
+        """Refuse parts with a field whose name something else in the results bears already."""
         taken = {*self.measure.variables, *self.measure.inner_coordinates}
         taken |= {*TAKEN, *QUANTITIES, *(reduction.name for reduction in self.reductions)}
         for name in self.scene_fields[len(FIELDS) :]:
@@ -176,8 +176,8 @@ class Study:
                 raise InvalidValue("field", name, rule, remedy=remedy)
 
     def _check_fields(self) -> None:
-        """Refuse axes over fields that nothing has, and over those of the measure that decide
-        which numbers it gives: all cells of a lattice have the same.
+        """Refuse axes over unknown fields, and over fields of the measure that decide which numbers
+        it gives, because all cells of a lattice have the same numbers.
         """
         known = dict.fromkeys((*self.scene_fields, *self.measure.plain_fields))
         for axis in self.axes:
@@ -231,7 +231,9 @@ class Study:
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """What its own parts and its measure say of what the vocabulary does not hold, by name."""
+        """Quantities that its own parts and its measure describe, by name; the vocabulary has
+        none of them.
+        """
         stated = *quantities_with(self.own_parts.values()), *self.measure.quantities
         return {about.name: about for about in stated}
 
@@ -292,7 +294,7 @@ class Study:
         return ", ".join(words)
 
     def _split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """What rows set of the scene, and of the measure."""
+        """The fields of the scene, and those of the measure, that rows set."""
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
             for name, value in row.items():
@@ -301,7 +303,7 @@ class Study:
 
     def _cell(self, rows: Sequence[Row]) -> Cell:
         of_scene, changes = self._split(rows)
-        # one row that states both a choice and what has no meaning then is contradictory
+        # a row that states a choice together with a field it makes meaningless must be refused
         stated = {name for row in rows if set(row) & SLOT_NAMES for name in row}
         parts = self.own_parts
         values = by_class(self.base.as_dict() | of_scene, parts)
@@ -383,7 +385,7 @@ def figure_name(plot: Any) -> str:
 
 
 def _check_figure(plot: Any) -> None:
-    """Raise InvalidValue for what draws nothing, and for a name that another figure has."""
+    """Raise InvalidValue for something that cannot draw, or a name that another figure has."""
     if isinstance(plot, str):
         check_text("plot", plot)
         return
@@ -397,7 +399,7 @@ def _check_figure(plot: Any) -> None:
 
 
 def _given(measure: Measure) -> str:
-    """Which numbers a measure gives, and what it looks for; as text, where NaN equals NaN."""
+    """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.headline, dict(measure.variables), inner, measure.sought))
 

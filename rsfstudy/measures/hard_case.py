@@ -1,4 +1,4 @@
-"""A case that breaks ordinary slider codes, and whether what must come out does."""
+"""A case that breaks ordinary slider codes, and whether the right answer comes out."""
 
 from __future__ import annotations
 

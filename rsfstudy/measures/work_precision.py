@@ -20,7 +20,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-#: Seconds of timing that are enough.
+#: Seconds after which timings are not repeated.
 _ENOUGH = 0.05
 
 #: What run times are relative to: the same problem, solved by default as loosely as in the study.
@@ -160,7 +160,7 @@ class WorkPrecision(Measure):
         if outcome.status is not problem.status:
             why = f"{outcome.status.label}: {outcome.message}"
             return Outcome(Status.ACCURACY_OUT_OF_REACH, work, why)
-        # what the reference cannot tell from zero is no error
+        # an error below the uncertainty of the reference cannot be measured
         error = max(problem.error_of(outcome), problem.uncertainty, 1e-16)
         return Outcome(
             Status.OK,
@@ -177,8 +177,8 @@ class WorkPrecision(Measure):
     def _times(
         self, problem: Problem, scene: Scene, before: float, first: float
     ) -> dict[str, float]:
-        """Of a run timed for the first time, and of the yardstick before it: more of both, in
-        turns.
+        """Median times, from a first timing of the run and of the yardstick `before` it, and
+        more of both in turns.
         """
         times, ratios = [first], []
         while True:

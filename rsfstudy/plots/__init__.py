@@ -76,7 +76,7 @@ def _draw(dataset: xr.Dataset, module: Any, axes: Axes, panel: Panel) -> Axes:
 
 
 def _lacking(dataset: xr.Dataset) -> str:
-    """What cells a figure cannot show."""
+    """The cells that a figure cannot show, in words."""
     completeness = dataset.attrs.get("completeness", "complete")
     failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
     parts = [
@@ -87,8 +87,8 @@ def _lacking(dataset: xr.Dataset) -> str:
 
 
 def _module(dataset: xr.Dataset, own: Any = None) -> Any:
-    """The module that draws a dataset, or what is like one: the one it declares, or plain lines
-    where it has more axes than that has room for.
+    """The module, or an object like one, that draws a dataset: the one it declares, or plain lines
+    if the dataset has more axes than that can show.
     """
     name = declaration(dataset).plot
     if name in NAMES:
@@ -104,7 +104,7 @@ def _module(dataset: xr.Dataset, own: Any = None) -> Any:
 
 
 def _single(dataset: xr.Dataset, module: Any) -> set[str]:
-    """Dimensions of one point that a figure does not know of."""
+    """Dimensions of one point that a figure does not expect."""
     known = getattr(module, "DIMENSIONS", dataset["status"].dims)
     return {str(d) for d in dataset["status"].dims if dataset.sizes[d] == 1 and d not in known}
 

@@ -76,7 +76,7 @@ def reduced(
 
 
 def _about(about: Quantity, values: xr.DataArray) -> dict[str, str]:
-    """Attributes of a result: what is known of its quantity, and what its reduction says."""
+    """Attributes of a result: those of its quantity, and those that its reduction sets."""
     own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
     scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
     kind = {"coverage_content_type": coverage(about.name)}
@@ -84,7 +84,7 @@ def _about(about: Quantity, values: xr.DataArray) -> dict[str, str]:
 
 
 def _check_new(reduction: Reduction, made: xr.Dataset, dataset: xr.Dataset) -> None:
-    """Raise InvalidValue where a reduction would take the place of what is there."""
+    """Raise InvalidValue where a reduction would replace an existing variable."""
     for name in made.data_vars:
         if name in dataset:
             rule = f"would replace {name!r} by what it makes of {reduction.of!r}"

@@ -1,4 +1,4 @@
-"""What all reductions share: a name, what they reduce, and that they never draw on failed cells."""
+"""What all reductions share: a name, a variable to reduce, and that they never use failed cells."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rsfstudy.vocabulary import QUANTITIES
 
 Data = TypeVar("Data", xr.Dataset, xr.DataArray)
 
-#: Values of a coordinate count as within a range they miss by a rounding error.
+#: Rounding error by which a coordinate value may miss a range and still count as in it.
 ROUNDING = 1e-9
 
 
@@ -35,14 +35,14 @@ class Reduction:
         raise TypeError(f"{type(self).__name__} reduces nothing")
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
-        """The status of what each result draws on, from that of what is reduced; `worst` leaves the
-        dimensions out that the results have lost.
+        """The worst status among the cells that each result draws on, from the status of all cells;
+        `worst` removes the dimensions that the results do not have.
         """
         return status
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """What its results mean, with their units: those that the vocabulary does not hold."""
+        """Names and units of its results that the vocabulary does not hold."""
         return ()
 
     def describe(self) -> dict[str, Any]:
@@ -56,15 +56,13 @@ def failed(status: xr.DataArray) -> xr.DataArray:
 
 
 def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
-    """Status without the dimensions that are not among some; failures, which have the largest
-    codes, stay.
-    """
+    """The worst status along all dimensions but `dims`; failures have the largest codes."""
     return status.max([d for d in status.dims if d not in dims])
 
 
 def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
-    """The dataset as a reduction of `of` may see it: with the status of what that draws on, and
-    without the numbers that failures left behind.
+    """The dataset for a reduction of `of`: with the status of the cells that `of` draws on, and
+    without the numbers of those that failed.
     """
     bad = failed(status)
     if bool(bad.any()) and dataset[of].dtype.kind == "f":
@@ -73,13 +71,15 @@ def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
 
 
 def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
-    """Where failed cells refuse a result: along these dimensions and those `of` has lost."""
+    """Whether a result must be refused because a cell failed along these dimensions, or along those
+    that `of` does not have.
+    """
     bad = failed(dataset["status"])
     return bad.any([d for d in bad.dims if d in along or d not in dataset[of].dims])
 
 
 def without_failures(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with its failed cells as cells that answered without a number."""
+    """The dataset with failed cells changed to cells that have an answer but no number."""
     lost = failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
         name: values.where(~lost)

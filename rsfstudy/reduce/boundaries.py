@@ -17,7 +17,7 @@ from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
 class Boundary(Reduction):
     """Boundary between the points of a coordinate whose cells say no and those that say yes.
 
-    Nothing is interpolated: cells that answer yes or no bracket the boundary and tell no more.
+    Nothing is interpolated: cells that answer yes or no bracket the boundary, and no more.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _inverse(
 
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """The one place where the interpolant through the points is at the level; NaN where not one."""
+    """Where the interpolant through the points reaches the level; NaN unless at one place only."""
     roots = PchipInterpolator(x, y).solve(level, extrapolate=False)
     return float(roots[0]) if len(roots) == 1 else np.nan
 

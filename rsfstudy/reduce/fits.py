@@ -60,7 +60,7 @@ class _Fit(Reduction):
         if support.sizes[dimension] == 0:
             return xr.Dataset()
         of = support[self.of]
-        # sums over arrays that lie otherwise in memory differ in the last bit
+        # sums over arrays with another memory layout differ in the last bit
         of = of.copy(data=np.ascontiguousarray(of.values))
         used = of.notnull()
         x = self.centred(support[self.on].astype(float).where(used), dimension)

@@ -1,4 +1,4 @@
-"""What accuracy costs: the cheapest integrator for a number of digits, and what another pays."""
+"""What accuracy costs: the cheapest integrator for a number of digits, and the work of another."""
 
 from __future__ import annotations
 
@@ -90,12 +90,12 @@ class Cheapest(Reduction):
 
 
 def _at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Values where a curve of runs first reaches the digits wanted for good; NaN where never."""
+    """Values at the first run from which on all reach the digits wanted; NaN where none does."""
     known = np.isfinite(achieved) & np.isfinite(values)
     achieved, values = achieved[known], values[known]
     if achieved.size == 0:
         return np.full(wanted.shape, np.nan)
-    # digits that a looser request reaches by luck do not count: what all tighter ones keep does
+    # digits that a loose request reaches by luck do not count, only those all tighter ones reach
     kept = np.minimum.accumulate(achieved[::-1])[::-1]
     return np.array([_first(kept, values, digits) for digits in wanted])
 
