@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import subprocess
 import sys
 from pathlib import Path
 
@@ -98,3 +99,11 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
     assert len(rows) == 11
     for name in named:
         assert importlib.util.find_spec(f"rsfstudy.slider.{name}"), name
+
+
+def test_workers_load_no_more_than_the_physics_needs():
+    """Datasets and figures are made by the process that asked for them: a worker starts sooner."""
+    heavy = {"xarray", "pandas", "matplotlib", "netCDF4"}
+    asked = f"import sys, rsfstudy.compute.cells; print(*{heavy} & set(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == ""

@@ -20,7 +20,7 @@ import cloudpickle
 
 from rsfstudy.compute import own_code, provenance
 from rsfstudy.compute.overheard import Overhearing
-from rsfstudy.declare.study import Cell
+from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.files.journal import Finished
 from rsfstudy.measures import Measure, Outcome

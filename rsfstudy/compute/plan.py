@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rsfstudy.declare.study import Cell, Study
+from rsfstudy.declare.cell import Cell
+from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure
 from rsfstudy.slider.scene import Scene
 

@@ -13,10 +13,12 @@ import sys
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.compute import own_code
-from rsfstudy.declare.study import Study
+
+if TYPE_CHECKING:
+    from rsfstudy.declare.study import Study
 
 _PACKAGE = Path(__file__).parent.parent
 #: Code whose change may change a number.

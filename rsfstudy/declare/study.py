@@ -12,11 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select, spread
+from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
@@ -43,13 +44,6 @@ _FIGURES = frozenset(
 )
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
-
-
-class Cell(NamedTuple):
-    """A scene, and what the axes change of the fields of the study's measure there."""
-
-    scene: Scene
-    changes: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
