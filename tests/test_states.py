@@ -163,6 +163,35 @@ def test_critical_steps_by_motions(law, fields):
     agree(Triggered(), *(s.with_(load_velocity_ratio=30.0) for s in (one, two)))
 
 
+APART = 0.05
+
+
+def resting_apart(log_rate, shift, p):
+    one, other = resting(log_rate, shift, p)
+    return one + APART, other - APART
+
+
+def two_states_apart(log_rate, psis, shift, share, p):
+    return two_slip_states(log_rate, (psis[0] - APART, psis[1] + APART), shift, share, p)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoStatesApart(TwoSlipStates):
+    name = "two_states_apart"
+    evolutions = staticmethod(two_states_apart)
+    resting = staticmethod(resting_apart)
+
+
+def test_states_that_rest_apart_begin_at_rest():
+    """Steady sliding at V_* is that of the law, which need not be zero in each state."""
+    fields = {"stiffness_ratio": 1.5, "load_velocity_ratio": 1.3}
+    one, two = (Scene(law=law, **fields) for law in ("slip", TwoStatesApart))
+    motions = [simulate(scene, duration=10.0) for scene in (one, two)]
+    ends = [float(motion["log10_slip_rate"][-1]) for motion in motions]
+    assert ends[1] == pytest.approx(ends[0], abs=1e-6)
+    agree(RigidResponse(points=5), one, two)
+
+
 def test_trajectories():
     one, two = (simulate(s, duration=20.0) for s in both("slowness", load_velocity_ratio=3.0))
     assert two["state_variable"][-1] == pytest.approx(float(one["state_variable"][-1]), abs=1e-7)

@@ -14,6 +14,7 @@ from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
     in_rupture,
+    resting_of,
     without_mass,
 )
 from rsfstudy.slider.forms import SLOWEST, Point
@@ -92,7 +93,7 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    stepped = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.parts.law.states)
+    stepped = on_slow_manifold(scene, scene.spring_stress_step, resting_of(scene, 0.0, 0.0))
     if not scene.has_mass:
         return stepped
     return stepped._replace(log_rate=0.0, friction=0.0)

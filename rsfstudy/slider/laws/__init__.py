@@ -26,7 +26,7 @@ class Law(Part):
     A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
     slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
     states ``resting(log_rate, shift, p)``: the states Psi of steady sliding, of which stress has
-    taken `shift`.
+    taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
 
     A law of several states says how many, and states ``evolutions(log_rate, psis, shift, share,
     p)`` instead, all of them times a share, and `resting`.
