@@ -11,16 +11,26 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import cell, check, open, rerun, run, studies
+    from rsfstudy.api import cell, check, open, plot, rerun, run, studies
     from rsfstudy.declare.axis import Axis
     from rsfstudy.declare.study import Study
     from rsfstudy.one_scene import critical_step, limit_cycle, to_si
+    from rsfstudy.plots._motion import picture
+    from rsfstudy.rig.laboratory import Laboratory
+    from rsfstudy.rig.protocol_file import read_protocol
+    from rsfstudy.slider.loading import Segment
+    from rsfstudy.slider.protocol import protocol
     from rsfstudy.slider.scene import Scene
     from rsfstudy.trajectory import simulate
 
 # loaded on first use, so that a worker does not import what only its driver needs
 _HOMES = {
     "Scene": "slider.scene",
+    "Segment": "slider.loading",
+    "protocol": "slider.protocol",
+    "Laboratory": "rig.laboratory",
+    "read_protocol": "rig.protocol_file",
+    "picture": "plots._motion",
     "Study": "declare.study",
     "Axis": "declare.axis",
     "run": "api",
@@ -28,6 +38,7 @@ _HOMES = {
     "cell": "api",
     "open": "api",
     "check": "api",
+    "plot": "api",
     "studies": "api",
     "simulate": "trajectory",
     "critical_step": "one_scene",
@@ -37,13 +48,19 @@ _HOMES = {
 
 __all__ = [
     "Axis",
+    "Laboratory",
     "Scene",
+    "Segment",
     "Study",
     "cell",
     "check",
     "critical_step",
     "limit_cycle",
     "open",
+    "picture",
+    "plot",
+    "protocol",
+    "read_protocol",
     "rerun",
     "run",
     "simulate",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
 from rich import progress as bars
+from rich.console import Console
 
 from rsfstudy.compute import own_code, provenance, runner
 from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
@@ -24,7 +25,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
 from rsfstudy.measures import Outcome
+from rsfstudy.motion.engines import COMPILED, check_engine, compiled_engine, compiling
 from rsfstudy.slider.scene import Scene
+
+if TYPE_CHECKING:
+    from rsfstudy import plots
 
 
 def studies() -> dict[str, Study]:
@@ -41,6 +46,7 @@ def run(
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
+    engine: str | None = None,
     time_limit: float = DEFAULT_TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
@@ -66,6 +72,8 @@ def run(
         Forget the finished cells and compute all again.
     rtol : float, optional
         Accuracy of the cells.
+    engine : {"scipy", "compiled"}, optional
+        What integrates motions; compiled, which needs Numba, is much faster.
     time_limit : float
         CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
         times as much wall time. There is no limit in this process (``workers=0``).
@@ -93,7 +101,7 @@ def run(
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
-    declared = declaration(study, rtol, overrides)
+    declared = declaration(study, rtol, overrides, engine)
     keeping = Keeping(
         output=places.directory(output),
         format=format,
@@ -107,12 +115,17 @@ def run(
 
 
 def declaration(
-    study: str | Path | Study, rtol: float | None, overrides: Mapping[str, Any]
+    study: str | Path | Study,
+    rtol: float | None,
+    overrides: Mapping[str, Any],
+    engine: str | None = None,
 ) -> Study:
-    """A study with another accuracy and other values, checked."""
+    """A study with another accuracy, other values and another engine, checked."""
     declared = study if isinstance(study, Study) else catalogue.load(str(study))
-    if rtol is not None:
-        declared = replace(declared, accuracy=replace(declared.accuracy, rtol=rtol))
+    asked = {"rtol": rtol, "engine": engine}
+    changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    if changes:
+        declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
     return declared.with_(**overrides) if overrides else declared
 
 
@@ -126,18 +139,33 @@ def prepared(
     InvalidValue
         For anything wrong with the study or the options.
     """
+    check_engine(study.accuracy.engine)
     parts = tuple(study.own_parts.values())
     digest = own_code.digest(type(study.measure), *parts)
-    task = Task(study.measure, study.accuracy, workers.time_limit, parts=parts, own_code=digest)
+    code = provenance.code(study.accuracy.engine)
+    task = Task(study.measure, study.accuracy, workers.time_limit, code, parts, digest)
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent
     ready = runner.Run(study, keeping, task, workers.threads())
 
     def run() -> xr.Dataset:
+        if study.accuracy.engine == COMPILED:
+            _compile(ready.plan.examples, progress)
         with _bar(study.name, progress) as show:
             return ready(workers.mapper(ready.worker_log), show)
 
     return run
+
+
+def _compile(examples: Sequence[Scene], show: bool) -> None:
+    """Compile what such scenes need, before any cell is timed, and say how long it took."""
+    console, before = Console(stderr=True, quiet=not show), replace(compiling)
+    with console.status("compiling the equations ..."):
+        for scene in examples:
+            compiled_engine().prepare(scene)
+    programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
+    if programs:
+        console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")
 
 
 @contextlib.contextmanager
@@ -177,6 +205,45 @@ def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
     return store.read(places.results(name, output))
+
+
+def plot(
+    dataset: xr.Dataset | str | Path,
+    variable: str | None = None,
+    *,
+    style: Any = None,
+    own: Any = None,
+) -> plots.Figure:
+    """The figure of a dataset (or of a named study's results, or of a file), as its study declares
+    it; a notebook shows it, and its `savefig` writes it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset, str or Path
+    variable : str, optional
+        Draw this variable instead: as maps over two numeric axes, else as lines.
+    style : path, str, dict or list of those, optional
+        What `matplotlib.style.use` takes, laid over the style that ships: a style sheet of yours,
+        ``"dark_background"``, or ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one
+        column of a journal in inches. All colours and line styles come from ``axes.prop_cycle``.
+    own : function or module, optional
+        What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Yours to change: its ``axes`` are the panels, in the order of their letters, and
+        ``figure.axes[0].set_title("")`` and its like work as ever.
+
+    Raises
+    ------
+    InvalidValue
+        For a variable or a style that is none, and for a figure that does not fit.
+    """
+    from rsfstudy import plots
+
+    results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
+    return plots.figure(results, own, variable=variable, style=style)
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:

@@ -12,6 +12,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 
 _SPACED = "must read start:stop:count, two finite numbers and a count"
+_LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 _MOST_POINTS = 1_000_000
 
 
@@ -35,7 +36,9 @@ def place(text: str) -> tuple[str, str]:
 
 
 def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
-    """One ``AXIS=VALUES``: a label, a single value, a comma list, or start:stop:count."""
+    """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
+    start:stop:count:log.
+    """
     name, equals, values = text.partition("=")
     if not equals or not name.strip() or not values.strip():
         raise InvalidValue("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
@@ -45,26 +48,34 @@ def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     if len(parts) > 1:
         if not all(parts):
             raise InvalidValue("--set", text, "leaves a value out")
-        return name.strip(), [_value(part) for part in parts]
-    if values.count(":") == 2:
-        return name.strip(), _spaced(text, *values.split(":"))
+        return name.strip(), [value(part) for part in parts]
     if ":" in values:
-        raise InvalidValue("--set", text, _SPACED)
-    return name.strip(), _value(parts[0])
+        return name.strip(), _spaced(text, values.split(":"))
+    return name.strip(), value(parts[0])
 
 
-def _spaced(text: str, start: str, stop: str, count: str) -> list[float]:
+def _spaced(text: str, parts: list[str]) -> list[float]:
+    spacing = parts[3].strip().lower() if len(parts) == 4 else ""
+    if len(parts) not in (3, 4) or spacing not in ("", "log"):
+        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC)
     try:
-        first, last, points = float(start), float(stop), int(count)
+        first, last, points = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError as error:
-        raise InvalidValue("--set", text, _SPACED) from error
+        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC) from error
     if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
         raise InvalidValue("--set", text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
     spaced: list[float] = np.linspace(first, last, points).tolist()
-    return spaced
+    if not spacing:
+        return spaced
+    if first <= 0.0 or last <= 0.0:
+        remedy = "Leave :log out, or start above 0."
+        raise InvalidValue("--set", text, "has no logarithm of 0 or less", remedy=remedy)
+    geometric: list[float] = np.geomspace(first, last, points).tolist()
+    return geometric
 
 
-def _value(text: str) -> Any:
+def value(text: str) -> Any:
+    """A flag, a number, or else a text."""
     flags = {"true": True, "false": False}
     if text.lower() in flags:
         return flags[text.lower()]

@@ -8,6 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,7 @@ import click
 import xarray as xr
 from rich.table import Table
 
-from rsfstudy import api, assignments, terminal
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT
+from rsfstudy import api, assignments, cli_simulate, options, terminal
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import FORMATS, Keeping
 from rsfstudy.compute.workers import Workers
@@ -24,6 +24,7 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, brief
 from rsfstudy.files import contents, places, restore
+from rsfstudy.motion.engines import lacking
 from rsfstudy.terminal import FAILED, OK, Ended
 
 WRONG_USAGE = 2
@@ -31,58 +32,6 @@ _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 RESULTS = (".nc", ".zarr")
 
 _stderr = terminal.Plain(stderr=True, markup=False, emoji=False, highlight=False)
-
-_all = click.option("--all", "every", is_flag=True, help="Every named study.")
-
-
-def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
-    return places.directory(value)
-
-
-_output = click.option(
-    "--output",
-    type=click.Path(file_okay=False),
-    callback=_directory,
-    default=places.DEFAULT,
-    show_default=True,
-    help="Directory of the results.",
-)
-_set = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="AXIS=VALUES",
-    help="Other values: a comma list, or start:stop:count.",
-)
-
-
-_rtol = click.option(
-    "--rtol",
-    type=float,
-    help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
-)
-_workers = click.option(
-    "--workers",
-    type=click.IntRange(1),
-    default=2,
-    show_default=True,
-    help="Worker processes of this machine.",
-)
-_serial = click.option("--serial", is_flag=True, help="Compute in this process.")
-_scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
-_time_limit = click.option(
-    "--time-limit",
-    type=float,
-    default=DEFAULT_TIME_LIMIT,
-    show_default=True,
-    help="Seconds of CPU time after which a worker gives a cell up.",
-)
-_study = click.option(
-    "--study",
-    type=click.Path(path_type=Path),
-    help="File that declares the study, if its measure, a part or the figure is its own.",
-)
-_quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -126,8 +75,8 @@ def list_studies() -> None:
 
 @cli.command()
 @click.argument("name")
-@_set
-@_rtol
+@options.settings
+@options.rtol
 def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
     """Show the declaration of a study, without running it; or what is in a results file, and how
     to reproduce each cell that failed.
@@ -142,14 +91,15 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
 
 @cli.command()
 @click.argument("name", required=False)
-@_all
-@_set
-@_output
-@_workers
-@_serial
-@_scheduler
-@_rtol
-@_time_limit
+@options.every
+@options.settings
+@options.output
+@options.workers
+@options.serial
+@options.scheduler
+@options.rtol
+@options.engine
+@options.time_limit
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
 @click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")
 @click.option("--despite-failures", is_flag=True, help="Reduce what there is where cells failed.")
@@ -160,7 +110,9 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
     show_default=True,
     help="One NetCDF file, or a Zarr store written in pieces, which never replaces another.",
 )
-@_quiet
+@options.figure
+@options.style
+@options.quiet
 def run(
     name: str | None,
     every: bool,
@@ -170,51 +122,90 @@ def run(
     serial: bool,
     scheduler: str | None,
     rtol: float | None,
+    engine: str | None,
     time_limit: float,
+    form: str | None,
+    style: str | None,
     quiet: bool,
     **choices: Any,
 ) -> int:
-    """Run a study: OUTPUT/NAME.nc, OUTPUT/NAME.png, its reductions and its claims."""
-    studies = [_declared(catalogue.load(n), settings, rtol) for n in _results(name, every)]
+    """Run a study: OUTPUT/NAME.nc, its figure OUTPUT/NAME.png, its reductions and its claims."""
+    names = _results(name, every)
+    studies = [_declared(catalogue.load(n), settings, rtol, engine) for n in names]
+    left_out = _left_out(studies) if every and engine is None else []
+    studies = [study for study in studies if study.name not in {end.study for end in left_out}]
     command = shlex.join(["rsfstudy", *sys.argv[1:]])
     keeping = Keeping(output=output, command=command, **choices)
+    look = Look(form, style)
     with _client(scheduler, serial) as client:
         where = Workers(0 if serial else workers, client, time_limit)
         ready = [(study, api.prepared(study, keeping, where, not quiet)) for study in studies]
         for study in studies if rtol is not None else ():
             terminal.announce(study)
         if every:
-            return _run_all(ready, keeping)
-        return OK if _run(*ready[0], keeping).is_fine else FAILED
+            return _run_all(ready, keeping, look, left_out)
+        return OK if _run(*ready[0], keeping, look).is_fine else FAILED
 
 
-def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping) -> Ended:
+@dataclass(frozen=True)
+class Look:
+    """How a figure is to be drawn: its file format, its style, and of which variable."""
+
+    form: str | None = None
+    style: str | None = None
+    variable: str | None = None
+
+    def beside(self, results: Path) -> Path:
+        """The figure beside results, which may be no file."""
+        name = results.name.removesuffix(".nc").removesuffix(".zarr")
+        words = [name, self.variable, self.form or options.FIGURES[0]]
+        return results.with_name(".".join(filter(None, words)))
+
+
+def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping, look: Look) -> Ended:
     """Compute a study, draw it and print what came out."""
     assert keeping.output is not None
     began = time.monotonic()
     dataset = compute()
     file = keeping.output / f"{study.name}.{_ENDINGS[keeping.format]}"
     own = None if isinstance(study.plot, str) else study.plot
-    drawn = _drawn(dataset, keeping.output / f"{study.name}.png", own)
+    drawn = _drawn(dataset, look.beside(file), look, own)
     terminal.report(dataset, study.name, [file, *drawn])
     return terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
 
 
-def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: Keeping) -> int:
+def _left_out(studies: Sequence[Study]) -> list[Ended]:
+    """Name the studies whose engine is not installed."""
+    ends = [
+        Ended(study.name, 0.0, left_out=why)
+        for study in studies
+        if (why := lacking(study.accuracy.engine))
+    ]
+    for end in ends:
+        terminal.console.print(f"{end.study}: left out: {end.left_out}", style="yellow")
+    return ends
+
+
+def _run_all(
+    ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]],
+    keeping: Keeping,
+    look: Look,
+    left_out: Sequence[Ended],
+) -> int:
     """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
     ends: list[Ended] = []
     try:
         for study, compute in ready:
             began = time.monotonic()
             try:
-                ends.append(_run(study, compute, keeping))
+                ends.append(_run(study, compute, keeping, look))
             except Interrupted:
                 raise
             except RsfStudyError as error:
                 _stderr.print(f"error: {error}")
                 ends.append(Ended(study.name, time.monotonic() - began, "not finished"))
     finally:
-        terminal.summary(ends)
+        terminal.summary([*ends, *left_out])
     return OK if all(end.is_fine for end in ends) else FAILED
 
 
@@ -227,18 +218,18 @@ def _run_all(ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]], keeping: K
     metavar="AXIS=VALUE",
     help="Only this cell, in this process, failing as it fails.",
 )
-@_study
+@options.study
 @click.option(
     "--output",
     type=click.Path(file_okay=False),
-    callback=_directory,
+    callback=options.directory,
     help="Directory to keep the new results in; nothing is written without it.",
 )
-@_workers
-@_serial
-@_scheduler
-@_time_limit
-@_quiet
+@options.workers
+@options.serial
+@options.scheduler
+@options.time_limit
+@options.quiet
 def rerun(
     file: Path,
     place: tuple[str, ...],
@@ -270,8 +261,8 @@ def rerun(
 
 @cli.command()
 @click.argument("name", required=False)
-@_all
-@_output
+@options.every
+@options.output
 def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values: a named study's, or those of a file."""
     if not every:
@@ -280,6 +271,8 @@ def check(name: str | None, every: bool, output: Path) -> int:
     for what in catalogue.names():
         if (output / f"{what}.nc").exists():
             datasets.append(api.open(what, output))
+        elif why := lacking(catalogue.load(what).accuracy.engine):
+            terminal.console.print(f"{what}: left out: {why}", style="yellow")
         else:
             terminal.console.print(f"{what}: not run yet", style="red")
             status = FAILED
@@ -288,24 +281,46 @@ def check(name: str | None, every: bool, output: Path) -> int:
 
 @cli.command()
 @click.argument("name", required=False)
-@_all
-@_output
-@_study
-def plot(name: str | None, every: bool, output: Path, study: Path | None) -> int:
+@options.every
+@options.drawn
+@options.figure
+@options.style
+@click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
+@options.study
+def plot(
+    name: str | None,
+    every: bool,
+    output: Path | None,
+    form: str | None,
+    style: str | None,
+    variable: str | None,
+    study: Path | None,
+) -> int:
     """Draw the figure of a named study's results, or of a file, beside it. A figure of your own is
     taken from the file that --study names, which is run.
     """
-    status = OK
+    status, look = OK, Look(form, style, variable)
+    target = _target(output, form, every)
     for what in _results(name, every):
-        dataset = api.open(what, output)
-        named = Path(what)
-        beside = named if named.suffix in RESULTS else output / f"{dataset.attrs['id']}.png"
-        path = beside.with_suffix(".png")
-        drawn = _drawn(dataset, path, _own_figure(dataset, study))
+        results = places.results(what, places.DEFAULT if target else output)
+        dataset = api.open(results)
+        place = results if output is None else output / results.name
+        own = None if variable else _own_figure(dataset, study)
+        drawn = _drawn(dataset, target or look.beside(place), look, own)
         status = status if drawn else FAILED
         for file in drawn:
             terminal.console.print(f"{file}", highlight=False)
     return status
+
+
+def _target(output: Path | None, form: str | None, every: bool) -> Path | None:
+    """The file that --output names, if it is a figure."""
+    ending = "" if output is None else output.suffix[1:].lower()
+    if ending not in options.FIGURES:
+        return None
+    if every or form not in (None, ending):
+        raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
+    return output
 
 
 # ---- arguments ------------------------------------------------------------------------------
@@ -317,8 +332,10 @@ def _results(name: str | None, every: bool) -> list[str]:
     return list(catalogue.names()) if name is None else [name]
 
 
-def _declared(study: Study, settings: tuple[str, ...], rtol: float | None) -> Study:
-    return api.declaration(study, rtol, assignments.overrides(study, settings))
+def _declared(
+    study: Study, settings: tuple[str, ...], rtol: float | None, engine: str | None = None
+) -> Study:
+    return api.declaration(study, rtol, assignments.overrides(study, settings), engine)
 
 
 @contextlib.contextmanager
@@ -350,17 +367,19 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
         return lines
 
 
-def _drawn(dataset: xr.Dataset, path: Path, own: Any = None) -> list[Path]:
+def _drawn(dataset: xr.Dataset, path: Path, look: Look, own: Any = None) -> list[Path]:
     """The figure, if it can be drawn; the results are there already."""
     from rsfstudy import plots
 
     try:
-        plots.save(dataset, path, own)
+        plots.save(dataset, path, own, variable=look.variable, style=look.style)
     except (OSError, RsfStudyError) as error:
         _stderr.print(f"no figure: {error}")
         return []
     return [path]
 
+
+cli.add_command(cli_simulate.simulate)
 
 if __name__ == "__main__":
     main()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,8 @@ from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
+from rsfstudy.motion.engines import SCIPY, check_engine
+from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import quantity
 
@@ -22,6 +25,7 @@ def critical_step(
     direction: str = "up",
     *,
     rtol: float = DEFAULT_RTOL,
+    engine: str = SCIPY,
 ) -> xr.Dataset:
     """The critical step of one scene.
 
@@ -36,6 +40,8 @@ def critical_step(
         Steps that increase, or decrease.
     rtol : float
         Relative accuracy of V_0/V_* - 1, or of the displacement.
+    engine : {"scipy", "compiled"}
+        What integrates motions; compiled, which needs Numba, is much faster.
 
     Returns
     -------
@@ -43,10 +49,10 @@ def critical_step(
         The critical value, its numerical error, and the values beside it that were verified as
         stable and as unstable; the status, the message and the work.
     """
-    return _measured(CriticalStep(of=of, direction=direction), scene, rtol)
+    return _measured(CriticalStep(of=of, direction=direction), scene, rtol, engine)
 
 
-def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL) -> xr.Dataset:
+def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY) -> xr.Dataset:
     """The stick-slip limit cycle of one scene.
 
     Parameters
@@ -55,6 +61,8 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL) -> xr.Dataset:
         The slider, with the load point velocity after the step; usually with inertia.
     rtol : float
         Relative accuracy of the recurrence interval and the stress drops, and of ln V.
+    engine : {"scipy", "compiled"}
+        As in `critical_step`.
 
     Returns
     -------
@@ -63,7 +71,7 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL) -> xr.Dataset:
         numerical error; the orbit along ``phase``; the status (``no_limit_cycle`` where the motion
         settles), the message and the work.
     """
-    return _measured(LimitCycle(), scene, rtol)
+    return _measured(LimitCycle(), scene, rtol, engine)
 
 
 def to_si(
@@ -98,42 +106,30 @@ def to_si(
                 "reference_rate", None, "is not one number in the dataset", remedy="State it."
             )
         reference_rate = float(dataset["reference_rate"])
-    scales = {
-        "sigma_*": (normal_stress, "Pa"),
-        "D_c": (slip_distance, "m"),
-        "V_*": (slip_distance * reference_rate, "m s-1"),
-        "D_c/V_*": (1.0 / reference_rate, "s"),
-        "sigma_*/D_c": (normal_stress / slip_distance, "Pa m-1"),
-    }
-    for of, (scale, _units) in scales.items():
-        if not 0.0 < scale < float("inf"):
-            raise InvalidValue(of, scale, "must be positive and finite")
-    result = dataset.copy()
-    for name, values in dataset.variables.items():
-        scale, units = scales.get(values.attrs.get("scale", ""), (1.0, ""))
-        if units:
-            about = {k: v for k, v in values.attrs.items() if k != "scale"} | {"units": units}
-            result[name] = (values.dims, values.values * scale, about)
-    return result
+    return scaled(dataset, scales(normal_stress, slip_distance, reference_rate))
 
 
-def _measured(measure: Measure, scene: Scene, rtol: float) -> xr.Dataset:
+def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
-    outcome = measure(scene, Accuracy(rtol))
-    dataset = xr.Dataset(coords=dict(measure.inner_coordinates))
-    dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
+    check_engine(engine)
+    outcome = measure(scene, Accuracy(rtol, engine=engine))
     own = {about.name: about for about in measure.quantities}
+    inner = measure.inner_coordinates
+    variables: dict[str, Any] = {}
     for name, dims in measure.variables.items():
         about = quantity(name, own)
         attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
-        missing = np.full([dataset.sizes[d] for d in dims], np.nan)
+        missing = np.full([len(inner[dim]) for dim in dims], np.nan)
         values = outcome.values.get(name, missing)
-        dataset[name] = (dims, values, {k: v for k, v in attrs.items() if v})
-    dataset["rhs_evaluations"] = ((), outcome.rhs_evaluations)
+        variables[name] = (dims, values, {k: v for k, v in attrs.items() if v})
+    variables["rhs_evaluations"] = ((), outcome.rhs_evaluations)
+    rate = ((), scene.reference_rate, {"units": "s-1"})
+    dataset = xr.Dataset(variables, coords={**inner, "reference_rate": rate})
     dataset.attrs = {
-        "scene": json.dumps(scene.as_dict()),
+        "scene": json.dumps(scene.describe()),
         "rtol": rtol,
+        "engine": engine,
         "status": outcome.status.label,
         "message": outcome.message,
     }
-    return dataset.set_coords("reference_rate")
+    return dataset

@@ -28,12 +28,13 @@ class Status(IntEnum):
     NORM_BELOW_LOADING_RATE = 8, "the loading alone already reaches the instability norm"
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
-    UNSTABLE_AT_ANY_STIFFNESS = 11, "mass makes steady sliding unstable however stiff the spring"
+    UNSTABLE_AT_ANY_STIFFNESS = 11, "steady sliding is unstable however stiff the spring"
     STABLE_AT_ANY_STIFFNESS = 12, "every perturbation decays however soft the spring"
     NO_STEP = 13, "the scene has no step to respond to"
     NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
     ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"
     SLIP_STOPPED = 16, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
+    NOT_PERIODIC = 17, "the motion goes on without repeating itself after up to 16 events"
 
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"

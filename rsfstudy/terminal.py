@@ -20,7 +20,8 @@ from rsfstudy import api
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
-from rsfstudy.declare.study import Study, settings, short
+from rsfstudy.declare.study import Study
+from rsfstudy.declare.wording import settings, short
 from rsfstudy.errors import RunError
 from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
@@ -112,12 +113,15 @@ class Ended:
         What went wrong; empty if nothing did.
     verdicts : str
         How many claims had which verdict.
+    left_out : str
+        Why it was not run, if it was left out.
     """
 
     study: str
     seconds: float
     wrong: str = ""
     verdicts: str = ""
+    left_out: str = ""
 
     @property
     def is_fine(self) -> bool:
@@ -153,6 +157,8 @@ def summary(ends: Sequence[Ended]) -> None:
     table = Table("study", "status", Column("time", justify="right"), "verdicts")
     for end in ends:
         status = Text(end.wrong or "ok", style="green" if end.is_fine else "red")
+        if end.left_out:
+            status = Text(f"left out: {end.left_out.partition(' (')[0]}", style="yellow")
         table.add_row(end.study, status, f"{end.seconds:.0f} s", end.verdicts or "-")
     console.print(table)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import json
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -11,14 +13,19 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind
-from rsfstudy.motion.recording import OBSERVED, SAMPLES, observed
+from rsfstudy.motion.engines import SCIPY, check_engine
+from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
+from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
+from rsfstudy.slider.protocol import Protocol
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
+#: Time that a step is followed for, and load point displacement beyond what a protocol states.
+_USUAL, _BEYOND = 50.0, 20.0
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
@@ -26,9 +33,10 @@ _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 def simulate(
     scene: Scene,
     *,
-    duration: float = 50.0,
+    duration: float | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
+    engine: str = SCIPY,
 ) -> xr.Dataset:
     """Follow the motion of a scene from the instant after its step.
 
@@ -36,67 +44,76 @@ def simulate(
     ----------
     scene : Scene
         The slider, its effects and its loading.
-    duration : float
-        Time to follow it for, in D_c/V_*.
+    duration : float, optional
+        Time to follow it for, in D_c/V_*. By default 50; of a protocol, all that it states, and 20
+        D_c of the load point beyond where it does not say how long its last segment lasts.
     rtol : float
         Accuracy of the motion.
     budget : int
         Right-hand sides it may cost.
+    engine : {"scipy", "compiled"}
+        What integrates; compiled, which needs Numba, is much faster.
 
     Returns
     -------
     xarray.Dataset
         ``time``, ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring),
-        ``frictional_stress``, ``normal_stress_ratio``, ``state_variable`` and ``regime`` along
-        ``sample``. A motion that cannot go on ends early, with its ``status`` and ``message`` in
-        the attributes.
+        ``frictional_stress``, ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``,
+        and what a rig reads, ``load_point_displacement`` and ``friction_coefficient`` (spring
+        stress over effective normal stress), along ``sample``; and ``porosity`` and
+        ``pore_pressure`` of a dilatant fault. A motion that cannot go on ends early, with its
+        ``status`` and ``message`` in the attributes.
 
     Raises
     ------
     InvalidValue
         For a duration that is not positive and finite.
     """
+    duration = _as_stated(scene) if duration is None else duration
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")
-    meter = Meter(budget)
-    rows: list[tuple[float, ...]] = []
-    regimes = dict.fromkeys(_REGIMES)
+    check_engine(engine)
+    meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
+    recording = Recording(list(_REGIMES))
     status, message = Status.OK, ""
-    moving = follow(scene, Accuracy(rtol, budget), meter, samples=SAMPLES, until=duration)
+    moving = follow(scene, accuracy, meter, recording=recording, until=duration)
     try:
-        for event in moving:
-            if event.kind is not Kind.END:  # the last sample is there
-                regimes[event.regime] = None
-                rows += [(*observed(scene, event), list(regimes).index(event.regime))]
+        collections.deque(moving, maxlen=0)
     except Halt as halt:
         status, message = halt.status, str(halt)
-    dataset = _dataset(np.array(rows).reshape(-1, len(OBSERVED) + 1), list(regimes))
+    seen, fluid = recording.seen(scene), scene.parts.fluid.unknowns
+    columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
+    first = STATES + scene.states - len(fluid)
+    columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
+    columns |= {LOAD_POINT: load_point_of(scene, seen), FRICTION: friction_of(seen)}
+    dataset = _dataset(columns, seen[:, REGIME], recording.regimes)
     dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
     dataset = dataset.set_coords(["time", "slip", "reference_rate"])
     return dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
             "Conventions": "CF-1.11",
-            "scene": json.dumps(scene.as_dict()),
+            "scene": json.dumps(scene.describe()),
             "effects": " ".join(scene.effects) or "none",
             "status": status.label,
             "message": message,
             "rtol": rtol,
+            "engine": engine,
             "rhs_evaluations": meter.spent,
             "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
         }
     )
 
 
-def _dataset(samples: np.ndarray, regimes: list[str]) -> xr.Dataset:
+def _dataset(
+    columns: Mapping[Quantity, np.ndarray], regime: np.ndarray, regimes: list[str]
+) -> xr.Dataset:
     dataset = xr.Dataset()
-    for column, name in enumerate(OBSERVED):
-        about = quantity(name)
-        attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
-        dataset[name] = ("sample", samples[:, column], {k: v for k, v in attrs.items() if v})
+    for about, values in columns.items():
+        dataset[about.name] = ("sample", values, _about(about))
     dataset["regime"] = (
         "sample",
-        samples[:, -1].astype(np.int8),
+        regime.astype(np.int8),
         {
             "long_name": quantity("regime").long_name,
             "flag_values": np.arange(len(regimes), dtype=np.int8),
@@ -104,3 +121,19 @@ def _dataset(samples: np.ndarray, regimes: list[str]) -> xr.Dataset:
         },
     )
     return dataset
+
+
+def _about(about: Quantity) -> dict[str, str]:
+    attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
+    return {key: text for key, text in attrs.items() if text}
+
+
+def _as_stated(scene: Scene) -> float:
+    """Time that the loading of a scene takes."""
+    loading = scene.parts.loading
+    if len(loading.segments) == 1:
+        return _USUAL
+    stated = math.fsum(s.duration for s in loading.segments if s.duration < math.inf)
+    if isinstance(loading, Protocol) and loading.lasts > stated:
+        return loading.lasts
+    return stated + (_BEYOND / scene.load_velocity if scene.load_velocity else _USUAL)

@@ -177,7 +177,7 @@ _QUANTITIES = (
         "healing_exponent",
         "",
         "1",
-        "exponent of the state variable theta in slip rate, from arrest to the slowest slip rate",
+        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
     ),
     Quantity("residual_friction", r"$\tau/\sigma$", "1", "friction coefficient at peak slip rate"),
     Quantity(

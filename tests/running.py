@@ -25,6 +25,7 @@ from rsfstudy import Axis, Scene, Study, cli
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion.engines import COMPILED
 
 SMALL = Study(
     name="small",
@@ -47,8 +48,7 @@ def run(study=SMALL, **options) -> xr.Dataset:
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
-#: claims speak of, and some between; of costs, the integrators that they turn on; of error
-#: estimates, a scene of each kind.
+#: claims speak of, and some between; of costs, the integrators that they turn on.
 ENOUGH = {
     "accuracy_cost": {
         "integrator": ["DOP853", "RK45", "DOP853 + Radau", "Radau (mass always)"],
@@ -56,24 +56,52 @@ ENOUGH = {
         "repeats": 1,
     },
     "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},
-    "coverage": {"sample": [0]},
+    "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
+    "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
     "instability_norm": {
         "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
         "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
     },
+    "laws": {"stiffness_ratio": [0.5, 1.0, 2.0]},
+    "laws_cycles": {"load_velocity_ratio": [2.0, 50.0, 250.0]},
+    "laws_velocity_steps": {"stiffness_ratio": [1.25, 1.75]},
     "rate_step_lattice": {"stiffness_ratio": [1.0, 1.5, 2.0]},
     "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},
+    "slide_hold_slide": {"hold_time": [1.0, 1e4, 1e5, 1e6, 1e7, 1e8]},
+    "stability_map": {
+        "stiffness_ratio": [0.2, 0.6, 0.8, 0.87, 0.96, 1.04],
+        "load_velocity_ratio": np.geomspace(1.01, 1000.0, 5),
+    },
     "stress_drop": {
         "stiffness_ratio": [0.4, 0.8],
         "load_velocity_ratio": 10.0 ** np.linspace(0.0, 3.0, 4),
     },
+    "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
+    "two_states": {
+        "stiffness_ratio": [0.84, 0.8531, 0.8567, 0.8655, 0.8659, 0.8663, 0.8667, 0.9, 0.95, 1.02]
+    },
 }
+
+
+#: Studies whose motions are left to the compiled engine, which `test_compiled` holds to SciPy's.
+LEFT_TO_COMPILED = (
+    "bounded_slip",
+    "coverage",
+    "dilatant_cycles",
+    "dilatant_steps",
+    "slide_hold_slide",
+    "stress_drop",
+    "two_states",
+    "velocity_steps",
+)
 
 
 def enough(name: str) -> Study:
     """The study, or enough of it: fewer points, but the study as declared, with all its claims."""
     study = catalogue.load(name)
+    if name in LEFT_TO_COMPILED:
+        study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
     return replace(study.with_(**ENOUGH.get(name, {})), overrides=study.overrides)
 
 

@@ -1,11 +1,14 @@
-"""What a cell costs beyond its physics, measured: ``python tests/scale.py``.
+"""What a cell costs beyond its physics, measured: ``python tests/scale.py [--million]``.
 
-Trivial cells at 10^3, 10^4 and 10^5, each size in a process of its own: time and driver memory a
-cell, bytes on disk. Then a real lattice on one worker and on two, in turns.
+Trivial cells at 10^3, 10^4, 10^5 and perhaps 10^6, with both engines, each in a process of its own:
+time a cell by phases, CPU time of all processes, driver memory, bytes on disk. Then a real lattice
+on one worker and on two, in turns.
 """
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import resource
 import statistics
@@ -13,13 +16,36 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, ClassVar
+from unittest import mock
 
 import numpy as np
-from faulty import Faulty
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.compute import runner
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Free(Measure):
+    """Gives b/a, at once: what cells cost beyond their physics is all they cost."""
+
+    name: ClassVar[str] = "free"
+    headline: ClassVar[str] = "total"
+    variables: ClassVar = {"total": ()}
+    typical_work: ClassVar[int] = 1
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """One right-hand side."""
+        meter.charge("any", 1)
+        return Outcome(Status.OK, {"total": scene.b_over_a})
 
 
 def lattice(cells: int) -> Study:
@@ -32,7 +58,7 @@ def lattice(cells: int) -> Study:
             Axis("a", np.linspace(0.01, 0.02, 10)),
             Axis("b_over_a", np.linspace(1.5, 3.0, cells // 10)),
         ],
-        measure=Faulty(),
+        measure=Free(),
     )
 
 
@@ -41,28 +67,66 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def measured(cells: int, workers: int, format: str = "netcdf") -> dict[str, float]:
-    """One run, in this process."""
-    options = {"workers": workers, "progress": False, "format": format}
+#: Steps of a run, by the methods that take them.
+PHASES = {"__init__": "planning", "_compute_missing": "computing", "_finished": "writing"}
+
+
+@contextlib.contextmanager
+def timed(seconds: dict[str, float]) -> Iterator[None]:
+    """Note how long each phase of a run takes."""
+
+    def noting(method: Callable[..., Any], phase: str) -> Callable[..., Any]:
+        def noted(*words: Any, **options: Any) -> Any:
+            began = time.perf_counter()
+            try:
+                return method(*words, **options)
+            finally:
+                seconds[phase] = time.perf_counter() - began
+
+        return noted
+
+    with contextlib.ExitStack() as stack:
+        for name, phase in PHASES.items():
+            noted = noting(getattr(runner.Run, name), phase)
+            stack.enter_context(mock.patch.object(runner.Run, name, noted))
+        yield
+
+
+def processor() -> float:
+    """CPU time in s of this process and of those it has started and seen end."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def measured(
+    cells: int, workers: int, format: str = "netcdf", engine: str = "scipy"
+) -> dict[str, float]:
+    """One run, in this process; times in us a cell, without what the measure took itself."""
+    options = {"workers": workers, "progress": False, "format": format, "engine": engine}
     with tempfile.TemporaryDirectory() as output:
         rsfstudy.run(lattice(100), output=output, **options)
-    with tempfile.TemporaryDirectory() as output:
-        before, began = peak(), time.perf_counter()
-        rsfstudy.run(lattice(cells), output=output, **options)
-        seconds = time.perf_counter() - began
+    seconds: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as output, timed(seconds):
+        before, used, began = peak(), processor(), time.perf_counter()
+        results = rsfstudy.run(lattice(cells), output=output, **options)
+        seconds["all"] = time.perf_counter() - began
+        spent = processor() - used
         sizes = {p.suffix: p.stat().st_size for p in Path(output).iterdir() if p.is_file()}
+    physics = float(results["wall_time"].sum()) / max(1, workers)
     return {
-        "ms": 1e3 * seconds / cells,
+        **{phase: 1e6 * took / cells for phase, took in seconds.items()},
+        "beyond": 1e6 * (seconds["all"] - physics) / cells,
+        "cpu": 1e6 * spent / cells,
         "bytes": (peak() - before) / cells,
         "file": sizes.get(".nc", 0) / cells,
         "journal": sizes[".sqlite"] / cells,
     }
 
 
-def apart(cells: int, workers: int, format: str = "netcdf") -> dict[str, float]:
-    """One run, in a process of its own."""
-    words = [sys.executable, __file__, str(cells), str(workers), format]
-    said = subprocess.run(words, capture_output=True, text=True, check=True)
+def apart(*words: int | str) -> dict[str, float]:
+    """What `measured` gives for these arguments, in a process of its own."""
+    command = [sys.executable, __file__, *map(str, words)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(said.stdout)
     return found
 
@@ -88,25 +152,35 @@ def speed_up(repeats: int = 3) -> list[float]:
     return ratios
 
 
-def main() -> None:
+COLUMNS = {
+    "beyond": "us a cell beyond physics",
+    **{phase: phase for phase in PHASES.values()},
+    "cpu": "CPU",
+    "bytes": "driver, bytes a cell",
+    "file": "file",
+    "journal": "journal",
+}
+
+
+def main(largest: int) -> None:
     """Print the tables of the README."""
-    print("| cells | workers | ms a cell | driver, bytes a cell | file | journal |")
-    for cells in (10**3, 10**4, 10**5):
-        for workers in (0, 2):
-            found = apart(cells, workers)
-            print(
-                f"| {cells:,} | {workers} | {found['ms']:.3f} | {found['bytes']:.0f} "
-                f"| {found['file']:.0f} | {found['journal']:.0f} |"
-            )
-    found = apart(10**5, 2, "zarr")
-    print(f"| 100,000 (zarr) | 2 | {found['ms']:.3f} | {found['bytes']:.0f} | |")
+    print(f"| cells | engine | workers | {' | '.join(COLUMNS.values())} |")
+    print("|---" * (3 + len(COLUMNS)) + "|")
+    sizes = [size for size in (10**3, 10**4, 10**5, 10**6) if size <= largest]
+    cases = itertools.product(sizes, ("scipy", "compiled"), (0, 2), ("netcdf",))
+    for cells, engine, workers, format in (*cases, (10**5, "scipy", 2, "zarr")):
+        found = apart(cells, workers, format, engine)
+        name = engine if format == "netcdf" else f"{engine} ({format})"
+        numbers = " | ".join(f"{found[column]:.0f}" for column in COLUMNS)
+        print(f"| {cells:,} | {name} | {workers} | {numbers} |", flush=True)
     print("\n4,500 rate steps:")
     ratios = speed_up()
     print(f"  median {statistics.median(ratios):.2f}")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        print(json.dumps(measured(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3])))
+    asked = sys.argv[1:]
+    if asked and asked[0] != "--million":
+        print(json.dumps(measured(int(asked[0]), int(asked[1]), *asked[2:])))
     else:
-        main()
+        main(10**6 if asked else 10**5)

@@ -17,6 +17,7 @@ from rsfstudy import assignments, cli
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim
 from rsfstudy.files import store
+from rsfstudy.motion import engines
 from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
@@ -143,6 +144,8 @@ def test_list_and_show():
         (["run", NAME, "--set", "b_over_a="], "must read AXIS=VALUES"),
         (["run", NAME, "--set", "b_over_a=2:3:x"], "must read start:stop:count"),
         (["run", NAME, "--set", "b_over_a=2:3"], "must read start:stop:count"),
+        (["run", NAME, "--set", "b_over_a=2:3:4:geom"], "write start:stop:count:log, as in"),
+        (["run", NAME, "--set", "b_over_a=0:3:4:log"], "has no logarithm of 0 or less"),
         (["run", NAME, "--set", "b_over_a=2,2"], "b_over_a = 2.0: stands twice"),
         (["run", NAME, "--set", "load_velocity_ratio=3"], "is what the measure looks for"),
         (["run", NAME, "--set", "b_over_a=two"], "b_over_a = 'two': must be a number"),
@@ -173,6 +176,7 @@ def test_results_that_are_not_there_are_status_1(tmp_path):
         ("b_over_a=2", 2.0),
         ("b_over_a=2,3.5", [2.0, 3.5]),
         ("b_over_a=1:2:3", [1.0, 1.5, 2.0]),
+        ("b_over_a=1:100:3:log", [1.0, 10.0, 100.0]),
         ("law=slip,slowness", ["slip", "slowness"]),
         ("inertia=true,false", [True, False]),
     ],
@@ -256,6 +260,46 @@ def test_run_all_is_fine_where_every_study_is(catalogued, tmp_path):
     ran = call("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0
     assert [row[0] for row in rows(ran.stdout).values()] == ["ok", "ok"]
+
+
+@pytest.fixture
+def without_numba(monkeypatch):
+    """As where Numba is not installed."""
+    monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.engine", None)
+    engines.compiled_engine.cache_clear()
+    yield
+    engines.compiled_engine.cache_clear()
+
+
+def compiled(**fields):
+    study = declared()
+    return replace(study, accuracy=replace(study.accuracy, engine="compiled"), **fields)
+
+
+def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypatch, without_numba):
+    """Where Numba is missing, a study that needs it is no failure."""
+    monkeypatch.setenv("COLUMNS", "150")
+    catalogued(compiled(name="dear"), replace(declared(), name="plain"))
+    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    said, short = "left out: needs Numba (pip install 'rsfstudy[fast]')", "left out: needs Numba"
+    assert f"dear: {said}" in ran.stdout
+    ended = {name: row[0] for name, row in rows(ran.stdout).items()}
+    assert ended == {"plain": "ok", "dear": short}
+    assert not list(tmp_path.glob("dear*"))
+    checked = call("check", "--all", "--output", tmp_path)
+    assert f"dear: {said}" in checked.stdout
+    assert "not run yet" not in checked.stdout
+
+
+def test_what_is_asked_for_is_not_left_out(catalogued, tmp_path, without_numba):
+    """A study alone, or the engine itself: an error with the remedy, before any work."""
+    catalogued(compiled(name="dear"), replace(declared(), name="plain"))
+    for words in (["dear"], ["--all", "--engine", "compiled"]):
+        ran = call("run", *words, "--serial", "--output", tmp_path / "o")
+        assert ran.returncode == 2
+        assert "pip install 'rsfstudy[fast]'" in " ".join(ran.stderr.split())
+        assert not (tmp_path / "o").exists()
 
 
 def test_ctrl_c_ends_all_studies(catalogued, tmp_path):

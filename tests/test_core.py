@@ -311,7 +311,7 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan():
     def point(state, _rates, _p):
         return Point(*[float(state[0])] * len(Point._fields))
 
-    system = Equations("broken", ("y",), (1.0,), rate, point, ())
+    system = Equations("broken", ("y",), (1.0,), rate, point, (0.0,) * 6)
     with np.errstate(invalid="ignore"), pytest.raises(Halt) as halted:
         for _step in steps(system, [0.0], 1e-8, Meter(10**5)):
             pass

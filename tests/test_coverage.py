@@ -3,23 +3,16 @@
 import numpy as np
 import pytest
 import xarray as xr
+from agreement import LIKE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import limit_cycle
 from rsfstudy.measures.coverage import QUESTIONS, Coverage, random_scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Covered, reduced
 from rsfstudy.status import Status
-
-LIKE = [
-    Scene(law=law, **stress, **dynamics)
-    for law in ("slip", "slowness")
-    for stress in ({"normal_stress": "constant"}, {"normal_stress": "variable"})
-    for dynamics in ({}, {"inertia": True}, {"radiation_damping": 1e-9})
-]
 
 
 @settings(deadline=None, derandomize=True)

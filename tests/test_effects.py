@@ -123,7 +123,7 @@ def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
 
 
 #: What the equations of any scene call.
-ALWAYS = {"balance", "strength", "evolving", "evolution", "total"}
+ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ ALWAYS = {"balance", "strength", "evolving", "evolution", "total"}
         ({"alpha": 0.0}, {"normal_stress", "coefficient"}),
         ({}, {"normal_stress", "coefficient", "state_effect"}),
         ({"normal_stress": "constant", "radiation_damping": 0.1}, set()),
-        ({"normal_stress": "constant", "inertia": True}, {"without_mass"}),
+        ({"normal_stress": "constant", "inertia": True}, {"without_mass", "felt"}),
     ],
 )
 def test_an_absent_effect_is_out_of_reach(fields, more):

@@ -133,7 +133,7 @@ def journal(tmp_path, fingerprint=None, **options):
 
 def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([(KEYS[0].tobytes(), DONE)])
+        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
     with journal(tmp_path) as kept:
         assert kept.ended(KEYS).tolist() == [Status.OK, Status.PENDING]
         found = kept.read(KEYS)
@@ -146,7 +146,7 @@ def test_the_journal_returns_what_it_was_given(tmp_path):
 def test_failed_cells_are_kept_as_such(tmp_path):
     failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), float("nan"))
     with journal(tmp_path) as kept:
-        kept.add([(KEYS[0].tobytes(), failed)])
+        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *failed)])
         assert kept.ended(KEYS).tolist() == [Status.CELL_RAISED, Status.PENDING]
         found = kept.read(KEYS)
     assert (found.status[0], found.message[0]) == (Status.CELL_RAISED, "ValueError: x")
@@ -155,7 +155,7 @@ def test_failed_cells_are_kept_as_such(tmp_path):
 
 def test_a_journal_of_other_numbers_is_refused_with_the_difference(tmp_path):
     with journal(tmp_path, {"rtol": 1e-7, "physics": "abc"}) as kept:
-        kept.add([(KEYS[0].tobytes(), DONE)])
+        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-09 now.*--fresh"):
         journal(tmp_path, {"rtol": 1e-9, "physics": "abc"})
     with journal(tmp_path, {"rtol": 1e-9, "physics": "abc"}, fresh=True) as kept:
@@ -171,7 +171,7 @@ def test_a_damaged_journal_is_named(tmp_path):
 
 def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([(KEYS[0].tobytes(), DONE)])
+        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
     path = tmp_path / "trial.cells.sqlite"
     right, wrong = np.array([1.5]).tobytes(), np.array([1.25]).tobytes()
     content = path.read_bytes()

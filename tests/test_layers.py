@@ -25,11 +25,14 @@ FLOORS = {
     "declare": 6,
     "files": 7,
     "compute": 8,
+    "rig": 8,
     "plots": 9,
+    "cli_simulate": 10,
     "trajectory": 10,
     "one_scene": 10,
     "api": 10,
     "assignments": 10,
+    "options": 10,
     "terminal": 10,
     "cli": 10,
     "__init__": 10,
@@ -39,8 +42,11 @@ FLOORS = {
 HOMES = {
     "dask": {"compute/clusters", "files/store", "files/pieces"},
     "distributed": {"compute/clusters", "compute/workers", "compute/worker_log"},
+    "llvmlite": {"motion/compiled/building", "motion/compiled/calls"},
     "matplotlib": {"plots"},
-    "click": {"cli"},
+    "numba": {f"motion/compiled/{name}" for name in ("building", "calls", "machine")},
+    "click": {"cli", "cli_simulate", "options"},
+    "pint": {"rig/units"},
     "rich": {"api", "cli", "terminal"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
@@ -103,7 +109,7 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
 
 def test_workers_load_no_more_than_the_physics_needs():
     """Datasets and figures are made by the process that asked for them: a worker starts sooner."""
-    heavy = {"xarray", "pandas", "matplotlib", "netCDF4"}
+    heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = f"import sys, rsfstudy.compute.cells; print(*{heavy} & set(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == ""

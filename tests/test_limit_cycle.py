@@ -244,3 +244,23 @@ def test_cycles_that_come_closer_slowly_are_leapt_ahead_of():
     assert outcome["recurrence_interval"] == pytest.approx(
         23.93999870907226927, abs=outcome["recurrence_interval_error"]
     )
+
+
+@pytest.mark.parametrize(
+    ("fields", "known"),
+    [
+        ({"law": "slowness"}, True),
+        ({"law": "composite"}, True),
+        ({"law": "slowness", "fluid": "dilatant", "dilatancy": 1e-4}, True),
+        ({"law": "cut_off", "cutoff_velocity_ratio": 10.0}, False),
+        ({"law": "two_slip_states"}, False),
+        ({"law": "two_slip_states", "b1_over_a": 2.0, "b2_over_a": -2.0}, False),
+    ],
+)
+def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known):
+    """b ln(theta/theta_*) is not the state of several, nor of a cut-off; b may be 0 of two."""
+    found = LimitCycle(phases=2)(
+        scene(normal_stress="constant", **{"stiffness_ratio": 0.7, **fields}), Accuracy(1e-4)
+    )
+    assert found.status is Status.OK, found.message
+    assert math.isfinite(found.values["healing_exponent"]) is known

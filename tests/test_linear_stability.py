@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.measures.linear_stability import LinearStability, growth, jacobian
+from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import between_ruptures, in_rupture, relation_of
 from rsfstudy.status import Status
@@ -114,3 +115,12 @@ def test_growth_close_to_critical_stiffness(off, effects):
     grows = growth(jacobian(between_ruptures(scene, clock=False), (0.0, 0.0)))
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
+
+
+@pytest.mark.parametrize("measure", [LinearStability(), RigidResponse(points=3)])
+@pytest.mark.parametrize("fields", [{"law": "slip"}, {"law": "two_slip_states"}])
+def test_a_held_load_point_is_refused_by_status(measure, fields):
+    for stress in ("constant", "variable"):
+        found = measure(Scene(displacement_step=0.3, normal_stress=stress, **fields), Accuracy())
+        assert found.status is Status.NO_STEADY_STATE
+        assert "the load point is held" in found.message

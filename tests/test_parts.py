@@ -18,7 +18,6 @@ from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.slots import FIRST_OWN
 from rsfstudy.status import Status
 
-OWN = 0
 C = 0.5
 
 
@@ -27,27 +26,15 @@ def weakened(friction, ratio, change, p):
     return C * friction, C
 
 
-def perrin_rice_zheng(log_rate, state, p):
-    """Perrin, Rice and Zheng (1995): dtheta/dt = 1 - (theta V/2 D_c)**2 is -b sinh per slip."""
-    return -p[OWN] * math.sinh(max(min(state / p[OWN] + log_rate, 300.0), -300.0))
-
-
 @dataclass(frozen=True, kw_only=True)
 class StressWeakened(SlownessLaw):
     name = "stress_weakened"
     state_effect = staticmethod(weakened)
 
 
-@dataclass(frozen=True, kw_only=True)
-class PerrinRiceZheng(laws.Law):
-    name = "perrin_rice_zheng"
-    evolution = staticmethod(perrin_rice_zheng)
-
-
 @pytest.fixture(autouse=True)
-def two_more_laws(monkeypatch):
-    for law in (StressWeakened, PerrinRiceZheng):
-        monkeypatch.setitem(laws.PARTS, law.name, law)
+def one_more_law(monkeypatch):
+    monkeypatch.setitem(laws.PARTS, StressWeakened.name, StressWeakened)
 
 
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.0}, {}])
@@ -66,7 +53,7 @@ def test_a_state_effect_is_part_of_the_friction_relation(effects):
         assert ratio == pytest.approx(1.0 / (1.0 + C), rel=1e-12)
 
 
-@pytest.mark.parametrize("law", ["stress_weakened", "perrin_rice_zheng"])
+@pytest.mark.parametrize("law", ["stress_weakened", *sorted(laws.PARTS)])
 @pytest.mark.parametrize(
     "effects",
     [
@@ -131,7 +118,7 @@ def test_slopes_of_a_law_at_steady_sliding():
 def test_numbers_stand_where_their_parts_look_for_them():
     scene = Scene(alpha=0.3, phi=70.0, inertia=True, stiffness=0.02, load_velocity_ratio=2.0)
     common, own = scene.numbers[:FIRST_OWN], scene.numbers[FIRST_OWN:]
-    assert common == (scene.a, scene.b, scene.mu_star, 0.02, 2.0, math.log(2.0))
+    assert common == (scene.a, scene.b, scene.mu_star, 0.02, 2.0, math.log(2.0), 0.0, scene.b)
     cot_phi = 1.0 / math.tan(math.radians(70.0))
     of_mass = scene.inertial_time, math.log(scene.inertial_time)
     assert own == (scene.b, cot_phi, 0.3, *of_mass)

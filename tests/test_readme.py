@@ -13,6 +13,8 @@ from running import call, named_results
 
 import rsfstudy
 from rsfstudy.cli import cli
+from rsfstudy.slider import laws
+from rsfstudy.slider.parts import names_of
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
@@ -76,6 +78,15 @@ def test_the_table_of_promises_names_tests_that_exist():
 def test_every_study_is_listed():
     for name in rsfstudy.studies():
         assert f"| `{name}` |" in README
+
+
+def test_every_law_is_listed():
+    for name, law in laws.PARTS.items():
+        row = re.search(rf"^\| (?:`\w+`, )*`{name}`.*$", README, re.MULTILINE)
+        assert row, name
+        own = set(names_of(law)) - set(names_of(laws.Law))
+        assert all(f"`{field}`" in row[0] for field in own)
+    assert all(f"`{field}`" in README for field in names_of(laws.Law) if field != "b_over_a")
 
 
 def test_the_table_of_zeta_is_ours(tmp_path_factory):

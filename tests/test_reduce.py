@@ -11,6 +11,8 @@ from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce import (
     Boundary,
+    CyclingEdge,
+    DecadeFit,
     Difference,
     Inverse,
     LinearFit,
@@ -65,6 +67,20 @@ def test_fit_agrees_with_numpy(noise):
         np.sqrt(residual / 2 / (x @ x)), rel=1e-9, abs=1e-15
     )
     assert float(result.zeta_misfit) == pytest.approx(np.abs(y - slope * x).max(), abs=1e-14)
+
+
+def test_a_slope_per_decade_is_that_over_the_logarithm():
+    """And a point at 0, which has none, is left out."""
+    noise = np.array([0.02, -0.03, 0.01, 0.04, -0.02])
+    values = 2.0 + 0.3 * np.log10(X) + noise
+    fit = DecadeFit(name="rate", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    result, expected = reduced(lattice(values), (fit,)), linregress(np.log10(X), values)
+    assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
+    assert float(result.rate_stderr) == pytest.approx(expected.stderr, rel=1e-12)
+    moved = lattice(values).assign_coords(a_over_b_minus_a=("b_over_a", [0.0, *X[1:]]))
+    result, expected = reduced(moved, (fit,)), linregress(np.log10(X[1:]), values[1:])
+    assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
+    assert int(result.rate_points) == 4
 
 
 @pytest.mark.parametrize("status", [Status.WORK_BUDGET_SPENT, Status.PENDING, Status.WORKER_LOST])
@@ -439,3 +455,73 @@ def test_claims_on_what_was_reduced_along_a_changed_axis_do_not_apply():
     (as_declared,) = verdicts(dataset, [claim], {}).verdict
     (changed,) = verdicts(dataset, [claim], {"b_over_a": [2.0]}).verdict
     assert (as_declared, changed) == ("reproduced", "not applicable")
+
+
+# ---- where limit cycles end ---------------------------------------------------------------------
+
+STIFFNESS = np.array([0.6, 0.8, 0.9, 0.97, 1.1])
+
+
+def cycling(answers) -> xr.Dataset:
+    """Cells along stiffness at V_0 = 1.01, 10 and 1000 V_*, variable normal stress: k_cr(V_0) is
+    0.99976, 0.946 and 0.851 of k_cr(V_*).
+    """
+    cycles = np.asarray(answers, dtype=bool)
+    codes = np.where(cycles, int(Status.OK), int(Status.NO_LIMIT_CYCLE))
+    dims = ("load_velocity_ratio", "stiffness_ratio")
+    return xr.Dataset(
+        {"recurrence_interval": (dims, np.where(cycles, 1.0, np.nan)), "status": (dims, codes)},
+        coords={
+            "load_velocity_ratio": [1.01, 10.0, 1000.0],
+            "stiffness_ratio": STIFFNESS,
+            "law": "slip",
+            "normal_stress": "variable",
+            "inertia": np.int8(1),
+            "b_over_a": 2.0,
+        },
+    )
+
+
+EDGE = CyclingEdge(name="edge", of="recurrence_interval")
+AS_THE_EIGENVALUES_SAY = [[1, 1, 1, 1, 0], [1, 1, 1, 0, 0], [1, 1, 0, 0, 0]]
+
+
+def test_the_edge_of_cycling_is_bracketed_beside_the_linear_boundary():
+    result = reduced(cycling(AS_THE_EIGENVALUES_SAY), (EDGE,))
+    assert result.edge.values == pytest.approx([1.035, 0.935, 0.85])
+    assert result.edge_error.values == pytest.approx([0.065, 0.035, 0.05])
+    assert result.edge_unstable.values == pytest.approx([0.97, 0.9, 0.8])
+    assert result.edge_linear.values == pytest.approx([0.99976, 0.94617, 0.85095], abs=1e-5)
+    assert float(result.edge_farthest) == pytest.approx((1.035 - 0.99976) / 0.13, abs=1e-4)
+    assert int(result.edge_misplaced) == 0
+    assert "eigenvalues" in result.edge_linear.attrs["long_name"]
+
+
+@pytest.mark.parametrize(
+    ("row", "crossings"), [([1, 1, 1, 1, 0], 1), ([1, 0, 0, 0, 0], 1), ([1, 1, 0, 1, 0], 3)]
+)
+def test_cells_on_the_wrong_side_of_the_linear_boundary_are_counted(row, crossings):
+    """Above it, below it, and where the answer changes more than once, which is no edge."""
+    result = reduced(cycling([row] * 3), (EDGE,))
+    below = [critical > STIFFNESS for critical in (0.9998, 0.946, 0.851)]
+    expected = int((np.array(below) != np.array(row, dtype=bool)).sum())
+    assert int(result.edge_misplaced) == expected > 0
+    assert (result.edge_crossings == crossings).all()
+    assert result.edge.isnull().all() == (crossings > 1)
+
+
+def test_an_edge_beyond_the_cells_is_none():
+    result = reduced(cycling([[1] * 5, [0] * 5, AS_THE_EIGENVALUES_SAY[2]]), (EDGE,))
+    assert result.edge.isnull().values.tolist() == [True, True, False]
+    assert float(result.edge_unstable[0]) == 1.1
+    assert float(result.edge_stable[1]) == 0.6
+
+
+def test_a_failed_cell_refuses_its_edge_and_the_summaries():
+    lattice = cycling(AS_THE_EIGENVALUES_SAY)
+    lattice.status[0, 2] = int(Status.WORK_BUDGET_SPENT)
+    result = reduced(lattice, (EDGE,))
+    assert result.edge.isnull().values.tolist() == [True, False, False]
+    assert np.isnan(result.edge_farthest)
+    assert np.isnan(result.edge_misplaced)
+    assert "failed or are missing" in result.edge.attrs["refused"]

@@ -50,7 +50,7 @@ def two_slowness_states(log_rate, psis, shift, share, p):
 
 @dataclass(frozen=True, kw_only=True)
 class TwoSlipStates(SlipLaw):
-    name = "two_slip_states"
+    name = "parted_slip"
     states = 2
     evolution = None
     evolutions = staticmethod(two_slip_states)
@@ -59,7 +59,7 @@ class TwoSlipStates(SlipLaw):
 
 @dataclass(frozen=True, kw_only=True)
 class TwoSlownessStates(SlownessLaw):
-    name = "two_slowness_states"
+    name = "parted_slowness"
     states = 2
     evolution = None
     evolutions = staticmethod(two_slowness_states)
@@ -81,9 +81,9 @@ def resting_at_two_lengths(log_rate, shift, p):
 
 @dataclass(frozen=True, kw_only=True)
 class TwoLengths(laws.Law):
-    """The slip law twice, with L_1/L_2 = `length_ratio` and b_2 = `second`; b is that of both."""
+    """The slip law twice, with L_1/L_2 and b_2 of its own; b is that of both."""
 
-    length_ratio: float = number(1.0, "", "1", "first over second slip distance")
+    first_over_second: float = number(1.0, "", "1", "first over second slip distance")
     second: float = number(0.0, "", "1", "evolution effect of the second state")
 
     name = "two_lengths"
@@ -92,7 +92,7 @@ class TwoLengths(laws.Law):
     resting = staticmethod(resting_at_two_lengths)
 
     def numbers(self, scene):
-        return self.length_ratio, self.second
+        return self.first_over_second, self.second
 
 
 LAWS = {"slip": TwoSlipStates, "slowness": TwoSlownessStates}
@@ -202,9 +202,9 @@ def test_trajectories():
     [(1.0, 0.84, 0.048, 0.0802755656), (1.4, -0.6, 0.02, 0.38741)],
 )
 def test_two_lengths(first, second, ratio, expected):
-    """Critical stiffness k L_1/(a sigma) of two states of different lengths, from the roots of the
-    cubic that det [K + a p + sum b_i p/(p + L_1/L_i) ...] = 0 makes; rate strengthening does not
-    exclude instability (the second).
+    """Critical stiffness k L_1/(a sigma) of two states of different lengths, against published
+    numbers and the closed form of the Routh-Hurwitz criterion for their cubic (Gu et al. 1984);
+    rate strengthening does not exclude instability (the second).
     """
     a = 0.01
     scene = Scene(
@@ -212,29 +212,35 @@ def test_two_lengths(first, second, ratio, expected):
         a=a,
         b_over_a=first + second,
         second=second * a,
-        length_ratio=ratio,
+        first_over_second=ratio,
         stiffness=0.01,
         **CONSTANT,
     )
-    assert scene.critical_stiffness / a == pytest.approx(expected, rel=2e-5)
+    assert scene.critical_stiffness / a == pytest.approx(expected, rel=2e-5)  # digits given
+    half = first - 1.0 + ratio * (2.0 * first + (second - 1.0) * (2.0 + ratio))
+    product = (
+        ratio * (1.0 + ratio) * (first + second - 1.0) * (1.0 + ratio - first - second * ratio)
+    )
+    closed = (half + math.sqrt(half**2 + 4.0 * product)) / (2.0 + 2.0 * ratio)
+    assert scene.critical_stiffness / a == pytest.approx(closed, rel=1e-9)
     agree_on = LinearStability()(scene.with_(stiffness=0.9 * scene.critical_stiffness), Accuracy())
     assert agree_on.status in (Status.OK, Status.STABLE_AT_ANY_STIFFNESS)
 
 
 @pytest.mark.parametrize(
-    ("b_over_a", "second", "length_ratio", "load"),
+    ("b_over_a", "second", "first_over_second", "load"),
     [
         (1.4651462863, 0.0138187125, 3.7746346349, 1.3),
         (2.3188214826, 0.0143733403, 0.1910147365, 1.1),
     ],
 )
-def test_peaks_of_two_states_may_fall_before_they_rise(b_over_a, second, length_ratio, load):
+def test_peaks_of_two_states_may_fall_before_they_rise(b_over_a, second, first_over_second, load):
     """With three unknowns paths pass each other: only the norm, or rest, decides."""
     scene = Scene(
         law=TwoLengths,
         b_over_a=b_over_a,
         second=second,
-        length_ratio=length_ratio,
+        first_over_second=first_over_second,
         stiffness_ratio=0.9,
         load_velocity_ratio=load,
         **CONSTANT,
@@ -246,11 +252,11 @@ def test_peaks_of_two_states_may_fall_before_they_rise(b_over_a, second, length_
 @pytest.mark.parametrize(
     "fields",
     [
-        {"b_over_a": 12.0, "length_ratio": 3.0, "second": 0.05 * 12.0 * 0.0145},
-        {"b_over_a": 16.0, "length_ratio": 2.0, "second": 0.05 * 16.0 * 0.0145},
+        {"b_over_a": 12.0, "first_over_second": 3.0, "second": 0.05 * 12.0 * 0.0145},
+        {"b_over_a": 16.0, "first_over_second": 2.0, "second": 0.05 * 16.0 * 0.0145},
         {
             "b_over_a": 1.4658,
-            "length_ratio": 0.4007,
+            "first_over_second": 0.4007,
             "second": 0.3854 * 1.4658 * 0.0145,
             "inertia": True,
             "period": 227374.0,

@@ -14,11 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.compute.plan import Batch, Plan, cell_key
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import ProportionalFit, Spread
+from rsfstudy.slider.laws.slip import SlipLaw
+from rsfstudy.slider.parts import number
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -263,3 +268,58 @@ def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
     (axis,) = declared(axes=[Axis("case", points)]).with_(alpha=[0.25]).axes
     assert [row["stiffness_ratio"] for row in axis.rows] == [2.0, 1.0]
     assert axis.labels == ("first, alpha = 0.25", "alpha = 0.25")
+
+
+# ---- cells as columns of numbers -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Twofold(SlipLaw):
+    """A law that makes something of its number when it is made."""
+
+    given: float = number(1.0, "", "1", "a number")
+
+    name = "twofold"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "given", 2.0 * self.given)
+
+
+MIXED = Study(
+    name="mixed",
+    title="Cells of many kinds",
+    base=Scene(),
+    axes=[
+        Axis("law", ["slip", "slowness", Twofold]),
+        Axis(
+            "case",
+            {
+                "constant": {"normal_stress": "constant"},
+                "no effect": {"alpha": 0.0},
+                "heavy": {"alpha": 0.3, "inertia": True},
+                "held": {"displacement_step": 2.0},
+            },
+        ),
+        Axis("load_velocity_ratio", [0.0, 0.5, 2.0]),
+        Axis("events", [50, 300]),
+    ],
+    measure=LimitCycle(),
+)
+
+
+@pytest.mark.parametrize("name", ["mixed", *catalogue.names()])
+def test_what_travels_in_columns_is_what_the_declaration_says(name):
+    """The name of each cell, its scene, and what it changes of the measure; of large lattices, for
+    a sample of their cells.
+    """
+    study = MIXED if name == "mixed" else catalogue.load(name)
+    plan = Plan(study)
+    numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
+    batch = Batch(plan, plan.table.ordered(numbers))
+    sent = dict(zip(batch.keys, (c for rows in batch.rows() for c in rows.cells()), strict=True))
+    for cell_number in numbers.tolist():
+        scene, changes = study.cell(cell_number)
+        key = cell_key(scene, study.measure.with_(**changes))
+        assert plan.keys[cell_number].tobytes() == key
+        assert sent[key] == (scene, changes)
+        assert sent[key].scene.numbers == scene.numbers

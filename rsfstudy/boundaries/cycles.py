@@ -15,7 +15,7 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.recording import SAMPLES, observed
+from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
@@ -80,6 +80,15 @@ class Cycle:
             ]
         )
 
+    def numbers_of_event(self) -> np.ndarray:
+        """The same of one event among others: with stress drops from where it begins, because the
+        next may begin elsewhere.
+        """
+        higher = self.begin.spring - self.end.spring
+        numbers = self.numbers()
+        numbers[1:3] += higher
+        return numbers
+
 
 def cycles(
     scene: Scene, accuracy: Accuracy, meter: Meter, start: Point | None
@@ -99,7 +108,7 @@ def cycles(
         cycle = watch.see(event)
         if cycle is not None:
             swings.append(cycle.swing)
-            if swings[-1] < _STEADY or (settles(scene) and _dies_down(swings)):
+            if swings[-1] < _STEADY or (_dies_down(swings) and settles(scene)):
                 yield None
                 return
             yield cycle
@@ -109,18 +118,19 @@ def cycles(
 
 
 def recorded(
-    scene: Scene, start: Point, accuracy: Accuracy, meter: Meter
-) -> tuple[Cycle | None, list[tuple[float, ...]]]:
-    """One cycle, and what is observed along it; no cycle where the motion settles instead."""
-    watch, rows = _Watch(start), list[tuple[float, ...]]()
+    scene: Scene, start: Point, accuracy: Accuracy, meter: Meter, count: int = 1
+) -> tuple[Cycle | None, np.ndarray]:
+    """The last of so many cycles, and what is recorded along all of them; no cycle where the motion
+    settles instead.
+    """
+    watch, recording = _Watch(start), Recording()
     asked = _asked(scene)
-    motion = follow(scene, accuracy, meter, asked, start=start, clock=True, samples=SAMPLES)
+    motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
     for event in motion:
         cycle = watch.see(event)
-        if event.watch is None or cycle is not None:
-            rows.append(observed(scene, event))
-        if cycle is not None or event.kind is Kind.SETTLED:
-            return cycle, rows
+        count -= cycle is not None
+        if not count or event.kind is Kind.SETTLED:
+            return cycle, recording.seen(scene, until=event)
     raise AssertionError("a motion never ends by itself")
 
 
@@ -128,10 +138,10 @@ def _asked(scene: Scene) -> tuple[Watch, ...]:
     """What a motion has to tell for its cycles to be seen."""
     load = scene.log_load_rate
     return (
-        maximum("log_rate"),
-        minimum("log_rate"),
+        maximum("log_rate", waits=True),
+        minimum("log_rate", waits=True),
         rise("log_rate", load),
-        fall("log_rate", load),
+        fall("log_rate", load, waits=True),
         settling(_AT_REST),
     )
 

@@ -31,6 +31,8 @@ _LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
 _GIVE_UP = 3
 #: How much farther in ln V a displacement step may jump where mass delays the rise of slip rate.
 _RISE_OF_MASS = 5.0
+#: b/a - 1 that is guessed from at least: some laws weaken without it.
+_LEAST_WEAKENING = 1e-6
 #: Spring stress over sigma_* that no displacement step goes beyond.
 _LARGEST_STRESS = 1e6
 
@@ -194,7 +196,8 @@ class RateSteps(Steps):
             return math.log(share / (1.0 - share))
 
         lowest, highest = position(self.smallest), _HIGHEST
-        guess = math.log1p(math.exp(self.scene.stiffness_ratio - 1.0) / (self.scene.b_over_a - 1.0))
+        weakening = max(self.scene.parts.law.b_over_a - 1.0, _LEAST_WEAKENING)
+        guess = math.log1p(math.exp(self.scene.stiffness_ratio - 1.0) / weakening)
         left = right = position(guess)
         at_left = at_right = misfit(log_size(left))
         stride, missing = 0.2, 0
@@ -262,8 +265,8 @@ class DisplacementSteps(Steps):
         def after(step: float) -> float:
             return math.exp(log_rate_at(self.scene, self.scene.stiffness * step, 0.0))
 
-        weakens = self.scene.b_over_a > 1.0
-        closed_form = after(self.sign / (self.scene.b_over_a - 1.0)) if weakens else math.nan
+        weakening = self.scene.parts.law.b_over_a - 1.0
+        closed_form = after(self.sign / weakening) if weakening > 0.0 else math.nan
         critical = math.nan if math.isnan(size) else after(self.value(size))
         return dict(zip(self.beside, (critical, closed_form), strict=True))
 

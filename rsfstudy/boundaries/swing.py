@@ -19,7 +19,8 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-#: Part of the critical stiffness below it that no motion can tell from none.
+#: Part of the critical stiffness below it, and decay per slip in D_c, that no motion can tell from
+#: none.
 _NEUTRAL = 1e-9
 #: Swings this small follow linear theory.
 _LINEAR = 0.05
@@ -27,6 +28,9 @@ _LINEAR = 0.05
 #: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
 _LEAP, _SHORTEST_LEAP = 1.3, 1.002
 
+#: Peaks in a row that must be the same for a cycle of several states to repeat: next to a cycle
+#: that motions leave, they would not stay.
+_IN_A_ROW = 4
 #: How much higher in ln V a motion is taken to rise that is followed up to the norm only.
 _HIGHER = 1.0
 #: Part of the farthest distance from steady sliding at which a motion has come to it.
@@ -92,7 +96,7 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     reach the norm or a limit cycle. To see which without following a thousand swings, the motion
     leaps to a somewhat larger orbit: if that grows too, and so on up to the norm, so does the orbit
     inside it. With mass, which acts during ruptures only, the same rules serve; with several states
-    only the norm or steady sliding itself ends a motion. Once the load point
+    only the norm, steady sliding itself or a cycle that repeats ends a motion. Once the load point
     is held, spring stress can only fall, and the first peak is the last.
 
     Raises
@@ -117,26 +121,27 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
 
 
 def friction_acts_alone(scene: Scene) -> bool:
-    """Whether only rate and state change friction, and only friction damps: stiffness is then
-    critical at every load point velocity or at none.
-    """
-    stress_acts = scene.parts.normal_stress.effects or scene.parts.law.state_effect
-    return not stress_acts and not scene.dynamics.damping(0.0)
+    """Whether effective normal stress is constant, and only friction damps."""
+    varies = scene.parts.normal_stress.effects or scene.parts.fluid.effects
+    return not varies and not scene.dynamics.damping(0.0)
 
 
 def orbits_may_close(scene: Scene) -> bool:
     """Whether every orbit closes at critical stiffness."""
-    return scene.parts.law.orbits_close and friction_acts_alone(scene)
+    law = scene.parts.law
+    return law.orbits_close and not law.feels_stress and friction_acts_alone(scene)
 
 
 def neutral(scene: Scene, within: float) -> bool:
-    """Whether stiffness is so close to the critical one, at any load point velocity, that growth
-    and decay cannot be told apart. Where all orbits close at critical stiffness, that is known;
-    with the load point held there are none.
+    """Whether stiffness is so close to the critical one, both at V_* and at the load point
+    velocity, that growth and decay cannot be told apart: by most laws it is critical at every rate
+    or at none, where friction acts alone. Where all orbits close at critical stiffness, that is
+    known; with the load point held there are none.
     """
     off = abs(scene.stiffness_ratio - 1.0)
     known = scene.log_load_rate == -math.inf or (off == 0.0 and orbits_may_close(scene))
-    return friction_acts_alone(scene) and off < within and not known
+    close = friction_acts_alone(scene) and off < within and not known
+    return close and abs(stability_margin(scene)) < within
 
 
 def settles(scene: Scene) -> bool:
@@ -148,7 +153,8 @@ def settles(scene: Scene) -> bool:
 
 def stability_margin(scene: Scene) -> float:
     """By how much stiffness exceeds the critical one at the scene's load point velocity, over that;
-    infinite where every stiffness is stable.
+    infinite where every stiffness is stable. Positive too where several states are stable below it,
+    by how far they are below.
     """
     return math.inf if scene.log_load_rate == -math.inf else _steady(scene).margin
 
@@ -227,7 +233,7 @@ def _orbit(
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
     watches += [settling(_CLOSE)] if steady.stable else []
-    planar = scene.parts.law.states == 1
+    planar, repeating = scene.states == 1, _Repeating(scene, steady, accuracy)
     peaks: list[float] = []
     at_start = -math.inf
     for event in follow(scene, accuracy, meter, watches, start=start):
@@ -249,6 +255,8 @@ def _orbit(
             if top >= norm:
                 return _Orbit(tuple(peaks), reached=True)
             if not planar:
+                if repeating.has(event.point):
+                    return _Orbit(tuple(peaks), reached=False)
                 continue
             if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
                 return _Orbit(tuple(peaks), reached=False)
@@ -256,6 +264,26 @@ def _orbit(
             if slow and not steady.stable and event.regime != IN_RUPTURE:
                 return _Orbit(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
+
+
+class _Repeating:
+    """Whether a motion of several states has come to a cycle that repeats, or as close to rest as
+    the tolerance lets it: at some peaks in a row its unknowns are the same, as far as numbers tell.
+    Where steady sliding is unstable, and growth too small to be measured, the motion goes on.
+    """
+
+    def __init__(self, scene: Scene, steady: _Steady, accuracy: Accuracy) -> None:
+        self._steady, self._slack = steady, 30.0 * accuracy.solver * scene.a
+        self._before, self._same = (math.inf,) * (1 + scene.states), 0
+
+    def has(self, peak: Point) -> bool:
+        """Whether it has at this peak."""
+        now = (peak.spring, *peak.psis)
+        change = max(abs(x - y) for x, y in zip(now, self._before, strict=True))
+        linear = peak.log_rate - self._steady.log_rate < _LINEAR and not self._steady.stable
+        self._same = self._same + 1 if change < self._slack and not linear else 0
+        self._before = now
+        return self._same == _IN_A_ROW
 
 
 def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) -> bool:
@@ -288,4 +316,13 @@ def _steady(scene: Scene) -> _Steady:
         )
     critical = steady.critical_stiffness(scene, load)
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
+    if margin < -_NEUTRAL and scene.states > 1 and _decays(scene):
+        margin = -margin
     return _Steady(load, sliding.spring, sliding.psis, margin)
+
+
+def _decays(scene: Scene) -> bool:
+    """Whether small changes of steady sliding decay, which those of several states may do below the
+    critical stiffness.
+    """
+    return bool(steady.growth_rates(scene, scene.log_load_rate)[0].real < -_NEUTRAL)

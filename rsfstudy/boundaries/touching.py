@@ -34,11 +34,11 @@ _ABOVE = 1e-6
 
 def touching_point(scene: Scene) -> tuple[float, float] | None:
     """Spring stress and state (f, Psi) at which ln V rests at the instability norm; None where it
-    never can, or where the law has several states and the path is none in a plane.
+    never can, or where there are several states and the path is none in a plane.
 
     There, strength'(f) K (V_0/V - 1) equals the evolution of the state per unit slip.
     """
-    if scene.parts.law.states > 1:
+    if scene.states > 1:
         return None
     relation, evolution = relation_of(scene), evolution_of(scene)
     a, x = scene.a, scene.log_norm_rate
@@ -48,7 +48,7 @@ def touching_point(scene: Scene) -> tuple[float, float] | None:
         value, slope, shift, _shift_slope = relation(friction)
         return slope * pull - evolution(x, value - shift - a * x)
 
-    reach = 2.0 * scene.b * abs(x) + scene.stiffness
+    reach = 2.0 * scene.b * abs(x) + scene.stiffness * max(1.0, relation(0.0)[1])
     lowest = max(-reach, (1.0 - 1e-6) * scene.parts.normal_stress.weakest(scene))
     if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
         return None
@@ -101,7 +101,7 @@ def _path(
     if start is None:
         return
     enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
-    path = Meter(min(enough, meter.budget - meter.spent), meter.methods)
+    path = Meter(min(enough, meter.budget - meter.spent), meter.methods, meter.engine)
     equations = between_ruptures(scene, clock=False)
     try:
         yield from along(equations, start, tolerance, path, watches, backward=backward)
@@ -118,7 +118,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
 
     None where the path never passes that slip rate as the motion of this scene would.
     """
-    begin = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.parts.law.states)
+    begin = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.states)
     if begin.growth == 0.0:
         return None
     start = start_of_path(

@@ -13,22 +13,27 @@ import time
 import traceback
 import uuid
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import cloudpickle
 
 from rsfstudy.compute import own_code, provenance
 from rsfstudy.compute.overheard import Overhearing
-from rsfstudy.declare.cell import Cell
+from rsfstudy.declare.cell import Cell, Rows
 from rsfstudy.errors import InvalidValue, RunError, brief
-from rsfstudy.files.journal import Finished
+from rsfstudy.files.journal import Finished, Layout
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import compiling
 from rsfstudy.slider import fields
 from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+
+if TYPE_CHECKING:
+    from rsfstudy.compute.plan import Batch
 
 #: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
 DEFAULT_TIME_LIMIT = 600.0
@@ -43,9 +48,7 @@ _BESIDE = 0.25
 #: Characters of a message that are kept.
 _LONGEST_MESSAGE = 2000
 
-#: Cells by their names.
-Batch = Sequence[tuple[bytes, Cell]]
-FinishedCells = list[tuple[bytes, Finished]]
+FinishedCells = list[Finished]
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,14 @@ class Task:
     own_code: str = "none"
     home: str = _HERE
 
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """Where the numbers of a cell are."""
+        return Layout(self.measure)
+
 
 #: Takes a task and batches, and yields the finished cells, in any order.
-Mapper = Callable[[Task, Iterable[Batch]], Generator[FinishedCells]]
+Mapper = Callable[[Task, Iterable["Batch"]], Generator[FinishedCells]]
 
 
 def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
@@ -89,13 +97,23 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
     """
     finished: FinishedCells = []
     handed_over, since = 0, time.monotonic()
-    for key, cell in itertools.chain.from_iterable(batches):
-        finished.append((key, computed(task, cell, let_through=(KeyboardInterrupt,))))
+    for key, cell in itertools.chain.from_iterable(map(_cells_of, batches)):
+        outcome, seconds = computed(task, cell, let_through=(KeyboardInterrupt,))
+        finished.append(task.layout.finished(key, outcome, seconds))
         if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER:
             yield finished
             handed_over += len(finished)
             finished, since = [], time.monotonic()
     yield finished
+
+
+def _cells_of(batch: Batch) -> Iterator[tuple[bytes, Cell]]:
+    return _named(batch.keys, batch.rows())
+
+
+def _named(keys: Iterable[bytes], rows: Iterable[Rows]) -> Iterator[tuple[bytes, Cell]]:
+    """Cells by their names."""
+    return zip(keys, itertools.chain.from_iterable(map(Rows.cells, rows)), strict=True)
 
 
 def sendable(task: Task) -> bytes:
@@ -136,7 +154,7 @@ def _received(sent: bytes) -> Task:
             f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
             "the workers the files it needs, or put them beside the study file"
         ) from error
-    ours = provenance.code()
+    ours = provenance.code(task.accuracy.engine)
     for name, wanted in task.code.items():
         if ours.get(name) != wanted:
             raise RunError(
@@ -156,24 +174,25 @@ def _received(sent: bytes) -> Task:
 
 def packed(batch: Batch) -> bytes:
     """A batch in as few bytes as possible, because Dask's scheduler keeps what it has passed on.
-    Scenes are sent as plain values; a worker has their parts from the task.
+    Scenes are sent as columns of numbers; a worker has their parts from the task.
     """
-    cells = [(key, scene.as_dict(), changes) for key, (scene, changes) in batch]
-    return zlib.compress(pickle.dumps(cells), level=1)
+    rows = [(rows.head.as_dict(), *rows[1:]) for rows in batch.rows()]
+    return zlib.compress(pickle.dumps((batch.keys, rows)), level=1)
 
 
 def _unpacked(batch: bytes) -> Iterator[tuple[bytes, Cell]]:
-    for key, values, changes in pickle.loads(zlib.decompress(batch)):
-        yield key, Cell(Scene(**values), changes)
+    keys, rows = pickle.loads(zlib.decompress(batch))
+    return _named(keys, (Rows(Scene(**values), *others) for values, *others in rows))
 
 
-def on_worker(sent: bytes, batch: bytes) -> FinishedCells:
+def on_worker(sent: bytes, batch: bytes) -> bytes:
     """Compute a packed batch in a worker process; a cell over its time limit ends the process.
 
     Returns
     -------
-    list
-        Its first cells: those that were finished when it was time to hand them over.
+    bytes
+        Its first cells: those that were finished when it was time to hand them over. They are
+        pickled here, because Dask would serialize each value of a list on its own.
 
     Raises
     ------
@@ -184,18 +203,24 @@ def on_worker(sent: bytes, batch: bytes) -> FinishedCells:
     finished: FinishedCells = []
     began = time.monotonic()
     ours = task.home == _HERE  # a worker may be a thread of the user's own process
+    if not ours:
+        compiling.aside = _limits.lifted
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
         fields.know(task.parts)
         for key, cell in _unpacked(batch):
-            finished.append((key, computed(task, cell)))
+            finished.append(task.layout.finished(key, *computed(task, cell)))
             if time.monotonic() - began > _WORKER_HANDS_OVER:
                 break
-    return finished
+    return pickle.dumps(finished)
 
 
-def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()) -> Finished:
-    """The outcome of one cell, and its wall time in s; an exception is an outcome too."""
-    begin = time.perf_counter()
+def computed(
+    task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()
+) -> tuple[Outcome, float]:
+    """The outcome of one cell, and its wall time in s, without that of compiling; an exception is
+    an outcome too.
+    """
+    begin = time.perf_counter() - compiling.seconds
     with Overhearing() as heard:
         try:
             outcome = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
@@ -205,9 +230,15 @@ def computed(task: Task, cell: Cell, let_through: tuple[type[BaseException], ...
             # not str(error), which may raise as well
             text = traceback.format_exception_only(error)[-1].strip()
             outcome = Outcome(Status.CELL_RAISED, message=text)
-    message = brief("; ".join(filter(None, [outcome.message, *heard])), _LONGEST_MESSAGE)
-    message = message.encode(errors="backslashreplace").decode()
-    return replace(outcome, message=message.replace("\0", "\\0")), time.perf_counter() - begin
+    if outcome.message or heard:
+        outcome = replace(outcome, message=_message([outcome.message, *heard]))
+    return outcome, time.perf_counter() - compiling.seconds - begin
+
+
+def _message(said: Iterable[str]) -> str:
+    """What is said of a cell, as a file can hold it."""
+    message = brief("; ".join(filter(None, said)), _LONGEST_MESSAGE)
+    return message.encode(errors="backslashreplace").decode().replace("\0", "\\0")
 
 
 class _Limits:
@@ -220,7 +251,7 @@ class _Limits:
     """
 
     def __init__(self) -> None:
-        self._computing = 0
+        self._computing, self._limit = 0, 0.0
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
@@ -235,7 +266,17 @@ class _Limits:
     def _add(self, threads: int, seconds: float) -> None:
         with self._lock:
             self._computing += threads
-            self._set(self._computing * seconds)
+            self._limit = self._computing * seconds
+            self._set(self._limit)
+
+    @contextlib.contextmanager
+    def lifted(self) -> Iterator[None]:
+        """No limit for a while; it starts anew afterwards."""
+        self._set(0.0)
+        try:
+            yield
+        finally:
+            self._set(self._limit)
 
     @staticmethod
     def _set(seconds: float) -> None:

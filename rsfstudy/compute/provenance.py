@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.compute import own_code
+from rsfstudy.motion.engines import SCIPY, versions
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -40,12 +41,13 @@ _PHYSICS_AS_IMPORTED = physics_digest()
 
 
 @functools.cache
-def code() -> dict[str, str]:
-    """Versions of everything that decides the numbers of a cell in every study."""
+def code(engine: str = SCIPY) -> dict[str, str]:
+    """Versions of everything that decides the numbers of a cell in every study, by an engine."""
     return {
         "physics": _PHYSICS_AS_IMPORTED,
         "numpy": version("numpy"),
         "scipy": version("scipy"),
+        **versions(engine),
     }
 
 
@@ -59,7 +61,8 @@ def fingerprint(study: Study) -> dict[str, Any]:
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
         "methods": [list(pair) for pair in study.accuracy.methods],
-        **code(),
+        "engine": study.accuracy.engine,
+        **code(study.accuracy.engine),
     }
 
 

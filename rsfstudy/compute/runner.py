@@ -21,12 +21,12 @@ from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError,
 from rsfstudy.files import pieces, store
 from rsfstudy.files.journal import Columns, Journal, Layout
 from rsfstudy.files.lattice import assemble
-from rsfstudy.measures import Outcome
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
 
 #: Statuses of cells that ended their worker.
-_LOST = (Status.WORKER_LOST, Status.TIME_LIMIT_SPENT)
+_LOST = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
+_ANSWERS = frozenset(status.name for status in Status if status.is_answer)
 #: A run ends early when this many cells have failed and none has succeeded.
 _HOPELESS = 10
 
@@ -171,22 +171,22 @@ class Run:
             for finished in arriving:
                 journal.add(finished)
                 self._tell_lost(finished)
-                for _key, (outcome, seconds) in finished:
-                    batches.learn(seconds)
-                    failed += not outcome.status.is_answer
+                for row in finished:
+                    batches.learn(row[4])
+                    failed += row[1] not in _ANSWERS
                 done += len(finished)
                 progress(done, total)
                 if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
-                    raise _hopeless(done, outcome)
+                    raise _hopeless(done, *row[1:3])
 
     def _tell_lost(self, finished: FinishedCells) -> None:
         """Warn of cells that ended their worker."""
-        for key, (outcome, _seconds) in finished:
-            if outcome.status in _LOST:
+        for key, status, message, *_ in finished:
+            if status in _LOST:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
-                    f"cell {self.study.place(cell)} failed, {outcome.status.label}: "
-                    f"{outcome.message}. The run goes on",
+                    f"cell {self.study.place(cell)} failed, {Status[status].label}: "
+                    f"{message}. The run goes on",
                     stacklevel=2,
                 )
 
@@ -256,10 +256,10 @@ class Run:
         return f"{text} and kept in {where}; the same command goes on from there."
 
 
-def _hopeless(cells: int, last: Outcome) -> RunError:
+def _hopeless(cells: int, status: str, message: str) -> RunError:
     return RunError(
-        f"the first {cells} cells all failed, the last with {last.status.label}"
-        f"{': ' * bool(last.message)}{last.message}. "
+        f"the first {cells} cells all failed, the last with {Status[status].label}"
+        f"{': ' * bool(message)}{message}. "
         "Mend that, or go on all the same with --keep-going (keep_going=True)"
     )
 

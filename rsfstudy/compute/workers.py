@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import pickle
 import time
 import warnings
 from collections.abc import Generator, Iterable, Iterator
@@ -21,7 +22,6 @@ from typing import Any
 from rsfstudy.compute.cells import (
     DEFAULT_TIME_LIMIT,
     WAITING,
-    Batch,
     FinishedCells,
     Mapper,
     Task,
@@ -31,6 +31,7 @@ from rsfstudy.compute.cells import (
     serial,
 )
 from rsfstudy.compute.clusters import local_cluster
+from rsfstudy.compute.plan import Batch
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -108,7 +109,7 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         sent, waiting = sendable(task), _Waiting(batches)
         running: dict[Any, Batch] = {}
-        suspects: list[Any] = []
+        suspects: list[Batch] = []
         try:
             while True:
                 if not suspects:
@@ -118,9 +119,9 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                         batch = running.pop(future)
                         finished = _result(future)
                         if finished is None:
-                            suspects += batch
+                            suspects += batch.singly()
                         else:
-                            waiting.back(batch[len(finished) :])
+                            waiting.back(batch.after(len(finished)))
                             yield finished
                 elif suspects:
                     warnings.warn(
@@ -129,7 +130,7 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                         stacklevel=2,
                     )
                     for cell in suspects:
-                        yield _alone(client, task, [cell])
+                        yield _alone(client, task, cell)
                     suspects = []
                 else:
                     return
@@ -151,7 +152,7 @@ class _Waiting(Iterator[Batch]):
 
     def back(self, rest: Batch) -> None:
         """Put the rest of a batch back."""
-        self._left += [rest] if rest else []
+        self._left += [rest] if len(rest) else []
 
 
 def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]) -> None:
@@ -218,7 +219,7 @@ def _result(future: Any) -> FinishedCells | None:
     from distributed import KilledWorker
 
     try:
-        finished: FinishedCells = future.result()
+        finished: FinishedCells = pickle.loads(future.result())
     except KilledWorker:
         return None
     except RunError:
@@ -235,6 +236,7 @@ def _result(future: Any) -> FinishedCells | None:
 
 def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
     """Compute a suspect cell alone; if its worker dies again, the cell is recorded as lost."""
+    (key,) = batch.keys
     for _ in range(_TRIES):
         _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
         began = time.monotonic()
@@ -252,12 +254,13 @@ def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
                 f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
                 "on the clock; the worker's log shows where it was"
             )
-            return [(batch[0][0], (Outcome(Status.TIME_LIMIT_SPENT, message=text), seconds))]
+            outcome = Outcome(Status.TIME_LIMIT_SPENT, message=text)
+            return [task.layout.finished(key, outcome, seconds)]
     text = (
         f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
         "than a worker may use"
     )
-    return [(batch[0][0], (Outcome(Status.WORKER_LOST, message=text), math.nan))]
+    return [task.layout.finished(key, Outcome(Status.WORKER_LOST, message=text), math.nan)]
 
 
 def on_local_cluster(processes: int, log: Path | None) -> Mapper:

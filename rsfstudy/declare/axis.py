@@ -101,6 +101,22 @@ class Axis:
         return {"dimension": self.dimension, "values": rows}
 
 
+def kinds(rows: Sequence[Row]) -> np.ndarray:
+    """The kind of each row of an axis, counted from 0 in the order of the first of each. Rows are
+    of one kind if they set the same fields, to the same texts and flags, and of numbers to 0 or to
+    any others: then scenes with them are made of the same parts.
+    """
+    known: dict[tuple[Any, ...], int] = {}
+    return np.array([known.setdefault(_kind(row), len(known)) for row in rows])
+
+
+def _kind(row: Row) -> tuple[Any, ...]:
+    return tuple(
+        (name, type(value), bool(value) if isinstance(value, float) else value)
+        for name, value in row.items()
+    )
+
+
 def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
     for label, row in points.items():

@@ -7,11 +7,9 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import pkgutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,12 +17,15 @@ import numpy as np
 from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select, spread
 from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import check_figure, figure_name
+from rsfstudy.declare.wording import short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
 from rsfstudy.slider.fields import (
+    CALLERS,
     FIELDS,
     SLOT_NAMES,
     by_class,
@@ -37,13 +38,6 @@ from rsfstudy.slider.fields import (
 from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import QUANTITIES
-
-#: Names of the figures of rsfstudy.
-_FIGURES = frozenset(
-    module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
-)
-#: Most values of a list that are shown.
-_MOST_SHOWN = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +62,8 @@ class Study:
         Published values the results are held against.
     plot : str, function or module
         What draws the study: a module of `rsfstudy.plots` by its name, or a function
-        ``draw(dataset, axes)`` or a module like those of the user's own.
+        ``draw(dataset, axes)`` or a module like those of the user's own. The default, "lines",
+        draws maps where two axes are of numbers.
     references : sequence of str
         Sources of the study.
     accuracy : Accuracy
@@ -104,7 +99,7 @@ class Study:
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
         for name in ("title", "summary", "declared_in"):
             check_text(name, getattr(self, name))
-        _check_figure(self.plot)
+        check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
@@ -261,6 +256,10 @@ class Study:
             cell = self._cell(rows)
             unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
             yield cell
+        self.refuse(unused)
+
+    def refuse(self, unused: Collection[str]) -> None:
+        """Raise InvalidValue where an axis varies one of these fields, which no cell has."""
         for axis in self.axes:
             for name in axis.fields:
                 if name in unused:
@@ -298,7 +297,7 @@ class Study:
     def _cell(self, rows: Sequence[Row]) -> Cell:
         of_scene, changes = self._split(rows)
         # a row that states a choice together with a field it makes meaningless must be refused
-        stated = {name for row in rows if set(row) & SLOT_NAMES for name in row}
+        stated = {name for row in rows if set(row) & {*SLOT_NAMES, *CALLERS} for name in row}
         parts = self.own_parts
         values = by_class(self.base.as_dict() | of_scene, parts)
         meaningless = without_meaning(values, parts.values()) - stated
@@ -371,27 +370,6 @@ class Study:
         }
 
 
-def figure_name(plot: Any) -> str:
-    """What a declaration calls a figure: one of rsfstudy by its name, one of the user's own by that
-    of its function or module.
-    """
-    return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
-
-
-def _check_figure(plot: Any) -> None:
-    """Raise InvalidValue for something that cannot draw, or a name that another figure has."""
-    if isinstance(plot, str):
-        check_text("plot", plot)
-        return
-    if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
-        rule = "must be a name, or a function or module of yours that draws"
-        raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
-    name = figure_name(plot)
-    if not is_name(name) or name in _FIGURES:
-        rule = "needs a name of its own, which no figure of rsfstudy has"
-        raise InvalidValue("plot", name, rule)
-
-
 def _given(measure: Measure) -> str:
     """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
@@ -416,21 +394,3 @@ def _by_name(overrides: Mapping[str, Any]) -> dict[str, Any]:
 def _rows(name: str, value: Any) -> list[Row]:
     """The rows of a field that is given one value or a list of them."""
     return [{name: v} for v in (value if is_list(value) else [value])]
-
-
-def settings(overrides: Mapping[str, Any]) -> str:
-    """Overrides as one types them, long lists cut short."""
-    texts = {
-        name: value if isinstance(value, list) else [value] for name, value in overrides.items()
-    }
-    return ", ".join(f"{name}={_listed(values)}" for name, values in texts.items())
-
-
-def _listed(values: Sequence[Any]) -> str:
-    shown = [short(value) for value in values]
-    return ",".join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
-
-
-def short(value: Any) -> str:
-    """A value with the digits a reader wants."""
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)

@@ -19,8 +19,9 @@ import xarray as xr
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import fluid
 from rsfstudy.slider.fields import SLOTS, by_class, kinds_with
-from rsfstudy.slider.parts import Part
+from rsfstudy.slider.parts import Part, names_of
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -98,6 +99,11 @@ class Provenance(TypedDict):
 
 #: NumPy's kinds of numbers and texts that variables may hold, and those that must be there.
 _KINDS = ("iufbOUT", "numbers or texts")
+#: What the scenes of files are that were written before there was a choice of pore fluid.
+_OLDER: Mapping[str, Any] = {
+    **{name: None for part in fluid.PARTS.values() for name in names_of(part)},
+    "fluid": "drained",
+}
 _OF_EVERY_LATTICE = {
     "status": ("i", "whole numbers"),
     "message": ("OUT", "texts"),
@@ -167,7 +173,7 @@ def scene(
     """
     parts = [part for part in by_class(plain, own).values() if isinstance(part, type)]
     kinds = kinds_with(parts)
-    values = _fitted(plain, kinds, path)
+    values = _fitted({**_OLDER, **plain}, kinds, path)
     for name in plain:
         if name not in kinds:
             raise refused(_inside(path, name), "is unknown")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
+import struct
 import textwrap
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,17 +25,18 @@ from rsfstudy.errors import DataError
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
-Finished = tuple[Outcome, float]
+#: A finished cell: its key, status, message, right-hand sides, wall time in s, numbers, checksum.
+Finished = tuple[bytes, str, str, int, float, bytes, int]
 
-#: Raised when the tables change.
-_FORMAT = 2
+#: Raised when the tables change, or what a cell is named by.
+_FORMAT = 3
 _TABLES = """
 CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
     checksum INTEGER);
 """
-_AT_A_TIME = 500
+_AT_A_TIME = 900
 #: How long to wait for another run to end, in s.
 _WAIT = 5.0
 _REMEDY = "Choose another --output, or start over with --fresh."
@@ -51,12 +53,22 @@ class Layout:
         starts = [0, *stops[:-1]]
         self.places = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
 
+        self._plain = "" if any(self.shapes.values()) else f"<{self.width}d"
+
     def packed(self, values: Mapping[str, Any]) -> bytes:
         """Numbers as bytes; those that are missing become NaN."""
+        if self._plain:
+            return struct.pack(self._plain, *(values.get(name, math.nan) for name in self.shapes))
         row = np.full(self.width, np.nan, dtype="<f8")
         for name, value in values.items():
             row[self.places[name]] = np.ravel(value)
         return row.tobytes()
+
+    def finished(self, key: bytes, outcome: Outcome, seconds: float) -> Finished:
+        """A cell as the journal holds it."""
+        numbers, work = self.packed(outcome.values), outcome.rhs_evaluations
+        row = (outcome.status.name, outcome.message, work, seconds, numbers)
+        return (key, *row, _checksum(*row))
 
 
 @dataclass(frozen=True)
@@ -153,7 +165,7 @@ class Journal:
     ) -> None:
         self._db.close()
 
-    def add(self, cells: Iterable[tuple[bytes, Finished]]) -> None:
+    def add(self, cells: Iterable[Finished]) -> None:
         """Record finished cells, all or none.
 
         Raises
@@ -161,15 +173,10 @@ class Journal:
         DataError
             If the disk takes no more.
         """
-        rows = []
-        for key, (outcome, seconds) in cells:
-            numbers = self._layout.packed(outcome.values)
-            row = (outcome.status.name, outcome.message, outcome.rhs_evaluations, seconds, numbers)
-            rows.append((key, *row, _checksum(row)))
         try:
             with self._db:
                 self._db.executemany(
-                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", cells
                 )
         except sqlite3.Error as error:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
@@ -178,10 +185,10 @@ class Journal:
         """The status of each cell; `pending` for a cell that is not in the journal."""
         codes = {status.name: int(status) for status in Status}
         statuses = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
-        for start, rows in self._rows(keys, "status"):
-            for cell, key in enumerate(keys[start : start + _AT_A_TIME], start):
-                (name,) = rows.get(key.tobytes(), (Status.PENDING.name,))
-                statuses[cell] = codes.get(name, int(Status.PENDING))
+        if not self._holds_any():
+            return statuses
+        for places, rows in self._rows(keys, "status"):
+            statuses[places] = [codes.get(name, int(Status.PENDING)) for (name,) in rows]
         return statuses
 
     def read(self, keys: np.ndarray) -> Columns:
@@ -194,35 +201,49 @@ class Journal:
         """
         columns = Columns.pending(len(keys), self._layout.width)
         what = "status, message, work, seconds, numbers, checksum"
-        for start, rows in self._rows(keys, what):
-            for cell, key in enumerate(keys[start : start + _AT_A_TIME], start):
-                row = rows.get(key.tobytes())
-                if row is None:
-                    continue
-                *known, checksum = row
-                if _checksum(known) != checksum:
-                    raise DataError(
-                        f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
-                    )
-                status, message, work, seconds, numbers = known
-                columns.status[cell] = Status[status]
-                columns.message[cell], columns.work[cell] = message, work
-                columns.seconds[cell] = math.nan if seconds is None else seconds
-                columns.numbers[cell] = np.frombuffer(numbers, dtype="<f8")
+        for places, rows in self._rows(keys, what):
+            if any(_checksum(*known) != checksum for *known, checksum in rows):
+                raise DataError(
+                    f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
+                )
+            status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
+            columns.status[places] = [Status[name] for name in status]
+            columns.message[places], columns.work[places] = message, work
+            columns.seconds[places] = [math.nan if s is None else s for s in seconds]
+            found = np.frombuffer(b"".join(numbers), dtype="<f8")
+            columns.numbers[places] = found.reshape(len(rows), -1)
         return columns
 
-    def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[int, dict[bytes, Any]]]:
-        """Rows by key, a group of keys at a time, each with the index at which its group starts."""
+    def _holds_any(self) -> bool:
+        try:
+            return self._db.execute("SELECT 1 FROM cells LIMIT 1").fetchone() is not None
+        except sqlite3.Error as error:
+            raise self._damaged(error) from error
+
+    def _damaged(self, error: sqlite3.Error) -> DataError:
+        return DataError(f"{self._path} is damaged: {error}. {_REMEDY}")
+
+    def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[list[int], list[Any]]]:
+        """The cells that are known, a group at a time: places of their keys, and their rows."""
+        names, width = np.ascontiguousarray(keys).tobytes(), keys.dtype.itemsize
         for start in range(0, len(keys), _AT_A_TIME):
-            wanted = {key.tobytes() for key in keys[start : start + _AT_A_TIME]}
+            ends = range(start, min(start + _AT_A_TIME, len(keys)))
+            wanted = [names[cell * width : (cell + 1) * width] for cell in ends]
             marks = ", ".join("?" * len(wanted))
             try:
-                rows = self._db.execute(
-                    f"SELECT key, {what} FROM cells WHERE key IN ({marks})", list(wanted)
-                ).fetchall()
+                rows = {
+                    key: row
+                    for key, *row in self._db.execute(
+                        f"SELECT key, {what} FROM cells WHERE key IN ({marks})", wanted
+                    )
+                }
             except sqlite3.Error as error:
-                raise DataError(f"{self._path} is damaged: {error}. {_REMEDY}") from error
-            yield start, {key: row for key, *row in rows}
+                raise self._damaged(error) from error
+            known = [
+                (cell, rows[key]) for cell, key in zip(ends, wanted, strict=True) if key in rows
+            ]
+            if known:
+                yield [cell for cell, _row in known], [row for _cell, row in known]
 
 
 def _alone(path: Path | str) -> sqlite3.Connection:
@@ -256,10 +277,9 @@ def _forget(path: Path) -> None:
         file.unlink(missing_ok=True)
 
 
-def _checksum(row: Iterable[Any]) -> int:
-    status, message, work, seconds, numbers = row
+def _checksum(status: str, message: str, work: int, seconds: float | None, numbers: bytes) -> int:
     known = math.nan if seconds is None else seconds
-    return zlib.crc32(f"{status}\0{message}\0{work}\0{known!r}\0".encode() + bytes(numbers))
+    return zlib.crc32(numbers, zlib.crc32(f"{status}\0{message}\0{work}\0{known!r}\0".encode()))
 
 
 def _brief(value: object) -> str:

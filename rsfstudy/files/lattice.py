@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.declare.axis import kinds
 from rsfstudy.declare.study import Study
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.quantity import Quantity
@@ -90,24 +91,23 @@ def coordinates(study: Study) -> dict[Any, Any]:
     own = study.quantities
     sample = []
     for axis, stride in zip(study.axes, strides, strict=True):
-        along = [study.scene(i * int(stride)) for i in range(len(axis))]
-        sample += along
+        firsts = np.unique(kinds(axis.rows), return_index=True, return_inverse=True)[1:]
+        scenes = [study.scene(int(i * stride)).as_dict() for i in firsts[0]]
+        sample += scenes
         if axis.labels is not None:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
         # an axis shows its own values, even where its first cells make no use of them
-        points = [
-            {**study.measure.plain_fields, **scene.as_dict(), **row}
-            for row, scene in zip(axis.rows, along, strict=True)
-        ]
+        fixed = [{**study.measure.plain_fields, **scene} for scene in scenes]
+        points = [{**fixed[n], **row} for n, row in zip(firsts[1], axis.rows, strict=True)]
         for name in axis.fields:
             varied = [point.get(name) for point in points]
             coords[name] = (axis.dimension, _array(varied), _about(name, own, _first(varied)))
     for name in study.scene_fields:
-        present = {scene.as_dict().get(name) for scene in sample} - {None}
+        present = {scene.get(name) for scene in sample} - {None}
         if name not in coords and len(present) == 1:
-            fixed = present.pop()
-            coords[name] = ((), _array([fixed])[0], _about(name, own, fixed))
+            value = present.pop()
+            coords[name] = ((), _array([value])[0], _about(name, own, value))
     for name, (source, formula) in DERIVED.items():
         if source in coords:
             dims, values, _attrs = coords[source]

@@ -17,7 +17,8 @@ import xarray as xr
 from rsfstudy import measures, reduce
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import Axis
-from rsfstudy.declare.study import Study, figure_name
+from rsfstudy.declare.figure import figure_name
+from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.files import contents
 from rsfstudy.files.contents import (

@@ -218,15 +218,16 @@ class Measure:
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
         """The outcome of `__call__`, and the meter with the work that was spent."""
-        meter = Meter(accuracy.budget, dict(accuracy.methods))
+        meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
-            outcome = self._checked(self.find(scene, accuracy, meter))
+            found = self._checked(self.find(scene, accuracy, meter))
         except Halt as halt:
-            outcome = Outcome(halt.status, message=str(halt))
-        return Outcome(outcome.status, outcome.values, outcome.message, _count(meter.spent)), meter
+            found = halt.status, {}, str(halt)
+        return Outcome(*found, _count(meter.spent)), meter
 
-    def _checked(self, outcome: Outcome) -> Outcome:
-        """The outcome, if it is as declared; ok without a finite headline becomes `not_finite`.
+    def _checked(self, outcome: Outcome) -> tuple[Status, Mapping[str, Value], str]:
+        """What an outcome says, if it is as declared; ok without a finite headline becomes
+        `not_finite`.
 
         Raises
         ------
@@ -242,26 +243,30 @@ class Measure:
             raise InvalidValue("message", type(outcome.message).__name__, "must be a text")
         if outcome.status is Status.PENDING:
             raise InvalidValue("measured", outcome, "must say what became of the cell")
-        values = {name: self._number(name, value) for name, value in outcome.values.items()}
+        declared = self.variables
+        values = {
+            name: self._number(declared, name, value) for name, value in outcome.values.items()
+        }
         if outcome.status is not Status.OK:
-            return Outcome(outcome.status, values, outcome.message)
-        headline = np.asarray(values.get(self.headline, np.nan), dtype=float)
-        if np.isfinite(headline).any():
-            return Outcome(Status.OK, values, outcome.message)
-        return Outcome(Status.NOT_FINITE, values, f"{self.headline} = {headline}")
+            return outcome.status, values, outcome.message
+        headline = values.get(self.headline, math.nan)
+        several = isinstance(headline, np.ndarray)
+        if np.isfinite(headline).any() if several else math.isfinite(headline):
+            return Status.OK, values, outcome.message
+        return Status.NOT_FINITE, values, f"{self.headline} = {headline}"
 
-    def _number(self, name: str, value: Any) -> Value:
+    def _number(self, declared: Mapping[str, tuple[str, ...]], name: str, value: Any) -> Value:
         """A measured number, or an array of them, as NumPy's or Python's own."""
-        if name not in self.variables:
-            raise InvalidValue("measured", name, "is not declared", choices=self.variables)
-        if isinstance(value, float) and not self.variables[name]:
+        if name not in declared:
+            raise InvalidValue("measured", name, "is not declared", choices=declared)
+        if isinstance(value, float) and not declared[name]:
             return value  # as most are
         if isinstance(value, np.ma.MaskedArray):
             raise InvalidValue(name, value, "is masked, and must be a real number")
         array = np.asarray(value)
         if array.dtype.kind not in "iufb":
             raise InvalidValue(name, value, "must be a real number")
-        shape = tuple(len(self.inner_coordinates[d]) for d in self.variables[name])
+        shape = tuple(len(self.inner_coordinates[d]) for d in declared[name])
         if array.shape != shape:
             rule = f"has the shape {array.shape} and must have {shape}"
             raise InvalidValue("measured", name, rule)

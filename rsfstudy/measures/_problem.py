@@ -64,7 +64,7 @@ class Problem:
     def describe(self) -> dict[str, Any]:
         """The problem as plain data."""
         return {
-            "scene": self.scene.as_dict(),
+            "scene": self.scene.describe(),
             "measure": self.measure.describe(),
             "quantity": self.quantity,
             "answer": self.answer,

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
 from scipy.optimize import toms748
 
 from rsfstudy.boundaries.sought import DisplacementSteps, RateSteps, Steps
@@ -28,6 +29,7 @@ from rsfstudy.boundaries.swing import (
 )
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
 from rsfstudy.motion.regimes import error_of_slow_manifold, mass_acts
 from rsfstudy.motion.stepping import Halt, Meter
@@ -45,6 +47,9 @@ _CAREFUL = 1e-8
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _BY_CHANCE = 0.005
+
+#: Sizes of smaller steps that are looked at where stability may come and go between them.
+_SIZES_BETWEEN = 24
 
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
@@ -111,6 +116,7 @@ class CriticalStep(Measure):
         Where mass hardly acts below the norm it is found from the `touching` path; where there is
         no such path, or mass acts, from motions followed forward.
         """
+        check_single_step(scene)
         sign = 1 if self.direction == "up" else -1
         steps = KINDS[self.of](scene, sign)
         if steps.largest <= steps.smallest:
@@ -310,9 +316,12 @@ def _smaller_steps_decay(steps: Steps, size: float) -> bool:
     """Whether steady sliding is linearly stable after every smaller step.
 
     Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
-    stiffness falls with the load point velocity, so the ends of the range decide.
+    stiffness falls with the load point velocity, so the ends of the range decide, unless the law
+    has a slip rate of its own: then it may rise between them.
     """
-    return all(settles(steps.scene_at(end)) for end in (steps.smallest, size))
+    own_rate = steps.scene.parts.law.resting is not None
+    between = np.geomspace(steps.smallest, size, _SIZES_BETWEEN)[1:-1].tolist() if own_rate else []
+    return all(settles(steps.scene_at(end)) for end in (steps.smallest, *between, size))
 
 
 def _at_light_norm(steps: Steps, meter: Meter) -> float | None:

@@ -22,7 +22,7 @@ from rsfstudy.slider.scene import Scene
 #: Evaluations timed together, and how often: the forms of the equations take short turns, so that
 #: a busy moment of the machine falls on all of them.
 _EVALUATIONS, _TURNS = 100, 25
-#: Unknowns at which they are evaluated.
+#: Unknowns at which they are evaluated; further states are 0.
 _BETWEEN_RUPTURES, _IN_RUPTURE = (0.01, 0.0), (0.01, 10.0, 0.01)
 
 _CYCLE = LimitCycle(phases=2)
@@ -109,7 +109,9 @@ def _costs(scene: Scene) -> dict[str, float]:
     forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _BETWEEN_RUPTURES)}
     if scene.inertia:
         forms["_in_rupture"] = in_rupture(scene), _IN_RUPTURE
-    plainest = scene.with_(normal_stress="constant", inertia=False, radiation_damping=0.0)
+    plainest = scene.with_(
+        normal_stress="constant", fluid="drained", inertia=False, radiation_damping=0.0
+    )
     timed = {"plainest": (between_ruptures(plainest, clock=False), _BETWEEN_RUPTURES), **forms}
     turns = [{where: _seconds(*form) for where, form in timed.items()} for _turn in range(_TURNS)]
     costs = {}
@@ -124,6 +126,7 @@ def _costs(scene: Scene) -> dict[str, float]:
 def _seconds(equations: Equations, state: tuple[float, ...]) -> float:
     """Processor time of one right-hand side."""
     rate, p = equations.rate, equations.p
+    state += (0.0,) * (len(equations.unknowns) - len(state))
     began = time.thread_time()
     for _ in range(_EVALUATIONS):
         rate(state, p)

@@ -6,32 +6,39 @@ at one maximum decides that at the next: a return map of one variable, whose fix
 limit cycle. Where cycles approach it slowly, the motion leaps to the fixed point that the last two
 imply. A cycle is accepted when it repeats the one before to the tolerance; the event that the step
 itself sets off is never taken for it.
+
+With several states, those of a law or of the fluid, cycles need not repeat each other: a motion may
+come back to itself after 2, 4 or any other number of events, or never. The numbers are then those
+of one event, the one with the fastest peak, and no mean; the orbit is that of the whole period.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from rsfstudy.boundaries.cycles import LN10, Cycle, cycles, recorded
+from rsfstudy.boundaries.periods import Course, ReturnMap, course
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.recording import OBSERVED, along_path
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
+from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.02
 #: Displacement in D_c that sets off a motion where the scene has no step.
-_NUDGE = 0.1
+NUDGE = 0.1
 #: Part of their distance to the limit that cycles keep each time: above the first they are leapt
 #: ahead of, above the second they approach none.
 _SLOW_APPROACH, _DIVERGES = 0.03, 0.98
@@ -52,6 +59,10 @@ _HEADLINES = (
 @dataclass(frozen=True)
 class LimitCycle(Measure):
     """Limit cycle of stick-slip under a steady load point velocity.
+
+    Where a motion of several states repeats itself after `period_events` events only, the numbers
+    are those of the event with the fastest peak, from one maximum of spring stress to the next;
+    where it never does, it ends as `not_periodic`, and the message tells the range of its events.
 
     Parameters
     ----------
@@ -78,12 +89,16 @@ class LimitCycle(Measure):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         scalars = [name for h in _HEADLINES for name in (h, f"{h}_error")]
         scalars += ["slip_per_event", "healing_exponent", "residual_friction", "drop_asymmetry"]
-        scalars += ["events_until_repeat", "work_per_cycle"]
+        scalars += ["period_events", "events_until_repeat", "work_per_cycle"]
         return dict.fromkeys(scalars, ()) | dict.fromkeys(OBSERVED, ("phase",))
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"phase": np.linspace(0.0, 1.0, self.phases)}
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return (PERIOD,)
 
     @property
     def typical_work(self) -> int:
@@ -95,12 +110,14 @@ class LimitCycle(Measure):
         """
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
+        if not scene.parts.loading.is_a_step:
             # steady sliding left alone never leaves its steady state, stable or not
-            scene = scene.with_(load_velocity_ratio=1.0, displacement_step=_NUDGE)
+            scene = scene.under(Segment(1.0, NUDGE))
+        if scene.states > 1:
+            return self._of_several_states(scene, accuracy, meter)
         approach = _approach(scene, accuracy, meter, self.events)
         if approach is None:
-            return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+            return SETTLES
         cycle = approach.seen[-1]
         again, rows = recorded(scene, cycle.end, accuracy.refined(), meter)
         if again is None:
@@ -108,28 +125,91 @@ class LimitCycle(Measure):
                 Status.UNVERIFIED,
                 message="with smaller tolerances the motion settles: ask for a smaller rtol",
             )
-        values: dict[str, float | np.ndarray] = {}
-        both = zip(*map(approach.of_limit_cycle, (cycle, again)), strict=True)
-        for name, (number, refined) in zip(_HEADLINES, both, strict=True):
-            values[name] = float(number)
-            values[f"{name}_error"] = error_between(number, refined, _BY_CHANCE * accuracy.rtol)
+        values = _headlines(accuracy, *map(approach.of_limit_cycle, (cycle, again)))
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values |= _properties(scene, cycle)
+        values["period_events"] = 1.0
         values["events_until_repeat"] = float(approach.events)
         values["work_per_cycle"] = float(approach.work)
         return Outcome(Status.OK, values | along_path(rows, self.phases))
 
+    def _of_several_states(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow events loosely up to a cycle of any period that attracts; close it as accurately
+        as asked, from its largest event on, and once more with smaller tolerances.
+        """
+        came = course(scene, replace(accuracy, rtol=max(accuracy.rtol, _LOW)), meter, self.events)
+        if came is None:
+            return SETTLES
+        if came.orbit is None:
+            return without_period(scene, came)
+        orbit = came.orbit.from_largest
+        one = ReturnMap(scene, accuracy, meter).again(orbit)
+        again = ReturnMap(scene, accuracy.refined(), meter).again(orbit)
+        if one is None or again is None:
+            why = "with other tolerances the cycle does not close: ask for a smaller rtol"
+            return Outcome(Status.UNVERIFIED, message=why)
+        cycle, begin, spent = one.events[0], again.events[0].begin, meter.spent
+        _last, rows = recorded(scene, begin, accuracy.refined(), meter, orbit.period)
+        values = _headlines(accuracy, *(o.events[0].numbers_of_event() for o in (one, again)))
+        carried = (cycle.end.spring - cycle.begin.spring) / scene.stiffness
+        values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"] - carried
+        values |= _properties(scene, cycle)
+        values["period_events"] = float(orbit.period)
+        values["events_until_repeat"] = float(len(came.seen))
+        values["work_per_cycle"] = (meter.spent - spent) / orbit.period
+        return Outcome(Status.OK, values | along_path(rows, self.phases))
+
+
+#: How many events a motion takes to repeat itself.
+PERIOD = Quantity("period_events", "", "1", "number of events after which a motion repeats itself")
+
+SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+
+
+def without_period(scene: Scene, came: Course) -> Outcome:
+    """The outcome of a motion that has not come to a cycle: because it never will, or because it
+    takes its time.
+    """
+    latest = came.seen[len(came.seen) // 2 :]
+    peaks = [cycle.fastest / LN10 for cycle in latest]
+    intervals = [cycle.interval for cycle in latest]
+    text = (
+        f"the last {len(latest)} of {len(came.seen)} events peak at 10^{min(peaks):.4g} to "
+        f"10^{max(peaks):.4g} V_* and come after {min(intervals):.5g} to {max(intervals):.5g} "
+        "D_c/V_*"
+    )
+    if came.open:
+        return Outcome(Status.WORK_BUDGET_SPENT, message=f"no cycle repeats yet: {text}")
+    return Outcome(Status.NOT_PERIODIC, message=text)
+
+
+def _headlines(
+    accuracy: Accuracy, numbers: np.ndarray, refined: np.ndarray
+) -> dict[str, float | np.ndarray]:
+    """The headline numbers with their errors, from two runs."""
+    values: dict[str, float | np.ndarray] = {}
+    for name, number, again in zip(_HEADLINES, numbers, refined, strict=True):
+        values[name] = float(number)
+        values[f"{name}_error"] = error_between(number, again, _BY_CHANCE * accuracy.rtol)
+    return values
+
 
 def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
     """What else is told of a cycle."""
-    healed = cycle.rested.imbalance - cycle.landed.imbalance
-    slowed = cycle.rested.log_rate - cycle.landed.log_rate
     return {
-        # d ln(theta)/d ln(V), with Theta = imbalance - b ln V = b ln(theta/theta_*)
-        "healing_exponent": healed / (scene.b * slowed) - 1.0 if abs(slowed) > 1.0 else math.nan,
+        "healing_exponent": _healing_exponent(scene, cycle),
         "residual_friction": cycle.sliding,
         "drop_asymmetry": (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest),
     }
+
+
+def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
+    """d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*); NaN where there is no such theta."""
+    slowed = cycle.rested.log_rate - cycle.landed.log_rate
+    law = scene.parts.law
+    if law.states > 1 or not law.logarithmic or not abs(slowed) > 1.0:
+        return math.nan
+    return (cycle.rested.state - cycle.landed.state) / (scene.b * slowed)
 
 
 class Approach:
@@ -155,6 +235,8 @@ class Approach:
         self._known: bool = after is not None and after._known
         self._return: float = after._return if after else 0.0
         self._slopes: np.ndarray = after._slopes if after else np.zeros(len(_HEADLINES))
+        #: What was left to go along the map where the motion leapt last.
+        self._left_at_leap = math.inf
 
     def follow(self, meter: Meter, events: int) -> bool:
         """Follow cycles until one is the limit cycle; false where the motion settles to steady
@@ -180,6 +262,7 @@ class Approach:
                     text = f"no cycle repeats within {events} events"
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
+                    self._left_at_leap = abs(cycle.end.spring - cycle.begin.spring)
                     self._start = self.fixed_point()
                     break
 
@@ -230,12 +313,15 @@ class Approach:
 
     def _may_leap(self) -> bool:
         """Whether to leap to the fixed point: not where the next cycle comes as close, nor where
-        that is far, because the swings may be headed for steady sliding.
+        that is far, because the swings may be headed for steady sliding; and not again where the
+        last leap came no closer, because leaps may go round in a circle.
         """
         cycle = self.seen[-1]
         noise = self._accuracy.solver * self._scene.a
-        still = abs(cycle.end.spring - cycle.begin.spring) < 10.0 * noise
-        if still or not _SLOW_APPROACH < self._return < _DIVERGES:
+        left = abs(cycle.end.spring - cycle.begin.spring)
+        if not 10.0 * noise <= left < 0.5 * self._left_at_leap:
+            return False
+        if not _SLOW_APPROACH < self._return < _DIVERGES:
             return False
         slowest, fastest = (self._slopes * self._ahead(cycle))[-2:] * LN10
         return bool(abs(fastest - slowest) < _NEAR * cycle.swing)

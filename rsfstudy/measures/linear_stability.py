@@ -18,7 +18,13 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import Steady, critical_stiffness, steady_sliding
+from rsfstudy.slider.steady import (
+    Steady,
+    critical_stiffness,
+    critical_stiffnesses,
+    steady_excess,
+    steady_sliding,
+)
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
@@ -74,15 +80,17 @@ class LinearStability(Measure):
         error.
         """
         load = scene.log_load_rate
+        if load == -math.inf:
+            return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         steady = steady_sliding(scene, load)
-        mu_ss = scene.mu_star + (scene.a - scene.b) * load
         if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
-                {"steady_friction": mu_ss},
+                {"steady_friction": scene.mu_star + steady_excess(scene, load)},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
         sigma_ss = normal_stress_at(scene, steady.friction)
+        mu_ss = (scene.mu_star + steady.friction) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
         massless = critical_stiffness(scene, load, quasi_static=True)
         critical = critical_stiffness(scene, load)
@@ -95,7 +103,10 @@ class LinearStability(Measure):
                 else f"at eta V = {scene.dynamics.damping(load):.3g} sigma_* radiation damps every "
                 "perturbation",
             )
-        rise = critical / massless - 1.0
+        if massless == math.inf:
+            why = "with this friction a perturbation grows without mass or damping too"
+            return Outcome(Status.UNSTABLE_AT_ANY_STIFFNESS, values, why)
+        rise = critical / massless - 1.0 if massless else math.inf
         if rise > _LARGEST_RISE:
             norm = scene.dynamics.norm(scene, load)
             return Outcome(
@@ -104,6 +115,9 @@ class LinearStability(Measure):
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
         by_growth = _threshold(scene, steady, critical, meter)
+        if math.isnan(by_growth):
+            why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
+            return Outcome(Status.UNVERIFIED, values, why)
         return Outcome(
             Status.OK,
             {
@@ -125,7 +139,8 @@ def _over(stiffness: float, at_reference: float) -> float:
 def _explicit(scene: Scene) -> float:
     """The published formula, for scenes it speaks of; NaN for others."""
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
-    if coupling is None or law.resting is not None or law.state_effect is not None:
+    others = law.resting or law.feels_stress or scene.parts.fluid.effects
+    if coupling is None or others:
         return math.nan
     return closed_forms.critical_stiffness(
         scene.log_load_rate, scene.mu_star, scene.a, scene.b, *coupling
@@ -133,7 +148,9 @@ def _explicit(scene: Scene) -> float:
 
 
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
-    """Stiffness at which perturbations of steady sliding neither grow nor decay."""
+    """Stiffness at which perturbations of steady sliding neither grow nor decay; NaN where they do
+    not grow below it and decay above.
+    """
     with_mass = scene.dynamics.norm(scene, steady.log_rate) > _MASS_SHOWS
 
     def growth_at(stiffness: float) -> float:
@@ -147,7 +164,12 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
         meter.charge(equations.regime, 2 * len(state))
         return growth(jacobian(equations, state))
 
-    return float(brentq(growth_at, 0.5 * near, 2.0 * near, xtol=1e-15 * near, rtol=1e-14))
+    # softer than at the root before it, several states may be stable again
+    before = [k for k in critical_stiffnesses(scene, steady.log_rate) if k < near]
+    softer = max(0.5 * near, math.sqrt(near * before[-1]) if before else 0.0)
+    if not growth_at(softer) > 0.0 > growth_at(2.0 * near):
+        return math.nan
+    return float(brentq(growth_at, softer, 2.0 * near, xtol=1e-15 * near, rtol=1e-14))
 
 
 def growth(jacobian: np.ndarray) -> float:

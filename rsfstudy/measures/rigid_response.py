@@ -79,6 +79,8 @@ class RigidResponse(Measure):
         log_rate = scene.log_load_rate
         if log_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
+        if log_rate == -math.inf:
+            return Outcome(Status.NO_STEADY_STATE, message="the load point is held: nothing slips")
         sliding = steady_sliding(scene, log_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
@@ -98,7 +100,7 @@ class RigidResponse(Measure):
                 **_asymmetry(scene, log_rate),
                 "steady_stress_change": steady,
                 "stress_left_at_unit_slip": left - steady,
-                "closed_form_misfit": _closed_form_misfit(scene, slip, rows[:, 0]),
+                "closed_form_misfit": _closed_form_misfit(scene, steady, slip, rows[:, 0]),
                 "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
                 "normal_stress_ratio": rows[:, 2],
@@ -134,17 +136,17 @@ class RigidResponse(Measure):
         raise AssertionError("a motion never ends by itself")
 
 
-def _closed_form_misfit(scene: Scene, slip: np.ndarray, stress: np.ndarray) -> float:
+def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: np.ndarray) -> float:
     """Largest departure of the stress change from the closed form of the law at constant normal
     stress (eqs. 17a and 17b of the paper, less mu_* sigma + a sigma ln(V/V_*), which they leave
     out), over sigma_*; NaN where there is none.
     """
-    stress_left = type(scene.parts.law).stress_left
-    if scene.parts.normal_stress.effects or stress_left is None:
+    law, parts = scene.parts.law, scene.parts
+    stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.feels_stress
+    if stress_acts or law.stress_left is None:
         return math.nan
-    rate = scene.log_load_rate
-    left = np.array([stress_left(rate, at) for at in slip.tolist()])
-    exact = (scene.a - scene.b) * rate + scene.b * left
+    left = np.array([law.stress_left(scene.log_load_rate, at) for at in slip.tolist()])
+    exact = steady + scene.b * left
     return float(np.abs(stress - exact).max())
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.boundaries.swing import neutral, swing
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.scene import Scene
@@ -39,16 +39,13 @@ class Triggered(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion until the answer is certain, at two tolerances."""
-        if len(scene.segments) > 1:
-            rule = "is no single step, after which a motion decides"
-            remedy = "Read its peaks by step_response, or by simulate."
-            raise InvalidValue("loading", scene.parts.loading.name, rule, remedy=remedy)
+        check_single_step(scene)
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
             return Outcome(
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        if scene.load_velocity == 1.0 and scene.displacement_step == 0.0:
+        if not scene.parts.loading.is_a_step:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
         answer, again = (swing(scene, asked, meter).reached for asked in accuracies)

@@ -15,6 +15,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._problem import Problem, posed_by
 from rsfstudy.motion.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.motion.stepping import METHODS, Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
@@ -51,10 +52,16 @@ _WITH_MASS: Mapping[str, tuple[type[Accuracy], Methods]] = {
     "DOP853 + LSODA": (Accuracy, (("inertial", "LSODA"),)),
     "Radau (mass always)": (_MassAlways, (("inertial", "Radau"),)),
 }
-_CHOICES = {**_ALONE, **_WITH_MASS}
+#: The same method, compiled.
+_COMPILED = "DOP853 (compiled)"
+_CHOICES: Mapping[str, tuple[type[Accuracy], Methods]] = {
+    **_ALONE,
+    **_WITH_MASS,
+    _COMPILED: (Accuracy, ()),
+}
 
-#: Names of the integrators, and of the ways to combine them.
-INTEGRATORS = tuple(_CHOICES)
+#: Names of the integrators, and of the ways to combine them, that are installed here.
+INTEGRATORS = tuple(name for name in _CHOICES if name != _COMPILED or is_installed(COMPILED))
 
 
 #: What its numbers are.
@@ -80,8 +87,9 @@ class WorkPrecision(Measure):
     problems : tuple of Problem
         One for each scene of the lattice.
     integrator : str
-        One of SciPy's names; two of them, between ruptures and where mass acts; or "Radau (mass
-        always)", which leaves the slow manifold out. Those are for scenes with mass.
+        One of SciPy's names; two of them, between ruptures and where mass acts; "Radau (mass
+        always)", which leaves the slow manifold out (those are for scenes with mass); or "DOP853
+        (compiled)", the compiled engine.
     requested_digits : float
         The accuracy asked for, rtol = 10**-requested_digits.
     repeats : int
@@ -114,7 +122,8 @@ class WorkPrecision(Measure):
     def _asked(self) -> Accuracy:
         """The accuracy and the integrators that the run is made with."""
         kind, methods = _CHOICES[self.integrator]
-        return kind(10.0**-self.requested_digits, self.budget, methods)
+        engine = COMPILED if self.integrator == _COMPILED else SCIPY
+        return kind(10.0**-self.requested_digits, self.budget, methods, engine)
 
     @property
     def headline(self) -> str:
@@ -149,6 +158,8 @@ class WorkPrecision(Measure):
         problem = posed_by(scene, self.problems)
         if self.integrator in _WITH_MASS and not scene.inertia:
             return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} needs mass")
+        if self._asked.engine == COMPILED:
+            problem.measure(scene, self._asked)  # compiles what it needs
         before = _timed(problem, scene, _YARDSTICK)[0]
         seconds, outcome, spent = _timed(problem, scene, self._asked)
         meter.by_regime, meter.spent = spent.by_regime, spent.spent

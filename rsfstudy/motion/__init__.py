@@ -1,1 +1,1 @@
-"""Integration of a scene with SciPy: accuracy, work budget, steps, and the regimes of motion."""
+"""Integration of a scene: accuracy, work budget, steps, regimes of motion, events; two engines."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from numbers import Real
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.engines import ENGINES, SCIPY
 
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
@@ -29,18 +30,22 @@ class Accuracy:
         Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
     methods : tuple of (str, str)
         Regimes and the SciPy integrators that serve them, where not the default one.
+    engine : {"scipy", "compiled"}
+        What integrates motions.
     refinement : float
         Part of the usual tolerances that the integration is given; see `refined`.
 
     Raises
     ------
     InvalidValue
-        For an rtol outside 1e-11 to 1e-2 or a budget below 1.
+        For an rtol outside 1e-11 to 1e-2, a budget below 1, an unknown engine, or integrators for
+        an engine that has its own.
     """
 
     rtol: float = DEFAULT_RTOL
     budget: int = DEFAULT_BUDGET
     methods: tuple[tuple[str, str], ...] = ()
+    engine: str = SCIPY
     refinement: float = 1.0
 
     def __post_init__(self) -> None:
@@ -56,6 +61,11 @@ class Accuracy:
             )
         if self.budget < 1:
             raise InvalidValue("budget", self.budget, "must be at least 1")
+        if self.engine not in ENGINES:
+            raise InvalidValue("engine", self.engine, "is unknown", choices=ENGINES)
+        if self.methods and self.engine != SCIPY:
+            rule = f"are SciPy's, and the engine is {self.engine}"
+            raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")
 
     def refined(self) -> Accuracy:
         """The accuracy of a second run, which tells the error of the first: every tolerance is a

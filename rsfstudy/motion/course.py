@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, compiled_engine
 from rsfstudy.motion.events import (
     Event,
     Kind,
@@ -14,10 +15,12 @@ from rsfstudy.motion.events import (
     Told,
     Watch,
     Watcher,
+    clocks_within,
     point_at,
     told_of,
     watchers,
 )
+from rsfstudy.motion.recording import SAMPLES, Recording, row
 from rsfstudy.motion.regimes import check_start, motion, starting
 from rsfstudy.motion.stepping import Meter, Step, steps
 from rsfstudy.motion.timeline import elapsed, moment_in, timed
@@ -35,7 +38,7 @@ def follow(
     *,
     start: Point | None = None,
     clock: bool = False,
-    samples: int = 0,
+    recording: Recording | None = None,
     until: float = math.inf,
 ) -> Iterator[Event]:
     """Follow a scene from the instant after its first step, for as long as the caller asks.
@@ -52,8 +55,8 @@ def follow(
         Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
     clock : bool
         Carry time along: without it, times and slips are NaN, and work is saved.
-    samples : int
-        Samples within each step of the integration.
+    recording : Recording, optional
+        Takes in what the motion does, step by step.
     until : float
         Time at which to end.
 
@@ -68,7 +71,7 @@ def follow(
     """
     segments = scene.segments if start is None else scene.segments[-1:]
     clock = clock or until < math.inf or len(segments) > 1
-    origin, before = _Origin(0.0, 0.0, 0.0), None
+    origin, before = Origin(0.0, 0.0, 0.0), None
     for number, (acting, duration) in enumerate(segments):
         if start is None:
             start = starting(acting)
@@ -77,18 +80,50 @@ def follow(
             check_start(acting, start)
         asked = watches if number == len(segments) - 1 else _without_settling(watches)
         origin = origin._replace(spring=start.spring)
-        segment = _Segment(acting, watchers(asked), samples, meter, origin)
         end = min(origin.time + duration, until)
-        moving = motion(acting, accuracy, meter, start, clock=clock)
         lasts = end - origin.time if clock else math.inf
-        last = yield from segment.told(moving, lasts, before)
-        if last is None:
-            return
-        if last.time >= until:
+        segment = compiled_engine().segment if meter.engine == COMPILED else _segment
+        for event in segment(
+            acting,
+            accuracy,
+            meter,
+            start,
+            asked,
+            origin=origin,
+            lasts=lasts,
+            clock=clock,
+            recording=recording,
+        ):
+            happened = [event] if before is None else _begun(event, before, acting, asked)
+            for event in happened:
+                last = event
+                if event.kind is not Kind.END:
+                    yield event
+                if event.watch is not None and event.watch.ends:
+                    return
+        if last.kind is Kind.END:
+            # clocks of slip tell time the worse the longer the load point is held
+            last = last._replace(time=end)
+            if recording is not None:
+                recording.ends_at(end)
+        if end >= until:
             yield last
             return
         start, before = last.point, Moment(last.point, acting.numbers)
-        origin = _Origin(last.time, last.slip, 0.0)
+        origin = Origin(last.time, last.slip, 0.0)
+
+
+def _begun(event: Event, before: Moment, acting: Scene, watches: Sequence[Watch]) -> list[Event]:
+    """An event of a later segment; its first brings those that happened where it began."""
+    if event.kind is not Kind.START:
+        return [event]
+    after = Moment(event.point, acting.numbers)
+    return [event._replace(kind=Kind.SEGMENT)] + [
+        # slip from the first point: the spring may have jumped with the load point
+        event._replace(kind=watcher.watch.kind, watch=watcher.watch, point=point)
+        for watcher in watchers(watches)
+        if (point := watcher.between(before, after)) is not None
+    ]
 
 
 def _without_settling(watches: Sequence[Watch]) -> list[Watch]:
@@ -109,13 +144,18 @@ def along(
 
     `samples` are the clocks at which to be told of it. A rigid slider has slip for its clock.
     """
+    if meter.engine == COMPILED:
+        yield from compiled_engine().along(
+            equations, state, tolerance, meter, watches, backward=backward, samples=samples
+        )
+        return
     watching, sampling, started = watchers(watches), iter(samples), False
     sample = next(sampling, math.inf)
     for step in steps(equations, state, tolerance, meter, backward=backward):
         if not started:
             yield _of_path(step, Told(step.start, Kind.START, None), step.before)
             started = True
-        happens = list(told_of(step, watching, 0))
+        happens = told_of(step, watching)
         while sample <= step.end:
             happens.append(Told(sample, Kind.SAMPLE, None))
             sample = next(sampling, math.inf)
@@ -131,7 +171,7 @@ def _of_path(step: Step, told: Told, point: Point) -> Event:
     return Event(told.kind, told.watch, math.nan, slip, point, regime, step.meter.spent)
 
 
-class _Origin(NamedTuple):
+class Origin(NamedTuple):
     """Time, slip and spring stress where a segment of loading begins."""
 
     time: float
@@ -139,63 +179,86 @@ class _Origin(NamedTuple):
     spring: float
 
 
-class _Segment:
-    """One segment of loading."""
+def _segment(
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+    start: Point,
+    watches: Sequence[Watch],
+    *,
+    origin: Origin,
+    lasts: float,
+    clock: bool,
+    recording: Recording | None,
+) -> Iterator[Event]:
+    """Events of one segment of loading, by SciPy; the last is its end, unless one ends the motion
+    earlier.
+    """
+    watching, equations = watchers(watches), None
+    told = _Teller(scene, meter, origin, recording)
+    before: Moment | None = None
+    for step, begin in timed(scene, motion(scene, accuracy, meter, start, clock=clock)):
+        if step.equations is not equations:
+            equations = step.equations
+            yield from told.beginning(step, begin, before, watching)
+        over = begin + elapsed(scene, step, step.end) >= lasts
+        if over:
+            step = step.until(moment_in(scene, step, lasts - begin))
+        told.record(step, begin, clocks_within(step, SAMPLES))
+        for happening in told_of(step, watching):
+            yield told.event(step, begin, happening, point_at(step, happening.clock))
+        before = Moment(step.after, step.equations.p)
+        if over:
+            yield told.event(step, begin, Told(step.end, Kind.END, None), step.after)
+            return
+
+
+class _Teller:
+    """Makes events of what happens in one segment."""
 
     def __init__(
-        self,
-        scene: Scene,
-        watching: Sequence[Watcher],
-        samples: int,
-        meter: Meter,
-        origin: _Origin,
+        self, scene: Scene, meter: Meter, origin: Origin, recording: Recording | None
     ) -> None:
-        self._scene, self._watching, self._samples = scene, watching, samples
-        self._meter, self._origin = meter, origin
+        self._scene, self._meter = scene, meter
+        self._origin, self._recording = origin, recording
 
-    def told(
-        self, moving: Iterator[Step], duration: float, before: Moment | None
-    ) -> Generator[Event, None, Event | None]:
-        """Events up to the end of the segment, which is returned; None where one ends the motion
-        earlier.
-        """
-        equations: Equations | None = None
-        for step, begin in timed(self._scene, moving):
-            if step.equations is not equations:
-                kind = Kind.REGIME if equations else Kind.SEGMENT if before else Kind.START
-                equations = step.equations
-                yield self._event(step, begin, Told(step.start, kind, None), step.before)
-                for told, point in self._jumped(step, before):
-                    yield self._event(step, begin, told, point)
-                    if told.watch is not None and told.watch.ends:
-                        return None
-            over = begin + elapsed(self._scene, step, step.end) >= duration
-            if over:
-                step = step.until(moment_in(self._scene, step, duration - begin))
-            for told in told_of(step, self._watching, self._samples):
-                yield self._event(step, begin, told, point_at(step, told.clock))
-                if told.watch is not None and told.watch.ends:
-                    return None
-            before = Moment(step.after, equations.p)
-            if over:
-                return self._event(step, begin, Told(step.end, Kind.END, None), step.after)
-        raise AssertionError("a motion never ends by itself")
-
-    def _jumped(self, step: Step, before: Moment | None) -> Iterator[tuple[Told, Point]]:
-        """What happened on the way from another regime or segment to the first point of a step."""
+    def beginning(
+        self, step: Step, begin: float, before: Moment | None, watching: Sequence[Watcher]
+    ) -> Iterator[Event]:
+        """That a regime has begun with a step, and what happened on the way from another one."""
+        kind = Kind.REGIME if before else Kind.START
+        self.record(step, begin, [step.start])
+        yield self.event(step, begin, Told(step.start, kind, None), step.before)
         if before is None:
             return
         after = Moment(step.before, step.equations.p)
-        for watcher in self._watching:
+        for watcher in watching:
             point = watcher.between(before, after)
             if point is not None:
-                yield Told(step.start, watcher.watch.kind, watcher.watch), point
+                told = Told(step.start, watcher.watch.kind, watcher.watch)
+                yield self.event(step, begin, told, point)
 
-    def _event(self, step: Step, begin: float, told: Told, point: Point) -> Event:
-        scene, origin, clock = self._scene, self._origin, told.clock
-        passed = begin + elapsed(scene, step, clock)
+    def record(self, step: Step, begin: float, clocks: Sequence[float]) -> None:
+        """Record the slider at clocks of a step."""
+        if self._recording is None:
+            return
+        points = [point_at(step, clock) for clock in clocks]
+        passed = [begin + elapsed(self._scene, step, clock) for clock in clocks]
+        regime = self._recording.number(step.equations.regime)
+        places = map(self._place, passed, points)
+        self._recording.add(
+            [row(*place, point, regime) for place, point in zip(places, points, strict=True)]
+        )
+
+    def event(self, step: Step, begin: float, told: Told, point: Point) -> Event:
+        """The event of what happens at a point."""
+        time, slip = self._place(begin + elapsed(self._scene, step, told.clock), point)
+        regime, work = step.equations.regime, self._meter.spent
+        return Event(told.kind, told.watch, time, slip, point, regime, work)
+
+    def _place(self, passed: float, point: Point) -> tuple[float, float]:
+        """Time and slip since the start of the motion, so long after that of the segment."""
+        scene, origin = self._scene, self._origin
         # slip follows from the spring: f = f_0 + K (V_0 t - slip)
         slipped = scene.load_velocity * passed - (point.spring - origin.spring) / scene.stiffness
-        regime, work = step.equations.regime, self._meter.spent
-        time, slip = origin.time + passed, origin.slip + slipped
-        return Event(told.kind, told.watch, time, slip, point, regime, work)
+        return origin.time + passed, origin.slip + slipped

@@ -8,16 +8,17 @@ Who measures a motion asks to be told of
                                 part of the farthest so far (told at the end of each step while so,
                                 in the segment of loading that goes on for ever)
 
-and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`; extrema are
-told of ``log_rate`` and ``spring``. Beside what was asked for, a motion tells its start, every
-change of regime, every segment of its loading that begins, the samples it was asked for, and its
-end in time. What happens from one regime or segment to the next is told where that begins. A
-motion that cannot go on ends with `Halt`, which says why.
+and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`, and the
+friction coefficient that is read, ``reading`` (see `readings`); extrema are told of ``log_rate``,
+``spring`` and ``reading``. Beside what was asked for, a motion tells its start, every
+change of regime, every segment of its loading that begins, and its end in time. What happens from
+one regime or segment to the next is told where that begins. A motion that cannot go on ends with
+`Halt`, which says why.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from operator import attrgetter
@@ -28,7 +29,7 @@ import numpy as np
 from rsfstudy.motion.stepping import Step
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import LOG_LOAD_RATE, B
+from rsfstudy.slider.slots import LOG_LOAD_RATE, MU_STAR, SIZE
 
 
 class Kind(StrEnum):
@@ -48,32 +49,35 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Watch:
-    """What to be told of, and whether the motion ends there."""
+    """What to be told of; whether the motion ends there; and whether whoever asks can wait for it
+    until something else has happened, so that an engine may tell several events at once.
+    """
 
     kind: Kind
     of: str = ""
     level: float = 0.0
     ends: bool = False
+    waits: bool = False
 
 
-def maximum(of: str, *, ends: bool = False) -> Watch:
-    """A maximum of ``log_rate`` or ``spring``."""
-    return Watch(Kind.MAXIMUM, of, ends=ends)
+def maximum(of: str, *, ends: bool = False, waits: bool = False) -> Watch:
+    """A maximum of ``log_rate``, ``spring`` or ``reading``."""
+    return Watch(Kind.MAXIMUM, of, ends=ends, waits=waits)
 
 
-def minimum(of: str, *, ends: bool = False) -> Watch:
-    """A minimum of ``log_rate`` or ``spring``."""
-    return Watch(Kind.MINIMUM, of, ends=ends)
+def minimum(of: str, *, ends: bool = False, waits: bool = False) -> Watch:
+    """A minimum of ``log_rate``, ``spring`` or ``reading``."""
+    return Watch(Kind.MINIMUM, of, ends=ends, waits=waits)
 
 
-def rise(of: str, to: float, *, ends: bool = False) -> Watch:
+def rise(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Watch:
     """A quantity on its way up, at a level."""
-    return Watch(Kind.RISE, of, to, ends)
+    return Watch(Kind.RISE, of, to, ends, waits)
 
 
-def fall(of: str, to: float, *, ends: bool = False) -> Watch:
+def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Watch:
     """A quantity on its way down, at a level."""
-    return Watch(Kind.FALL, of, to, ends)
+    return Watch(Kind.FALL, of, to, ends, waits)
 
 
 def settling(part: float, *, ends: bool = False) -> Watch:
@@ -116,6 +120,7 @@ Quantity = Callable[[Point, Numbers], float]
 _SLOPES: dict[str, Quantity] = {
     "log_rate": lambda point, p: point.growth,
     "spring": lambda point, p: p[LOG_LOAD_RATE] - point.log_rate,
+    "reading": lambda point, p: point.reading_growth,
 }
 #: Whether what changes sign does so upwards.
 _UPWARDS = {Kind.RISE: True, Kind.FALL: False, Kind.MINIMUM: True, Kind.MAXIMUM: False}
@@ -189,7 +194,10 @@ def watchers(watches: Sequence[Watch]) -> list[Watcher]:
 
 
 def _above(watch: Watch) -> Quantity:
-    value, level = attrgetter(watch.of), watch.level
+    level = watch.level
+    if watch.of == "reading":
+        return lambda point, p: (p[MU_STAR] + point.spring) / point.normal_stress - level
+    value = attrgetter(watch.of)
     return lambda point, p: value(point) - level
 
 
@@ -197,7 +205,7 @@ def distance(point: Point, p: Numbers) -> float:
     """How far a point is from steady sliding at the load point velocity, in ln V or in the state
     over b.
     """
-    return max(abs(point.log_rate - p[LOG_LOAD_RATE]), point.unrest / p[B])
+    return max(abs(point.log_rate - p[LOG_LOAD_RATE]), point.unrest / p[SIZE])
 
 
 class Told(NamedTuple):
@@ -208,22 +216,25 @@ class Told(NamedTuple):
     watch: Watch | None
 
 
-def told_of(step: Step, watching: Sequence[Watcher], samples: int) -> Iterator[Told]:
-    """What happens within a step, in its order, and as many samples evenly spaced along its
-    clock, of which the last is its end.
-    """
+def told_of(step: Step, watching: Sequence[Watcher]) -> list[Told]:
+    """What happens within a step, in its order."""
     happened = [
         Told(clock, watcher.watch.kind, watcher.watch)
         for watcher in watching
         if (clock := watcher.within(step)) is not None
     ]
-    if samples:
-        clocks = np.linspace(step.start, step.end, samples + 1)[1:].tolist()
-        happened += [Told(clock, Kind.SAMPLE, None) for clock in clocks]
     backward = step.end < step.start
-    return iter(sorted(happened, key=lambda told: told.clock, reverse=backward))
+    return sorted(happened, key=lambda told: told.clock, reverse=backward)
+
+
+def clocks_within(step: Step, samples: int) -> list[float]:
+    """Clocks evenly spaced along a step, of which the last is its end."""
+    clocks: list[float] = np.linspace(step.start, step.end, samples + 1)[1:].tolist()
+    return clocks
 
 
 def point_at(step: Step, clock: float) -> Point:
-    """The point at a clock of a step; that of its end is known."""
+    """The point at a clock of a step; those of its ends are known."""
+    if clock == step.start:
+        return step.before
     return step.after if clock == step.end else step.point_at(clock)

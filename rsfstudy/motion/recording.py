@@ -1,13 +1,15 @@
-"""What is recorded along a motion, from its events."""
+"""What is recorded along a motion: where each regime begins, and within each step."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rsfstudy.motion.events import Event
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
 #: What is recorded, in this order.
@@ -20,29 +22,68 @@ OBSERVED = (
     "normal_stress_ratio",
     "state_variable",
 )
+#: Columns behind those: the regime, and from this one on the states.
+REGIME, STATES = len(OBSERVED), len(OBSERVED) + 1
 #: Samples within each integration step of a recorded motion: enough for a smooth curve.
 SAMPLES = 4
 
 
-def observed(scene: Scene, event: Event) -> tuple[float, ...]:
-    """The quantities of `OBSERVED` at an event."""
-    point = event.point
-    return (
-        event.time,
-        event.slip,
-        point.log_rate / math.log(10.0),
-        scene.mu_star + point.spring,
-        scene.mu_star + point.friction,
-        point.normal_stress,
-        point.state,
-    )
+@dataclass
+class Recording:
+    """Takes in what a motion does, from the engine that integrates it.
+
+    Attributes
+    ----------
+    regimes : list of str
+        Those of the motion, as they came.
+    """
+
+    regimes: list[str] = field(default_factory=list)
+    _rows: list[np.ndarray] = field(default_factory=list)
+    _ended: int = 0
+
+    def number(self, regime: str) -> int:
+        """Place of a regime among those of the motion."""
+        if regime not in self.regimes:
+            self.regimes.append(regime)
+        return self.regimes.index(regime)
+
+    def add(self, rows: Sequence[tuple[float, ...]] | np.ndarray) -> None:
+        """Rows as `row` makes them."""
+        self._rows.append(np.array(rows, dtype=float))
+
+    def ends_at(self, time: float) -> None:
+        """What was taken in since the last such time, or the start, has ended at this one."""
+        for rows in self._rows[self._ended :]:
+            np.minimum(rows[:, 0], time, out=rows[:, 0])
+        self._ended = len(self._rows)
+
+    def seen(self, scene: Scene, until: Event | None = None) -> np.ndarray:
+        """The quantities of `OBSERVED`, the number of the regime and the states freed of stress, in
+        columns; up to an event.
+        """
+        table = np.concatenate(self._rows or [np.empty((0, STATES + scene.states))])
+        if until is not None:
+            last = row(until.time, until.slip, until.point, self.number(until.regime))
+            table = np.vstack([table[table[:, 0] < until.time], last])
+        table[:, 2] /= math.log(10.0)
+        table[:, 3:5] += scene.mu_star
+        return table
 
 
-def along_path(rows: Sequence[tuple[float, ...]], points: int) -> dict[str, np.ndarray]:
-    """Recorded rows at points spread evenly along the path, half by its length in time, ln V and
+def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
+    """What is recorded of a point: the quantities of `OBSERVED`, less scales and offsets, the
+    regime, and the states.
+    """
+    stresses = point.spring, point.friction, point.normal_stress
+    return time, slip, point.log_rate, *stresses, point.state, regime, *point.psis
+
+
+def along_path(table: np.ndarray, points: int) -> dict[str, np.ndarray]:
+    """What was seen, at points spread evenly along the path, half by its length in time, ln V and
     stress, half by the steps the integrator took, which are short where the path bends.
     """
-    table = np.array(rows)
+    table = table[:, : len(OBSERVED)]
     table = table[np.append(True, (np.diff(table, axis=0) != 0.0).any(axis=1))]
     seen = table[:, [OBSERVED.index(n) for n in ("time", "log10_slip_rate", "shear_stress")]]
     spread = np.ptp(seen, axis=0)

@@ -4,29 +4,65 @@ it does.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
+from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.stepping import Halt, Meter, Step, steps
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
     in_rupture,
+    normal_stress_at,
     resting_of,
     without_mass,
 )
-from rsfstudy.slider.forms import SLOWEST, Point
+from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.slots import LARGEST_EXPONENT
 from rsfstudy.status import Status
 
-#: Normal stress over sigma_* at which the fault counts as open, and as locked.
-LOST, LOCKED = 1e-9, 1e6
-#: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
-UNBOUNDED = 120.0 * math.log(10.0)
+
+class Regimes(NamedTuple):
+    """The equations of a scene with mass, and when they change."""
+
+    slow: Equations
+    fast: Equations
+    limits: Limits
+
+    def begins_slow(self, start: Point) -> bool:
+        """Whether a motion begins on the slow manifold."""
+        below, missing = self.below(start)
+        rate = handover.norm_at(start.log_rate, self.limits) / self.limits.norm
+        slow = max(handover.weight_of_mass(below, missing, self.limits), rate) < 1.0
+        rise = handover.slip_of_rise(start.log_rate, below, self.limits)
+        return slow and rise <= self.limits.landing
+
+    def below(self, point: Point) -> tuple[float, float]:
+        """ln(V/V_*) on the slow manifold with the same spring stress and states, and the stress by
+        which friction differs from that of the spring there.
+        """
+        assert self.slow.balance is not None
+        log_rate, friction, _shift = self.slow.balance(point.spring, point.psis, self.slow.p)
+        return log_rate, point.spring - friction
+
+    def excess(self, point: Point) -> float:
+        """Positive where the slow manifold has to be left."""
+        missing = point.spring - point.friction
+        return handover.weight_of_mass(point.log_rate, missing, self.limits) - 1.0
+
+    def has_landed(self, point: Point) -> bool:
+        """Whether the full equations have done their work."""
+        below, missing = self.below(point)
+        return handover.has_landed(point.log_rate, point.growth, below, missing, self.limits)
+
+
+def regimes(scene: Scene, accuracy: Accuracy, *, clock: bool) -> Regimes:
+    """The regimes of a scene with mass."""
+    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene)
+    return Regimes(slow, fast, handover.limits(scene, accuracy))
 
 
 def motion(
@@ -65,22 +101,29 @@ def motion(
         With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
         the equations end, or as `steps` does.
     """
+
+    def guarded(equations: Equations, state: Numbers) -> Iterator[Step]:
+        return _guarded(scene, steps(equations, state, accuracy.solver, meter))
+
     if not scene.has_mass:
-        equations, state = without_mass(scene, clock=clock), _unknowns(start, clock)
-        yield from _guarded(scene, steps(equations, state, accuracy.solver, meter))
+        yield from guarded(without_mass(scene, clock=clock), slow_state(start, clock))
         return
-    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene)
-    handover = _Handover(scene, slow, accuracy)
-    point = handover.slow_point(start)
-    rises = handover.slip_of_rise(start, point) > accuracy.landing
-    slow_start = max(handover.weight_of_mass(point), handover.weight_of_rate(start)) < 1.0
-    if slow_start and not rises:
-        point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
-    else:
-        point = start
+    both, point = regimes(scene, accuracy, clock=clock), start
+    if both.begins_slow(start):
+        point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
     while True:
-        point = yield from _rupture(scene, fast, point, handover, accuracy, meter)
-        point = yield from _climb(scene, slow, point, handover, accuracy, meter, clock)
+        point = yield from _rupture(both, guarded(both.fast, fast_state(point)))
+        point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
+
+
+def slow_state(point: Point, clock: bool) -> Numbers:
+    """Unknowns at a point between ruptures."""
+    return (point.spring, *point.psis, 0.0) if clock else (point.spring, *point.psis)
+
+
+def fast_state(point: Point) -> Numbers:
+    """Unknowns at a point of a rupture."""
+    return (point.spring, point.log_rate, point.friction, *point.psis[1:])
 
 
 def starting(scene: Scene) -> Point:
@@ -102,63 +145,6 @@ def starting(scene: Scene) -> Point:
 def on_slow_manifold(scene: Scene, spring: float, psis: Numbers) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
     return between_ruptures(scene, clock=False).at((spring, *psis))
-
-
-@dataclass(frozen=True)
-class _Handover:
-    """When to change between the slow manifold and the full equations."""
-
-    scene: Scene
-    slow: Equations
-    accuracy: Accuracy
-
-    @property
-    def switch_norm(self) -> float:
-        """Slip rate norm at which to leave the slow manifold, which is a series in (K/a) w**2."""
-        softness = min(1.0, self.scene.stiffness / self.scene.a)
-        return self.accuracy.switch_norm / math.sqrt(softness)
-
-    def slow_point(self, point: Point) -> Point:
-        """The point of the slow manifold with the same spring stress and states."""
-        state = (point.spring, *point.psis)
-        below: Point = self.slow.point(state, (0.0,) * len(state), self.slow.p)
-        return below
-
-    def weight_of_mass(self, point: Point) -> float:
-        """How much mass matters: 1 where the slow manifold has to be left."""
-        correction = abs(point.spring - point.friction) / self.scene.a
-        return max(self.weight_of_rate(point), correction / self.accuracy.switch_correction)
-
-    def weight_of_rate(self, point: Point) -> float:
-        """The same by slip rate alone."""
-        return self._norm(point) / self.switch_norm
-
-    def slip_of_rise(self, start: Point, point: Point) -> float:
-        """Slip in D_c, times the change of ln V, while slip rate rises to a point after a step;
-        left out, the state would miss the evolution of that slip.
-        """
-        rise = abs(point.log_rate - start.log_rate)
-        norm = max(self._norm(point), self._norm(start))
-        return self.scene.stiffness / self.scene.a * norm**2 * rise
-
-    def _norm(self, point: Point) -> float:
-        return self.scene.inertial_time * math.exp(min(point.log_rate, LARGEST_EXPONENT))
-
-    def landed(self, point: Point) -> bool:
-        """Whether the full equations have done their work.
-
-        The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
-        (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
-        unnoticed. And the slow manifold must not hand straight back.
-        """
-        below = self.slow_point(point)
-        if point.growth > 0.0 and point.log_rate > below.log_rate + 1.0:
-            return False
-        norm = max(self._norm(point), self._norm(below))
-        distance = min(1.0, abs(point.log_rate - below.log_rate))
-        remaining = 0.5 * self.scene.stiffness / self.scene.a * norm**2 * distance
-        settled = max(norm / self.switch_norm, self.weight_of_mass(below)) < 0.5
-        return settled and remaining < self.accuracy.landing
 
 
 def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
@@ -183,73 +169,56 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     from steady sliding at V_*, or leads to a point.
     """
     spring = scene.spring_stress_step if start is None else start.spring
-    if spring <= scene.parts.normal_stress.weakest(scene):
+    lost = spring <= scene.parts.normal_stress.weakest(scene)
+    if lost or (start and normal_stress_at(scene, spring, start.psis) <= handover.LOST):
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
-    if scene.mu_star + spring <= 0.0:
-        raise Halt(
-            Status.SHEAR_STRESS_REVERSED,
-            f"the step takes shear stress to {scene.mu_star + spring:.3g} sigma_*",
-        )
+    if scene.mu_star + spring > 0.0:
+        return
+    text = f"the step takes shear stress to {scene.mu_star + spring:.3g} sigma_*"
+    if not scene.parts.law.regularised:
+        raise Halt(Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True")
+    if scene.load_velocity == 0.0:
+        text = f"{text}, where slip backwards dies out under a load point at rest"
+        raise Halt(Status.SHEAR_STRESS_REVERSED, text)
 
 
-def _unknowns(start: Point, clock: bool) -> Numbers:
-    return (start.spring, *start.psis, 0.0) if clock else (start.spring, *start.psis)
-
-
-def _climb(
-    scene: Scene,
-    slow: Equations,
-    start: Point,
-    handover: _Handover,
-    accuracy: Accuracy,
-    meter: Meter,
-    clock: bool,
-) -> Generator[Step, None, Point]:
+def _climb(both: Regimes, moving: Iterator[Step]) -> Generator[Step, None, Point]:
     """The slow manifold, until slip is fast enough for mass to act; returns the last point."""
-
-    def excess(point: Point) -> float:
-        return handover.weight_of_mass(point) - 1.0
-
-    state = _unknowns(start, clock)
-    for step in _guarded(scene, steps(slow, state, accuracy.solver, meter)):
-        if excess(step.after) >= 0.0 > excess(step.before):
-            step = step.until(step.locate(excess))
+    for step in moving:
+        if both.excess(step.after) >= 0.0 > both.excess(step.before):
+            step = step.until(step.locate(both.excess))
             yield step
             return step.after
         yield step
     raise AssertionError("steps() never ends by itself")
 
 
-def _rupture(
-    scene: Scene,
-    fast: Equations,
-    start: Point,
-    handover: _Handover,
-    accuracy: Accuracy,
-    meter: Meter,
-) -> Generator[Step, None, Point]:
+def _rupture(both: Regimes, moving: Iterator[Step]) -> Generator[Step, None, Point]:
     """The full equations, until mass no longer matters; returns the last point."""
-    state = (start.spring, start.log_rate, start.friction, *start.psis[1:])
-    for step in _guarded(scene, steps(fast, state, accuracy.solver, meter)):
+    for step in moving:
         yield step
-        if handover.landed(step.after):
+        if both.has_landed(step.after):
             return step.after
     raise AssertionError("steps() never ends by itself")
 
 
 def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
-    """Pass steps on until normal stress vanishes, or normal stress or slip rate grow without bound.
-
-    Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
-    """
+    """Pass steps on until the motion cannot go on."""
     for step in moving:
-        ratio = step.after.normal_stress
-        if ratio <= LOST:
-            raise Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
-        if ratio >= LOCKED:
-            raise Halt(Status.LOCKED, f"normal stress grew to {ratio:.3g} sigma_* and goes on")
-        if step.after.log_rate <= SLOWEST and scene.load_velocity == 0.0:
-            raise Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
-        if step.after.log_rate >= UNBOUNDED:
-            raise Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")
+        point = step.after
+        end = handover.fate(point.log_rate, point.normal_stress, scene.load_velocity)
+        if end != handover.GOES_ON:
+            raise halted(end, point.normal_stress)
         yield step
+
+
+def halted(end: int, normal_stress: float) -> Halt:
+    """The end of a motion, by its `handover.fate`."""
+    if end == handover.IS_LOST:
+        return Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+    if end == handover.IS_LOCKED:
+        text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
+        return Halt(Status.LOCKED, text)
+    if end == handover.HAS_STOPPED:
+        return Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
+    return Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")

@@ -10,9 +10,11 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
+from rsfstudy.motion.engines import SCIPY
 from rsfstudy.slider.equations import LONGEST_STEP, RIGID, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.slots import LOG_LOAD_RATE
 from rsfstudy.status import Status
 
 Vector = np.ndarray
@@ -24,9 +26,9 @@ METHODS: Mapping[str, type[OdeSolver]] = {
 DEFAULT_METHOD = "DOP853"
 #: Local tolerance at which the longest steps of equations hold as they are; at others they change
 #: as steps of order eight do.
-_TOLERANCE_OF_STRIDES = 1e-7
+TOLERANCE_OF_STRIDES = 1e-7
 #: Local tolerance below which rounding decides, and SciPy warns.
-_TIGHTEST = 5e-14
+TIGHTEST = 5e-14
 
 
 class Halt(Exception):
@@ -48,6 +50,8 @@ class Meter:
         Right-hand sides it may evaluate.
     methods : mapping of str to str
         Name of the SciPy integrator of a regime; `DEFAULT_METHOD` where none is named.
+    engine : str
+        What integrates.
     by_regime : dict
         Right-hand sides evaluated so far.
     spent, steps, jacobians : int
@@ -56,6 +60,7 @@ class Meter:
 
     budget: int
     methods: Mapping[str, str] = field(default_factory=dict)
+    engine: str = SCIPY
     by_regime: dict[str, int] = field(default_factory=dict)
     spent: int = 0
     steps: int = 0
@@ -161,7 +166,7 @@ def steps(
     """
     regime, rate_of, p = equations.regime, equations.rate, equations.p
     method = meter.method_of(regime)
-    tolerance = max(tolerance, _TIGHTEST)
+    tolerance = max(tolerance, TIGHTEST)
 
     def rate(_clock: float, unknowns: Vector) -> Numbers:
         meter.charge(regime, 1)
@@ -180,13 +185,14 @@ def steps(
         )
 
     # what limits a step must differ between two tolerances whose results are to tell errors
-    finer = (tolerance / _TOLERANCE_OF_STRIDES) ** 0.125
+    finer = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
     solver, jacobians = started(np.asarray(state, dtype=float)), 0
     before = equations.point(tuple(solver.y.tolist()), _rates(solver, rate), p)
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
         # checked
-        solver.max_step = equations.longest(before) * finer
+        longest = equations.longest(before.log_rate, before.normal_stress, p[LOG_LOAD_RATE])
+        solver.max_step = longest * finer
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             failure = solver.step()
         meter.steps += 1

@@ -1,7 +1,9 @@
 """Figures: ``draw(dataset, axes)`` draws a results dataset and computes nothing; one file each,
 found by name, or a function or module of the user's own.
 
-A figure of several panels lists its functions of that kind in ``PANELS``.
+A figure of several panels lists its functions of that kind in ``PANELS``, or gives those that a
+dataset needs by ``panels(dataset)``; ``COLUMNS`` says how many stand beside each other, and
+``HEIGHT`` how many mm one is high. How figures look is in ``rsfstudy.mplstyle``.
 """
 
 from __future__ import annotations
@@ -10,31 +12,52 @@ import importlib
 import io
 import os
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Figure
 
-from rsfstudy.declare.study import settings
+from rsfstudy.declare.wording import settings
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
+from rsfstudy.plots._style import hold_ticks, letter, make_room, settle, share_legends, size
+from rsfstudy.plots._style import styled as styled
+from rsfstudy.plots._text import pretty, symbol, wrapped
 from rsfstudy.reduce.base import failed as is_failed
+from rsfstudy.reduce.base import stated_by
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import quantity
 
 Panel = Callable[[xr.Dataset, Axes], Axes]
 
 NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
-#: Size of one panel in inches, and most panels in a row; a module may state its own as ``PANEL``
-#: and ``COLUMNS``.
-_PANEL, _COLUMNS = (6.4, 4.8), 2
+#: File formats of figures, by the ending of the file.
+FORMATS = ("png", "pdf", "svg")
+#: Points an inch of what a notebook shows.
+_ON_SCREEN = 150
+#: What would make two files of one figure differ.
+_DATES: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+#: Most panels beside each other.
+_COLUMNS = 2
 
 
-def figure(dataset: xr.Dataset, own: Any = None) -> Figure:
+class Drawing(Figure):
+    """A figure that a notebook shows, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=_ON_SCREEN)
+        return image.getvalue()
+
+
+def figure(
+    dataset: xr.Dataset, own: Any = None, *, variable: str | None = None, style: Any = None
+) -> Figure:
     """The figure of a results dataset, as its study declares it, with all its panels.
 
     Parameters
@@ -42,36 +65,51 @@ def figure(dataset: xr.Dataset, own: Any = None) -> Figure:
     dataset : xarray.Dataset
     own : function or module, optional
         What draws it where that is no module of `rsfstudy.plots`.
+    variable : str, optional
+        Draw this variable instead: as maps over two numeric axes, else as lines.
+    style : path, str, dict or list of those, optional
+        What `matplotlib.style.use` takes, to be laid over the style that ships.
 
     Raises
     ------
     InvalidValue
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
+        Where there is no such variable or style.
     """
-    module = _module(dataset, own)
-    panels, size = getattr(module, "PANELS", (None,)), getattr(module, "PANEL", _PANEL)
-    columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
-    rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
-    for number, panel in enumerate(panels, start=1):
-        _draw(dataset, module, figure.add_subplot(rows, columns, number), panel or module.draw)
-    overrides = declaration(dataset).overrides
-    if overrides:
-        figure.supxlabel(f"not as declared: {settings(overrides)}", fontsize="small", color="0.4")
+    with styled(style):
+        module = _module(dataset, own) if variable is None else _drawing(dataset, variable)
+        dataset = dataset.squeeze(sorted(_single(dataset, module)), drop=False)
+        panels = _panels(module, dataset)
+        columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
+        rows = -(-len(panels) // columns)
+        height = getattr(module, "HEIGHT", None)
+        figure = Drawing(figsize=size(columns, rows, height), layout="constrained")
+        drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
+        for axes, panel in zip(drawn, panels, strict=True):
+            hold_ticks(axes)
+            _draw(dataset, axes, panel)
+        letter(drawn)
+        share_legends(figure, drawn)
+        overrides = declaration(dataset).overrides
+        if overrides:
+            figure.suptitle(_not_as_declared(dataset, columns), color="0.4")
+        make_room(figure, [drawn[i : i + columns] for i in range(0, len(drawn), columns)])
+        settle(figure)
     return figure
 
 
 def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
     module = _module(dataset)
-    return _draw(dataset, module, axes, panel or module.draw)
+    dataset = dataset.squeeze(sorted(_single(dataset, module)), drop=False)
+    return _draw(dataset, axes, panel or _panels(module, dataset)[0])
 
 
-def _draw(dataset: xr.Dataset, module: Any, axes: Axes, panel: Panel) -> Axes:
-    panel(dataset.squeeze(sorted(_single(dataset, module)), drop=False), axes)
+def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel) -> Axes:
+    panel(dataset, axes)
     lacking = _lacking(dataset)
     if lacking:
-        axes.set_title(f"{axes.get_title()} [{lacking}]".strip(), color="tab:red")
+        axes.set_title(f"{axes.get_title()}\n[{lacking}]".strip(), color="tab:red")
     return axes
 
 
@@ -86,9 +124,20 @@ def _lacking(dataset: xr.Dataset) -> str:
     return ", ".join(filter(None, parts))
 
 
+def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:
+    own = stated_by(dataset)
+    names = {n: symbol(quantity(n, own)) for n in declaration(dataset).overrides}
+    values = {names[name]: value for name, value in declaration(dataset).overrides.items()}
+    text = pretty(settings(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", "))
+    return wrapped(f"not as declared: {text}", 55 if columns == 1 else 120)
+
+
+# ---- which module draws, and what ---------------------------------------------------------------
+
+
 def _module(dataset: xr.Dataset, own: Any = None) -> Any:
     """The module, or an object like one, that draws a dataset: the one it declares, or plain lines
-    if the dataset has more axes than that can show.
+    or maps if the dataset has more axes than that can show.
     """
     name = declaration(dataset).plot
     if name in NAMES:
@@ -98,9 +147,25 @@ def _module(dataset: xr.Dataset, own: Any = None) -> Any:
     else:
         module = own if hasattr(own, "draw") else SimpleNamespace(draw=own)
     varied = {str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1}
-    if varied <= set(getattr(module, "DIMENSIONS", varied)):
-        return module
-    return importlib.import_module(f"{__name__}.lines")
+    fits = varied <= set(getattr(module, "DIMENSIONS", varied))
+    return module if fits and name != "lines" else _drawing(dataset)
+
+
+def _drawing(dataset: xr.Dataset, variable: str | None = None) -> Any:
+    """What draws any lattice: maps where it has two numeric axes, else lines."""
+    from rsfstudy.plots import _axes, lines, maps
+
+    for module in (maps, lines):
+        if found := module.panels(dataset, variable):
+            return SimpleNamespace(PANELS=found)
+    choices = [str(name) for name, values in dataset.data_vars.items() if _axes.is_number(values)]
+    raise InvalidValue("variable", variable, "is no number of these results", choices=choices)
+
+
+def _panels(module: Any, dataset: xr.Dataset) -> Sequence[Panel]:
+    if hasattr(module, "panels"):
+        return list(module.panels(dataset))
+    return [panel or module.draw for panel in getattr(module, "PANELS", (None,))]
 
 
 def _single(dataset: xr.Dataset, module: Any) -> set[str]:
@@ -109,14 +174,25 @@ def _single(dataset: xr.Dataset, module: Any) -> set[str]:
     return {str(d) for d in dataset["status"].dims if dataset.sizes[d] == 1 and d not in known}
 
 
-def save(dataset: xr.Dataset, path: Path, own: Any = None) -> None:
-    """Write the figure of a results dataset as PNG: the old file stays, or the whole new one.
+# ---- files --------------------------------------------------------------------------------------
+
+
+def save(
+    dataset: xr.Dataset,
+    path: Path,
+    own: Any = None,
+    *,
+    variable: str | None = None,
+    style: Any = None,
+) -> None:
+    """Write the figure of a results dataset, as PNG, PDF or SVG by the ending of the path: the old
+    file stays, or the whole new one.
 
     Parameters
     ----------
     dataset : xarray.Dataset
     path : Path
-    own : function or module, optional
+    own, variable, style : optional
         As in `figure`.
 
     Raises
@@ -126,9 +202,13 @@ def save(dataset: xr.Dataset, path: Path, own: Any = None) -> None:
     OSError
         Where it cannot be written.
     """
-    image = io.BytesIO()
+    image, form = io.BytesIO(), path.suffix[1:].lower()
+    if form not in FORMATS:
+        raise InvalidValue("figure", path.name, "needs an ending we write", choices=FORMATS)
     try:
-        figure(dataset, own).savefig(image, format="png", dpi=160)
+        drawn = figure(dataset, own, variable=variable, style=style)
+        with styled(style):
+            drawn.savefig(image, format=form, metadata=_DATES.get(form))
     except RsfStudyError:
         raise
     except Exception as error:

@@ -12,16 +12,18 @@ from matplotlib.axes import Axes
 
 from rsfstudy.slider.fields import kinds_with, own_named, without_meaning
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import stress_at
+from rsfstudy.slider.steady import steady_excess, stress_at
 from rsfstudy.vocabulary import quantity
 
 LN10 = math.log(10.0)
 
 
-def coupling(cell: xr.Dataset) -> tuple[str, float]:
-    """What decides the steady-state line: normal stress, and its angle."""
+def coupling(cell: xr.Dataset) -> tuple[str, float, float]:
+    """What decides the steady-state line: normal stress, its angle, and the law where steady
+    friction at ten times V_* tells of one.
+    """
     scene = scene_of(cell)
-    return scene.normal_stress, scene.phi or 0.0
+    return scene.normal_stress, scene.phi or 0.0, steady_excess(scene, LN10)
 
 
 def scene_of(cell: xr.Dataset) -> Scene:
@@ -41,7 +43,8 @@ def scene_of(cell: xr.Dataset) -> Scene:
 def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
     """Shear stress of steady sliding at slip rates 10^x V_*; NaN where there is none."""
     scene = scene_of(cell)
-    return _stresses(scene, (scene.a - scene.b) * log10_rates * LN10)
+    excesses = [steady_excess(scene, rate * LN10) for rate in log10_rates.tolist()]
+    return _stresses(scene, np.array(excesses))
 
 
 def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray) -> np.ndarray:
@@ -58,5 +61,24 @@ def _stresses(scene: Scene, excesses: np.ndarray) -> np.ndarray:
 
 def label_axes(axes: Axes) -> None:
     """Axis labels of the plane."""
-    axes.set_xlabel(quantity("log10_slip_rate").symbol)
+    axes.set_xlabel(f"Slip rate, {quantity('log10_slip_rate').symbol}")
     axes.set_ylabel(f"Frictional stress, {quantity('frictional_stress').symbol}")
+
+
+def mark_reversed(axes: Axes) -> None:
+    """Hatch where stress along y is below zero, if the axes reach there: friction of forward slip
+    does not apply.
+    """
+    lowest, highest = axes.get_ylim()
+    if lowest < 0.0:
+        axes.axhspan(
+            lowest,
+            0.0,
+            facecolor="0.95",
+            edgecolor="0.6",
+            linewidth=0.0,
+            hatch="////",
+            zorder=0,
+            label="below 0: stress reversed",
+        )
+        axes.set_ylim(lowest, highest)

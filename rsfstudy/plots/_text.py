@@ -1,13 +1,112 @@
-"""Numbers as figures write them."""
+"""Words, symbols and numbers as figures write them."""
 
 from __future__ import annotations
 
 import math
+import re
+from typing import Any
+
+from matplotlib.mathtext import MathTextParser
+
+from rsfstudy.quantity import Quantity
+
+_PARSER = MathTextParser("path")
+_MATH = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
+_WORD = re.compile(rf"(?:{_MATH.pattern[1:-1]}|\\\$|[^\s$])+")
+
+#: What results call things, and how figures write it.
+_SYMBOLS: tuple[tuple[str, str], ...] = (
+    (r"\bk_cr\(V_\*\)", r"$k_{cr}(V_*)$"),
+    (r"\ba/\(b-a\)", r"$a/(b-a)$"),
+    (r"\bb/a\b", r"$b/a$"),
+    (r"\bk_cr\b", r"$k_{cr}$"),
+    (r"\b([VDbL])_([0c12])\b", r"$\1_\2$"),
+    (r"\bV_(?:\*|star\b)", r"$V_*$"),
+    (r"\b(sigma|mu)_(?:\*|star\b)", r"$\\\1_*$"),
+    (r"\bmu_ss\b", r"$\\mu_{ss}$"),
+    (r"\b(alpha|phi|lambda|zeta|theta|Theta)\b", r"$\\\1$"),
+    (r"\b10\^(-?\d+)", r"$10^{\1}$"),
+    (r"\b1e\+?(-?)0*(\d+)\b", r"$10^{\1\2}$"),
+    (r"\b(\d+(?:\.\d+)?)e\+?(-?)0*(\d+)\b", r"$\1\\times10^{\2\3}$"),
+)
 
 
-def with_error(value: float, error: float) -> str:
-    """A value and its standard error, to the first digit of the error."""
+def pretty(text: Any) -> str:
+    """A name or label with symbols for what stands for them, and no underscore; formulas stay as
+    they are, and what only looks like one is taken literally.
+    """
+    parts = _MATH.split(str(text)) if _is_math(str(text)) else [str(text).replace("$", r"\$")]
+    return "".join(part if _MATH.fullmatch(part) else _worded(part) for part in parts)
+
+
+def _worded(text: str) -> str:
+    for found, written in _SYMBOLS:
+        pieces = _MATH.split(text)
+        text = "".join(p if _MATH.fullmatch(p) else re.sub(found, written, p) for p in pieces)
+    pieces = _MATH.split(text)
+    return "".join(p if _MATH.fullmatch(p) else p.replace("_", " ") for p in pieces)
+
+
+def _is_math(text: str) -> bool:
+    if text.count("$") % 2:
+        return False
+    try:
+        _PARSER.parse(text)
+    except ValueError:
+        return False
+    return True
+
+
+def wrapped(text: str, width: int) -> str:
+    """Text in lines of `width` characters at most, never broken within a formula."""
+    lines: list[list[str]] = [[]]
+    for word in _WORD.findall(text):
+        if lines[-1] and _length(" ".join([*lines[-1], word])) > width:
+            lines.append([])
+        lines[-1].append(word)
+    return "\n".join(" ".join(line) for line in lines)
+
+
+def _length(text: str) -> int:
+    """Characters to be seen, about."""
+    return len(re.sub(r"[${}^_]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
+
+
+def label(about: Quantity, width: int = 45) -> str:
+    """What a quantity is, its symbol and its units, for an axis."""
+    text = f"{about.long_name[0].upper()}{about.long_name[1:]}"
+    if about.symbol:
+        text += f", {about.symbol}"
+    units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
+    powers = re.sub(r"\b([a-zA-Z]+)(-?\d)\b", r"\1$^{\2}$", units)
+    return wrapped(pretty(f"{text} ({powers})" if units else text), width)
+
+
+def symbol(about: Quantity) -> str:
+    """Its symbol, or else its name in words."""
+    return pretty(about.symbol or about.name)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number of so many digits; with a power of ten where it is far from 1."""
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1.0 <= abs(float(text)) < 1e5:
+        text = f"{float(text):,.0f}"
+    return pretty(text)
+
+
+def with_error(value: float, error: float, most: int | None = None) -> str:
+    """A value and its standard error, to the first digit of the error; the value alone where the
+    error is too small to show in at most so many digits behind the point.
+    """
     if not math.isfinite(value) or not math.isfinite(error):
         return "unknown"
+    if most is not None and error < 0.5 * 10.0**-most:
+        return f"${value:.{most}f}$"
     digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
-    return rf"{value:.{digits}f} $\pm$ {error:.{digits}f}"
+    return rf"${value:.{digits}f} \pm {error:.{digits}f}$"
+
+
+def stiffness(ratio: float) -> str:
+    """A stiffness in units of the critical one at V_*."""
+    return "$k = k_{cr}$" if ratio == 1.0 else rf"$k = {ratio:g}\,k_{{cr}}$"

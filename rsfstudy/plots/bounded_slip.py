@@ -4,11 +4,18 @@ takes off their peaks.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.plots._phase_plane import label_axes, steady_line
+from rsfstudy.plots import Panel
+from rsfstudy.plots._axes import log_scale
+from rsfstudy.plots._phase_plane import label_axes, mark_reversed, steady_line
+from rsfstudy.plots._style import legend, look, marker
+from rsfstudy.plots._text import stiffness
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -17,105 +24,74 @@ DIMENSIONS = ("normal_stress", "stiffness_ratio", "load_velocity_ratio", "inerti
 _MASS = {0: "quasi-static", 1: "with mass"}
 
 
+def panels(dataset: xr.Dataset) -> Sequence[Panel]:
+    """Figs. 8 and 12, peaks against the step for each kind of dynamics, and peak after peak."""
+    return [draw, draw_mass, *(_peaks(n) for n in range(dataset.sizes["inertia"])), draw_decay]
+
+
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Quasi-static motions after the smallest and the largest step (Fig. 8)."""
     softest = _softest(dataset).sortby("load_velocity_ratio").sortby("inertia").isel(inertia=0)
     for number, end in enumerate((-1, 0)):
         cell = softest.isel(load_velocity_ratio=end)
-        axes.plot(
-            cell["log10_slip_rate"],
-            cell["frictional_stress"],
-            color=f"C{number}",
-            linewidth=1.0,
-            label=rf"$V_0 = {float(cell['load_velocity_ratio']):g}\,V_*$",
-        )
-    _steady(softest, axes)
-    return _finish(axes, f"{_MASS[int(softest['inertia'])]}, {_which(softest)}".capitalize())
+        rate = float(cell["load_velocity_ratio"])
+        style = {"color": look(number)["color"], "linewidth": 1.1 - 0.5 * number}
+        _orbit(axes, cell, rf"$V_0 = {rate:g}\,V_*$", style)
+    return _finish(axes, softest, _MASS[int(softest["inertia"])].capitalize())
 
 
 def draw_mass(dataset: xr.Dataset, axes: Axes) -> Axes:
     """With mass and without it, after the largest step (Fig. 12)."""
     softest = _softest(dataset).sortby("load_velocity_ratio").isel(load_velocity_ratio=-1)
     for number, mass in enumerate(softest["inertia"].values):
-        cell = softest.isel(inertia=number)
-        axes.plot(
-            cell["log10_slip_rate"],
-            cell["frictional_stress"],
-            "-" if mass else "--",
-            color="C3" if mass else "C1",
-            linewidth=1.2,
-            label=_MASS[int(mass)],
-        )
-    if "paths_parting" in softest:
-        for name, text in (("paths_parting", "part"), ("paths_merging", "merge")):
-            axes.axvline(float(softest[name]), color="0.7", linewidth=0.8, linestyle=":")
-            axes.text(
-                float(softest[name]),
-                0.02,
-                f" {text}",
-                transform=axes.get_xaxis_transform(),
-                color="0.4",
-                fontsize="small",
-            )
-    _steady(softest, axes)
+        _orbit(axes, softest.isel(inertia=number), _MASS[int(mass)], look(number))
+    found = [float(softest[n]) for n in ("paths_parting", "paths_merging") if n in softest]
+    for number, where in enumerate(x for x in found if np.isfinite(x)):
+        text = "paths part and merge" if number == 0 else None
+        axes.axvline(where, color="0.5", linewidth=0.8, linestyle="-.", label=text)
     rate = float(softest["load_velocity_ratio"])
-    return _finish(axes, rf"$V_0 = {rate:g}\,V_*$, {_which(softest)}")
-
-
-def draw_peaks(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """Highest slip rate against the size of the step, with mass and without it."""
-    for number, stress in enumerate(dataset["normal_stress"].values):
-        for stiffness, marker in zip(dataset["stiffness_ratio"].values, "os^v", strict=False):
-            for mass in dataset["inertia"].values:
-                row = dataset.sel(normal_stress=stress, stiffness_ratio=stiffness, inertia=mass)
-                axes.plot(
-                    row["load_velocity_ratio"],
-                    row["max_log10_slip_rate"],
-                    marker + ("-" if mass else "--"),
-                    color=f"C{number}",
-                    fillstyle="full" if mass else "none",
-                    markersize=4,
-                    linewidth=0.9,
-                    label=f"{stress}, {stiffness:g} $k_{{cr}}$, {_MASS[int(mass)]}",
-                )
-    axes.set_xscale("log")
-    axes.set_ylim(0.0, 16.0)
-    axes.set_xlabel(quantity("load_velocity_ratio").symbol)
-    axes.set_ylabel(rf"Highest {quantity('log10_slip_rate').symbol}")
-    axes.set_title("Peaks: filled with mass, open without", fontsize="medium")
-    axes.legend(fontsize="xx-small")
-    axes.grid(alpha=0.3)
-    return axes
+    return _finish(axes, softest, rf"$V_0 = {rate:g}\,V_*$")
 
 
 def draw_decay(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Peak after peak without mass, after the smallest step: decaying, or periodic."""
     rows = dataset.sortby("load_velocity_ratio").sortby("inertia")
     rows = rows.isel(load_velocity_ratio=0, inertia=0)
-    for number, stress in enumerate(dataset["normal_stress"].values):
-        for stiffness, marker in zip(dataset["stiffness_ratio"].values, "os^v", strict=False):
-            row = rows.sel(normal_stress=stress, stiffness_ratio=stiffness)
-            axes.plot(
-                row["peak"],
-                row["peak_log10_slip_rate"],
-                f"{marker}-",
-                color=f"C{number}",
-                markersize=4,
-                linewidth=0.9,
-                label=f"{stress}, {stiffness:g} $k_{{cr}}$",
-            )
+    for row, style in _rows(rows):
+        axes.plot(row["peak"], row["peak_log10_slip_rate"], **style)
     axes.set_xlabel("Number of the peak")
-    axes.set_ylabel(quantity("peak_log10_slip_rate").symbol)
+    axes.set_ylabel(f"Peak slip rate, {quantity('peak_log10_slip_rate').symbol}")
     rate = float(rows["load_velocity_ratio"])
-    axes.set_title(
-        rf"Peaks, {_MASS[int(rows['inertia'])]}, $V_0 = {rate:g}\,V_*$", fontsize="medium"
-    )
-    axes.legend(fontsize="x-small")
-    axes.grid(alpha=0.3)
+    axes.set_title(rf"Peaks, {_MASS[int(rows['inertia'])]}, $V_0 = {rate:g}\,V_*$")
+    legend(axes)
     return axes
 
 
-PANELS = (draw, draw_mass, draw_peaks, draw_decay)
+def _peaks(mass: int) -> Panel:
+    def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
+        """Highest slip rate against the size of the step."""
+        part = dataset.isel(inertia=mass)
+        for row, style in _rows(part):
+            axes.plot(row["load_velocity_ratio"], row["max_log10_slip_rate"], **style)
+        log_scale(axes, "x")
+        axes.set_xlabel(f"Load point velocity, {quantity('load_velocity_ratio').symbol}")
+        axes.set_ylabel(rf"Highest slip rate, {quantity('log10_slip_rate').symbol}")
+        axes.set_title(f"Peaks, {_MASS[int(part['inertia'])]}")
+        legend(axes)
+        return axes
+
+    return panel
+
+
+def _rows(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, dict[str, Any]]]:
+    """What there is at each normal stress condition and stiffness, and how it is drawn."""
+    for number, stress in enumerate(dataset["normal_stress"].values):
+        for other, ratio in enumerate(dataset["stiffness_ratio"].values):
+            style = look(number) | {
+                "marker": marker(other),
+                "label": f"{stress}, {stiffness(ratio)}",
+            }
+            yield dataset.sel(normal_stress=stress, stiffness_ratio=ratio), style
 
 
 def _softest(dataset: xr.Dataset) -> xr.Dataset:
@@ -124,19 +100,20 @@ def _softest(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.sortby("stiffness_ratio").sel(normal_stress=stress).isel(stiffness_ratio=0)
 
 
-def _which(cell: xr.Dataset) -> str:
-    stress, ratio = str(cell["normal_stress"].item()), float(cell["stiffness_ratio"])
-    return rf"{stress} normal stress, $k = {ratio:g}\,k_{{cr}}(V_*)$"
+def _orbit(axes: Axes, cell: xr.Dataset, label: str, style: Mapping[str, Any]) -> None:
+    drawn = {"linestyle": "-", **style}
+    axes.plot(cell["log10_slip_rate"], cell["frictional_stress"], **drawn, label=label)
 
 
-def _steady(cell: xr.Dataset, axes: Axes) -> None:
-    reach = np.linspace(*axes.get_xlim(), 200)
-    axes.plot(reach, steady_line(cell, reach), ":", color="0.5", label="steady state")
-
-
-def _finish(axes: Axes, title: str) -> Axes:
+def _finish(axes: Axes, cell: xr.Dataset, title: str) -> Axes:
+    """The steady state, as far as the motions reach, and what the axes and the panel are."""
+    reach, height = axes.get_xlim(), axes.get_ylim()
+    axes.set(xlim=reach, ylim=height)
+    rates = np.linspace(*reach, 400)
+    axes.plot(rates, steady_line(cell, rates), ":", color="0.5", label="steady state")
+    mark_reversed(axes)
     label_axes(axes)
-    axes.set_title(title, fontsize="medium")
-    axes.legend(fontsize="small")
-    axes.grid(alpha=0.3)
+    stress, ratio = str(cell["normal_stress"].item()), float(cell["stiffness_ratio"])
+    axes.set_title(f"{title}, {stress} normal stress, {stiffness(ratio)}")
+    legend(axes, 3)
     return axes

@@ -9,11 +9,14 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots import Panel
+from rsfstudy.plots._axes import name_points
+from rsfstudy.plots._style import legend, look
 
 #: Dimensions the figure has room for.
 DIMENSIONS = ("law", "coupling", "dynamics")
 
-_COLOURS = {"slip": "C0", "slowness": "C1"}
+#: Millimetres of a panel: one line a combination and law.
+HEIGHT = 88.0
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
@@ -29,18 +32,27 @@ def _bars(dataset: xr.Dataset, axes: Axes, name: str, label: str, digits: int) -
         values = [float(dataset[name].sel(law=law, coupling=c, dynamics=d)) for c, d in rows]
         place = at + (number - 0.5 * (len(laws) - 1)) * 0.4
         axes.barh(
-            place, values, height=0.38, color=_COLOURS.get(str(law), "C2"), label=f"{law} law"
+            place,
+            values,
+            height=0.36,
+            color=look(number)["color"],
+            hatch=("", "/////")[number % 2],
+            edgecolor="white",
+            linewidth=0.0,
+            label=f"{law} law",
         )
         for y, value in zip(place, values, strict=True):
             text = f" {value:.{digits}g}" if np.isfinite(value) else " no cycle"
-            axes.text(value if value > 0.0 else 0.0, y, text, va="center", fontsize="xx-small")
-    axes.set_yticks(at, [f"{c}\n{d}" for c, d in rows], fontsize="xx-small")
+            where = value if value > 0.0 else 0.0
+            axes.text(where, y, text, va="center", fontsize=5.5, clip_on=True)
+    name_points(axes.yaxis, [f"{c}, {d}" for c, d in rows], 20)
+    axes.tick_params(axis="y", labelsize=6)
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.margins(x=0.15)
+    axes.margins(x=0.25)
+    axes.grid(axis="y", visible=False)
     axes.set_xlabel(label)
     axes.set_ylabel("Effects")
-    axes.set_title(label, fontsize="medium")
-    axes.legend(fontsize="x-small")
+    legend(axes)
     return axes
 
 
@@ -53,7 +65,7 @@ def _panel(name: str, label: str, digits: int = 4) -> Panel:
 
 PANELS: tuple[Callable[[xr.Dataset, Axes], Axes], ...] = (
     draw,
-    _panel("evaluation_cost", "Time of a right-hand side, over quasi-static, constant stress", 2),
+    _panel("evaluation_cost", "Time of a right-hand side, relative", 2),
     _panel("static_stress_drop", r"Static stress drop, $\sigma_*$"),
     _panel("max_log10_slip_rate", r"Fastest slip, $\log_{10}(V/V_*)$"),
 )

@@ -4,16 +4,28 @@ as in Fig. 11.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots import Panel
-from rsfstudy.plots._phase_plane import LN10, constant_state_line, coupling, label_axes, steady_line
+from rsfstudy.plots._axes import place
+from rsfstudy.plots._phase_plane import (
+    LN10,
+    constant_state_line,
+    coupling,
+    label_axes,
+    mark_reversed,
+    scene_of,
+    steady_line,
+)
+from rsfstudy.plots._style import legend, look, marker
 from rsfstudy.vocabulary import quantity
 
+#: Numbers on lines are wider than high.
+_SHAPE = (1.0, 2.0)
 #: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
 #: steady state.
 _STATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
@@ -32,60 +44,109 @@ def _phase_plane(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
         axes.plot(
             cell["log10_slip_rate"],
             cell["frictional_stress"],
-            color=f"C{number}",
-            linewidth=1.2,
+            color=look(number)["color"],
+            linestyle="-",
+            linewidth=1.2 + 0.8 * (number == 0),
             label=label,
         )
-    reach, height = np.array(axes.get_xlim(), dtype=float), axes.get_ylim()
-    rates = np.linspace(reach[0], reach[1], 200)
-    drawn: set[tuple[str, float]] = set()
-    top = height[0] + 0.96 * (height[1] - height[0])
-    for number, (cell, _label) in enumerate(cells):
+    _lines_of_state(axes, [cell for cell, _label in cells])
+    mark_reversed(axes)
+    label_axes(axes)
+    axes.set_title(_title(dataset, law))
+    legend(axes)
+    return axes
+
+
+def _lines_of_state(axes: Axes, cells: Sequence[xr.Dataset]) -> None:
+    """Steady state and constant states, for each coupling of stress and slip that there is; numbers
+    stand where nothing else is.
+    """
+    reach, height = axes.get_xlim(), axes.get_ylim()
+    axes.set(xlim=reach, ylim=height)
+    rates = np.linspace(*reach, 400)
+    drawn: set[tuple[str | float, ...]] = set()
+    taken = [_on(axes, cell["log10_slip_rate"], cell["frictional_stress"]) for cell in cells]
+    for number, cell in enumerate(cells):
         if coupling(cell) in drawn:
             continue
+        colour, first = look(number)["color"], not drawn
         drawn.add(coupling(cell))
-        axes.plot(rates, steady_line(cell, rates), "--", color=f"C{number}", linewidth=0.8)
+        steady = steady_line(cell, rates)
+        text = "steady state" if first else None
+        axes.plot(rates, steady, "--", color=colour, linewidth=0.8, label=text)
+        taken.append(_on(axes, rates, steady))
         for state in _STATES:
-            theta = -state * LN10 * float(cell["a"]) * float(cell["b_over_a"])
+            theta = -state * LN10 * scene_of(cell).b
             line = constant_state_line(cell, theta, rates)
-            axes.plot(rates, line, ":", color=f"C{number}", linewidth=0.6)
-            inside = np.flatnonzero((line > height[0]) & (line < top))
-            if inside.size and number == 0:  # the lines of the others meet these at the edges
-                at = inside[-1]
-                axes.text(
-                    rates[at],
-                    line[at],
-                    f"{theta + 0.0:.2g}",
-                    fontsize="xx-small",
-                    color=f"C{number}",
-                    ha="right",
-                )
-    axes.plot([], [], "--", color="0.4", linewidth=0.8, label="steady state")
-    axes.plot([], [], ":", color="0.4", linewidth=0.8, label=r"constant state, $\Theta$")
-    axes.set_xlim(*reach)
-    axes.set_ylim(*height)
-    label_axes(axes)
-    axes.set_title(_title(dataset, law), fontsize="medium")
-    axes.legend(fontsize="x-small")
-    return axes
+            text = r"constant state, with its $\Theta$" if first and state == _STATES[0] else None
+            axes.plot(rates, line, ":", color=colour, linewidth=0.7, label=text)
+            taken.append(
+                _numbered(axes, _on(axes, rates, line), (f"${theta + 0.0:.2g}$", colour), taken)
+            )
+
+
+def _on(axes: Axes, x: xr.DataArray | np.ndarray, y: xr.DataArray | np.ndarray) -> np.ndarray:
+    """Places on the axes, as fractions of their sides."""
+    sides = np.array([axes.get_xlim(), axes.get_ylim()])
+    points = np.column_stack([np.asarray(x), np.asarray(y)])
+    return np.asarray((points - sides[:, 0]) / (sides[:, 1] - sides[:, 0]))
+
+
+def _numbered(
+    axes: Axes, line: np.ndarray, what: tuple[str, str], taken: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Write a number in a colour on what is seen of a line, far from all else; where that is."""
+    seen = line[((line > 0.06) & (line < 0.94)).all(axis=1)][::8]
+    others = np.concatenate([points[np.isfinite(points).all(axis=1)] for points in taken])
+    if not len(seen):
+        return seen
+    apart = np.hypot(*((seen[:, None, :] - others[None, :, :]) * _SHAPE).T).min(axis=0)
+    place = seen[int(apart.argmax())]
+    white = {"facecolor": "white", "edgecolor": "none", "pad": 0.4}
+    axes.text(
+        place[0],
+        place[1],
+        what[0],
+        color=what[1],
+        fontsize=6,
+        ha="center",
+        va="center",
+        bbox=white,
+        zorder=1.5,  # below the orbits
+        transform=axes.transAxes,
+    )
+    return np.asarray(place + np.outer(np.linspace(-0.07, 0.07, 5), (1.0, 0.0)))
 
 
 def _stress_slip(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
     """Two cycles, one after the other, against slip."""
     for number, (cell, label) in enumerate(_cells(dataset, law)):
-        slip, stress = cell["slip"].values, cell["frictional_stress"].values
+        slip, stress, first = cell["slip"].values, cell["frictional_stress"].values, number == 0
         both = np.concatenate([slip, slip + slip[-1] - slip[0]])
-        axes.plot(both, np.tile(stress, 2), color=f"C{number}", linewidth=1.2, label=label)
-        axes.plot(slip, cell["shear_stress"], "--", color=f"C{number}", linewidth=0.7)
+        colour = look(number)["color"]
+        axes.plot(both, np.tile(stress, 2), "-", color=colour, linewidth=1.2, label=label)
         fastest = int(cell["log10_slip_rate"].values.argmax())
-        axes.plot(slip[fastest], stress[fastest], "o", color=f"C{number}", markersize=4)
-    axes.plot([], [], "o", color="0.4", markersize=4, label="fastest slip")
-    axes.plot([], [], "--", color="0.4", linewidth=0.7, label="spring")
-    axes.set_xlabel(quantity("slip").symbol)
+        axes.plot(
+            slip,
+            cell["shear_stress"],
+            "--",
+            color=colour,
+            linewidth=0.7,
+            label="spring" if first else None,
+        )
+        axes.plot(
+            slip[fastest],
+            stress[fastest],
+            marker(number),
+            color=colour,
+            markersize=4,
+            label="fastest slip" if first else None,
+        )
+    mark_reversed(axes)
+    axes.set_xlabel(f"Slip, {quantity('slip').symbol}")
     axes.set_ylabel(f"Frictional stress, {quantity('frictional_stress').symbol}")
-    axes.set_title(_title(dataset, law), fontsize="medium")
-    axes.legend(fontsize="x-small")
-    axes.grid(alpha=0.3)
+    axes.set_title(_title(dataset, law))
+    legend(axes)
     return axes
 
 
@@ -96,12 +157,10 @@ def _of_law(function: Callable[[xr.Dataset, Axes, int], Axes], law: int) -> Pane
     return panel
 
 
-PANELS = (
-    draw,
-    _of_law(_phase_plane, -1),
-    _of_law(_stress_slip, 0),
-    _of_law(_stress_slip, -1),
-)
+def panels(dataset: xr.Dataset) -> Sequence[Panel]:
+    """Stress against slip rate for each law, and then against slip."""
+    laws = range(dataset.sizes.get("law", 1))
+    return [_of_law(kind, law) for kind in (_phase_plane, _stress_slip) for law in laws]
 
 
 def _title(dataset: xr.Dataset, law: int) -> str:
@@ -130,7 +189,5 @@ def _counts(cell: xr.Dataset, dimension: str) -> bool:
 
 
 def _place(cell: xr.Dataset, dimension: str) -> str:
-    value = cell[dimension].item()
-    if dimension == "normal_stress":
-        return f"{value} normal stress"
-    return value if isinstance(value, str) else f"{quantity(dimension).symbol} = {value:g}"
+    text = place(cell, dimension)
+    return f"{text} normal stress" if dimension == "normal_stress" else text

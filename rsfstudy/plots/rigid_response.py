@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots import Panel
+from rsfstudy.plots._style import legend, look
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -32,17 +33,16 @@ def _panel(dataset: xr.Dataset, axes: Axes, law: int, stress: int) -> Axes:
             cell["slip"],
             left.sel(load_velocity_ratio=rate),
             "-" if rate > 1.0 else "--",
-            color=f"C{round(abs(decades)) - 1}",
+            color=look(round(abs(decades)) - 1)["color"],
             linewidth=1.0,
             label=f"$10^{{{round(decades)}}}$",
         )
-    axes.axhline(0.0, color="0.7", linewidth=0.8)
-    axes.set_xlabel(quantity("slip").symbol)
-    axes.set_ylabel(r"$(\tau - \tau_{ss})/(a\,\sigma_*)$")
+    axes.axhline(0.0, color="0.7", linewidth=0.8, linestyle="-")
+    axes.set_xlabel(f"Slip, {quantity('slip').symbol}")
+    axes.set_ylabel(r"Stress left, $(\tau - \tau_{ss})/(a\,\sigma_*)$")
     names = cell["law"].item(), cell["normal_stress"].item()
-    axes.set_title("{} law, {} normal stress".format(*names), fontsize="medium")
-    axes.legend(title=quantity("load_velocity_ratio").symbol, fontsize="x-small", ncols=2)
-    axes.grid(alpha=0.3)
+    axes.set_title(f"{str(names[0]).capitalize()} law, {names[1]} normal stress")
+    legend(axes, 4, f"Slip rate after the step, {quantity('slip_rate_after_step').symbol}")
     return axes
 
 

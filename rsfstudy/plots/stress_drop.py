@@ -4,18 +4,23 @@ lines.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.plots._text import with_error
+from rsfstudy.plots._style import legend, look, marker
+from rsfstudy.plots._text import pretty, stiffness, with_error
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
 DIMENSIONS = ("law", "case", "stiffness_ratio", "load_velocity_ratio")
 
 _DROPS = {"static": "full", "dynamic": "none"}
-_MARKERS = {"static": "o", "dynamic": "s"}
+#: Where a line misses by more than this part of what it spans, no line fits.
+_CURVED = 0.05
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
@@ -26,28 +31,49 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
 def _drops(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
     x = dataset["log_load_velocity_ratio"]
     stiffest = float(dataset["stiffness_ratio"].max())
-    name = str(dataset["law"].values[law])
     for number, case in enumerate(dataset["case"].values):
         row = dataset.isel(law=law).sel(case=case, stiffness_ratio=stiffest)
         for drop, fill in _DROPS.items():
-            values = row[f"{drop}_stress_drop"]
-            text = f"{case}, {drop}"
-            if f"{drop}_slope" in row:
-                slope, error = float(row[f"{drop}_slope"]), float(row[f"{drop}_slope_stderr"])
-                text += f": {with_error(slope, error)}"
+            values, colour = row[f"{drop}_stress_drop"], look(number)["color"]
+            slope, text = _slope(row, drop)
+            if np.isfinite(slope):
                 centre = float(x.where(values.notnull()).mean())
                 line = (float(values.mean()) + slope * (x - centre)).where(values.notnull())
-                axes.plot(x, line, color=f"C{number}", linewidth=0.8)
-            points = axes.plot(x, values, _MARKERS[drop], label=text)[0]
-            points.set(color=f"C{number}", fillstyle=fill, markersize=5)
-    axes.set_xlabel(quantity("log_load_velocity_ratio").symbol)
+                axes.plot(x, line, "-" if drop == "static" else "--", color=colour, linewidth=0.8)
+            axes.plot(
+                x,
+                values,
+                marker(number),
+                color=colour,
+                fillstyle=fill,
+                markersize=4.5,
+                label=f"{pretty(case)}, {drop}{text}",
+            )
+    axes.set_xlabel(f"Load point velocity, {quantity('log_load_velocity_ratio').symbol}")
     axes.set_ylabel(r"Stress drop, $\Delta\tau/\sigma_*$")
-    title = rf"{name.capitalize()} law, $k = {stiffest:g}\,k_{{cr}}$; slopes"
-    axes.set_title(title, fontsize="medium")
+    name = str(dataset["law"].values[law]).capitalize()
+    axes.set_title(f"{name} law, {stiffness(stiffest)}; slopes")
     axes.set_ylim(bottom=0.0)
-    axes.legend(fontsize="x-small")
-    axes.grid(alpha=0.3)
+    legend(axes, 1)
     return axes
+
+
+def _slope(row: xr.Dataset, drop: str) -> tuple[float, str]:
+    """The slope of a drop, if a line fits it, and what to say of it."""
+    name = f"{drop}_slope"
+    if name not in row or not np.isfinite(row[name]):
+        return np.nan, ""
+    if not bool(_is_straight(row, drop)):
+        return np.nan, ": no line fits"
+    slope = float(row[name])
+    return slope, f": {with_error(slope, float(row[f'{name}_stderr']))}"
+
+
+def _is_straight(dataset: xr.Dataset, drop: str) -> xr.DataArray:
+    """Whether a line in ln V_0 fits a stress drop."""
+    values = dataset[f"{drop}_stress_drop"]
+    span = values.max("load_velocity_ratio") - values.min("load_velocity_ratio")
+    return dataset[f"{drop}_slope_misfit"] <= _CURVED * span
 
 
 def draw_slowness(dataset: xr.Dataset, axes: Axes) -> Axes:
@@ -56,37 +82,43 @@ def draw_slowness(dataset: xr.Dataset, axes: Axes) -> Axes:
 
 
 def draw_scaled(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """Slopes of the static drop over (a-b) sigma_*, against stiffness: f(k)."""
+    """Slopes of the static drop over (a-b) sigma_*, against stiffness: f(k), where a line fits."""
     if "static_slope_scaled" in dataset:
-        for law, style in zip(dataset["law"].values, ("-", "--"), strict=False):
-            for number, case in enumerate(dataset["case"].values):
-                row = dataset["static_slope_scaled"].sel(law=law, case=case)
-                label = f"{law} law, {case}"
-                axes.plot(row["stiffness_ratio"], row, f"o{style}", color=f"C{number}", label=label)
-    axes.set_xlabel(quantity("stiffness_ratio").symbol)
+        slopes = dataset["static_slope_scaled"].where(_is_straight(dataset, "static"))
+        for row, style in _curves(slopes):
+            axes.plot(row["stiffness_ratio"], row, **style)
+    axes.set_xlabel(f"Stiffness, {quantity('stiffness_ratio').symbol}")
     axes.set_ylabel(r"Slope of static drop over $(a-b)\,\sigma_*$")
-    axes.set_title("Dependence of the slopes on stiffness, $f(k)$", fontsize="medium")
-    axes.legend(fontsize="x-small", handlelength=4.0)
-    axes.grid(alpha=0.3)
+    axes.set_title("Slopes of lines that fit, $f(k)$")
+    legend(axes)
     return axes
 
 
 def draw_drift(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Local slopes between neighbouring points: where a law in ln V_0 holds, they are level."""
     x = dataset["log_load_velocity_ratio"].values
-    for law, style in zip(dataset["law"].values, ("-", "--"), strict=False):
-        for number, case in enumerate(dataset["case"].values):
-            row = dataset["static_stress_drop"].sel(law=law, case=case).isel(stiffness_ratio=-1)
-            slopes = np.diff(row.values) / np.diff(x)
-            middle = 0.5 * (x[1:] + x[:-1])
-            axes.plot(middle, slopes, style, color=f"C{number}", label=f"{law} law, {case}")
-    axes.set_ylim(-0.14, 0.0)
-    axes.set_xlabel(quantity("log_load_velocity_ratio").symbol)
+    middle = 0.5 * (x[1:] + x[:-1])
+    for row, style in _curves(dataset["static_stress_drop"].isel(stiffness_ratio=-1)):
+        axes.plot(middle, np.diff(row.values) / np.diff(x), **style)
+    axes.set_xlabel(f"Load point velocity, {quantity('log_load_velocity_ratio').symbol}")
     axes.set_ylabel(r"Local slope of static drop, $\sigma_*$")
-    axes.set_title("Local slopes: level where the law holds", fontsize="medium")
-    axes.legend(fontsize="x-small")
-    axes.grid(alpha=0.3)
+    axes.set_title("Local slopes: level where the law holds")
+    legend(axes)
     return axes
+
+
+def _curves(values: xr.DataArray) -> Iterator[tuple[xr.DataArray, dict[str, Any]]]:
+    """What there is of each law and case, and how it is drawn."""
+    for law, line, fill in zip(values["law"].values, ("-", "--"), ("full", "none"), strict=False):
+        for number, case in enumerate(values["case"].values):
+            style = {
+                "color": look(number)["color"],
+                "linestyle": line,
+                "marker": marker(number),
+                "fillstyle": fill,
+                "label": f"{law} law, {pretty(case)}",
+            }
+            yield values.sel(law=law, case=case), style
 
 
 PANELS = (draw, draw_slowness, draw_scaled, draw_drift)

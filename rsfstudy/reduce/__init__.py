@@ -15,7 +15,8 @@ from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_fa
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.covered import Covered
-from rsfstudy.reduce.fits import LinearFit, ProportionalFit
+from rsfstudy.reduce.edges import CyclingEdge
+from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.paths import Parting
 from rsfstudy.reduce.work import Cheapest
 from rsfstudy.status import Status
@@ -25,6 +26,8 @@ __all__ = [
     "Boundary",
     "Cheapest",
     "Covered",
+    "CyclingEdge",
+    "DecadeFit",
     "Difference",
     "Inverse",
     "LinearFit",

@@ -62,8 +62,10 @@ class _Fit(Reduction):
         of = support[self.of]
         # sums over arrays with another memory layout differ in the last bit
         of = of.copy(data=np.ascontiguousarray(of.values))
+        x = self.abscissa(support[self.on].astype(float))
+        of = of.where(x.notnull())
         used = of.notnull()
-        x = self.centred(support[self.on].astype(float).where(used), dimension)
+        x = self.centred(x.where(used), dimension)
         y = self.centred(self.offset(of), dimension)
         count = used.sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
@@ -95,6 +97,10 @@ class _Fit(Reduction):
     def offset(self, values: xr.DataArray) -> xr.DataArray:
         """Values less what the law holds fixed."""
         return values
+
+    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
+        """What the law is linear in."""
+        return on
 
 
 @dataclass(frozen=True)
@@ -133,3 +139,21 @@ class LinearFit(_Fit):
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Less their mean, which takes care of the constant."""
         return values - values.mean(dimension)
+
+
+@dataclass(frozen=True)
+class DecadeFit(LinearFit):
+    """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
+    `on` is 0 or less are left out.
+    """
+
+    kind: ClassVar[str] = "decade_fit"
+
+    def law(self) -> str:
+        """The law in words."""
+        return f"{self.of} = constant + {self.name} * log10({self.on})"
+
+    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
+        """The decimal logarithm."""
+        logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
+        return logarithms

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 import types
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Iterable, Mapping
+from functools import cache, reduce
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.slider import forms, friction
+from rsfstudy.slider import forms, friction, saturated, states
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.slots import FIRST_OWN
-from rsfstudy.slider.states import only
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
@@ -40,7 +39,10 @@ def numbers_of_friction(scene: Scene) -> Numbers:
 
 
 def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate: float) -> Numbers:
-    common = scene.a, scene.b, scene.mu_star, stiffness, load_velocity, log_load_rate
+    law = scene.parts.law
+    of_friction, of_load = (scene.a, scene.b, scene.mu_star), (load_velocity, log_load_rate)
+    of_law = law.stress_dependence, scene.a * law.size_over_a
+    common = *of_friction, stiffness, *of_load, *of_law
     own = (value for part in _with_numbers(scene) for value in part.numbers(scene))
     return (*common, *own)
 
@@ -49,59 +51,52 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> Functions:
     """The functions of a scene by their names in `slots`, with other dynamics than its own where
     some are given.
     """
-    law, stress, own = _with_numbers(scene)
+    law, stress, fluid, own = _with_numbers(scene)
     acting = own if dynamics is None else dynamics
     begin, starts = FIRST_OWN, []
-    for part in (law, stress, own):
+    for part in (law, stress, fluid, own):
         starts.append(begin)
         begin += len(part.numbers(scene))
     return _assembled(
-        (law.states, tuple(getattr(law, name) for name in _OF_LAW), law.state_effect, starts[0]),
+        (
+            law.states,
+            tuple(getattr(law, name) for name in _OF_LAW),
+            law.state_effect,
+            friction.stress_dependence if law.stress_dependence else None,
+            law.regularised,
+            starts[0],
+        ),
         (stress.normal_stress, stress.state_effect, starts[1]),
-        (*(getattr(acting, name) for name in _OF_DYNAMICS), starts[2]),
+        (len(fluid.unknowns), *(getattr(fluid, name) for name in _OF_FLUID), starts[2]),
+        (*(getattr(acting, name) for name in _OF_DYNAMICS), starts[3]),
     )
 
 
 _OF_LAW = ("evolution", "evolutions", "resting")
+_OF_FLUID = ("seepage", "seeped")
 _OF_DYNAMICS = ("balance", "growth", "rupture_rate", "rupture_point")
 
 
-def _with_numbers(scene: Scene) -> tuple[Any, Any, Any]:
-    return scene.parts.law, scene.parts.normal_stress, scene.parts.dynamics
+def _with_numbers(scene: Scene) -> tuple[Any, Any, Any, Any]:
+    parts = scene.parts
+    return parts.law, parts.normal_stress, parts.fluid, parts.dynamics
 
 
 @cache
 def _assembled(
-    law: tuple[Any, ...], stress: tuple[Any, ...], dynamics: tuple[Any, ...]
+    law: tuple[Any, ...], stress: tuple[Any, ...], fluid: tuple[Any, ...], dynamics: tuple[Any, ...]
 ) -> Functions:
     """The functions of a combination of parts; the same ones whenever it is asked for."""
-    states, of_law, law_effect, law_own = law
-    normal_stress, stress_effect, stress_own = stress
-    filled: dict[str, Any] = {"STATES": states, "BEYOND": 1 + states}
-    for name, function in zip(_OF_LAW, of_law, strict=True):
-        if function is not None:
-            filled[name] = of_part(function, law_own)
-    for name, usual in (("evolutions", "evolutions_of_one"), ("resting", "resting_of_one")):
-        filled.setdefault(name, bound(getattr(forms, usual), **filled))
-    if normal_stress is not None:
-        filled["normal_stress"] = of_part(normal_stress, stress_own)
-    effects = [
-        of_part(effect, own)
-        for effect, own in ((stress_effect, stress_own), (law_effect, law_own))
-        if effect is not None
-    ]
-    filled |= dict(zip(("state_effect", "other_state_effect"), effects, strict=False))
-    if len(effects) > 1:
-        filled["state_effect"] = bound(friction.both_state_effects, **filled)
-    coupled = "coupled" if normal_stress is not None else "plain"
-    form = f"{coupled}_with_state_effect" if effects else coupled
-    filled["strength"] = bound(getattr(friction, form), **filled)
-    if normal_stress is None:
-        filled["normal_stress"] = forms.unchanged_normal_stress
-    alone = states == 1 and of_law[0] is not None
-    if alone:
-        filled["total"] = only
-    filled["evolving"] = bound(forms.evolving_alone if alone else forms.evolving, **filled)
+    count, of_law, law_effect, dependence, reverses, law_own = law
+    effects = [(stress[1], stress[2]), (law_effect, law_own), (dependence, law_own)]
+    filled = _of_law(count, of_law, law_own) | _of_stress(stress[0], stress[2], effects)
+    if reverses:
+        filled["strength"] = bound(friction.reversible, one_way=filled["strength"])
+    if fluid[0]:
+        filled |= _of_fluid(filled, count, *fluid)
+    filled["states_at"] = bound(states.states_at, **filled)
+    filled["pace"] = forms.pace
+    filled["reading_growth"] = bound(forms.reading_growth, **filled)
     filled["point_at"] = bound(forms.point_at, **filled)
     *supplied, own = dynamics
     for name, function in zip(_OF_DYNAMICS, supplied, strict=True):
@@ -109,7 +104,76 @@ def _assembled(
             filled[name] = of_part(function, own, **filled)
     for name in ("rate", "rate_with_time", "point", "rigid_rate", "rigid_point"):
         filled[name] = bound(getattr(forms, name), **filled)
+    if reverses:
+        for name in ("rate", "rate_with_time"):
+            forward = {**filled, "rate": filled[name]}
+            filled[name] = bound(forms.rate_either_way, **forward)
     return types.MappingProxyType(filled)
+
+
+def _of_law(count: int, of_law: tuple[Any, ...], own: int) -> dict[str, Any]:
+    """How the states of a law evolve, and add up."""
+    filled: dict[str, Any] = {"STATES": count, "BEYOND": 1 + count}
+    for name, function in zip(_OF_LAW, of_law, strict=True):
+        if function is not None:
+            filled[name] = of_part(function, own)
+    for name, usual in (("evolutions", "evolutions_of_one"), ("resting", "resting_of_one")):
+        filled.setdefault(name, bound(getattr(forms, usual), **filled))
+    alone = count == 1 and of_law[0] is not None
+    filled["total"] = states.only if alone else states.total
+    filled["felt"] = states.felt_of_one if alone else states.felt
+    return filled
+
+
+def _of_stress(
+    normal_stress: Any, own: int, state_effects: Iterable[tuple[Any, int]]
+) -> dict[str, Any]:
+    """The friction relation, with the effects of stress on the state."""
+    filled: dict[str, Any] = {}
+    if normal_stress is not None:
+        filled["normal_stress"] = of_part(normal_stress, own)
+    effects = [of_part(effect, place) for effect, place in state_effects if effect is not None]
+    if effects:
+        filled["state_effect"] = reduce(_both, effects)
+    coupled = "coupled" if normal_stress is not None else "plain"
+    form = f"{coupled}_with_state_effect" if effects else coupled
+    filled["strength"] = bound(getattr(friction, form), **filled)
+    filled.setdefault("normal_stress", forms.unchanged_normal_stress)
+    filled["effective_stress"] = bound(forms.normal_stress_alone, **filled)
+    filled["effective_stress_change"] = bound(forms.normal_stress_change, **filled)
+    return filled
+
+
+def _both(effect: Function, other: Function) -> Function:
+    """Two effects of stress on the state as one."""
+    return bound(friction.both_state_effects, state_effect=effect, other_state_effect=other)
+
+
+def _of_fluid(
+    known: Mapping[str, Any], of_law: int, count: int, seepage: Any, seeped: Any, own: int
+) -> dict[str, Any]:
+    """What a fluid puts in the place of functions of law and stress, of which it makes use."""
+    filled = {
+        **known,
+        "STATES": of_law + count,
+        "BEYOND": 1 + of_law + count,
+        "OF_LAW": of_law,
+        "evolutions_of_law": known["evolutions"],
+        "resting_of_law": known["resting"],
+        "seepage": of_part(seepage, own),
+        "seeped": of_part(seeped, own),
+    }
+    if known["total"] is not states.only:
+        filled["total"] = bound(saturated.total, **filled)
+    filled["effective_stress"] = bound(saturated.less_pressure, **filled)
+    filled["effective_stress_change"] = bound(saturated.less_pressure_change, **filled)
+    effect = "_with_state_effect" if "state_effect" in known else ""
+    filled["strength"] = bound(getattr(saturated, f"strength{effect}"), **filled)
+    by_pressure = getattr(saturated, f"by_pressure{effect}")
+    filled["strength_of_pressure"] = bound(by_pressure, **filled)
+    for name in ("felt", "evolutions", "resting"):
+        filled[name] = bound(getattr(saturated, name), **filled)
+    return filled
 
 
 def bound(function: Function, **names: Any) -> Function:
@@ -123,12 +187,16 @@ def bound(function: Function, **names: Any) -> Function:
 
 
 def of_part(function: Function, own: int, **names: Any) -> Function:
-    """A function of a part whose numbers begin at `own`, with the other functions of its file."""
+    """A function of a part whose numbers begin at `own`, with the other plain functions of its
+    file.
+    """
     assert isinstance(function, types.FunctionType)
     names["OWN"] = own
     beside = {
         name: bound(value, **names)
         for name, value in function.__globals__.items()
-        if isinstance(value, types.FunctionType) and value.__module__ == function.__module__
+        if isinstance(value, types.FunctionType)
+        and value.__module__ == function.__module__
+        and value.__closure__ is None
     }
     return bound(function, **{**beside, **names})

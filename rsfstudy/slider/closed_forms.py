@@ -41,6 +41,28 @@ def critical_stiffness(
     return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
 
 
+def displacement_step(b_over_a: float, exponent: float, ratio: float) -> float:
+    """Critical displacement step of the family of laws, over D_c: ``a/(b-a) (-ln(1 - eps r))/(eps
+    r)``, r = k/k_cr; NaN where there is none.
+    """
+    product = exponent * ratio
+    if math.isnan(product) or product >= 1.0:
+        return math.nan
+    longer = -math.log1p(-product) / product if product else 1.0
+    return longer / (b_over_a - 1.0)
+
+
+def velocity_step(b_over_a: float, exponent: float) -> float:
+    """Critical V_0/V_* of the family of laws at critical stiffness; NaN where there is none.
+
+    With q = exp(-eps u) and y = V_0/V the motion follows a system of Lotka-Volterra equations,
+    which the line from V_* through its saddle (1 - eps, 0) does not leave.
+    """
+    if math.isnan(exponent) or exponent >= 1.0:
+        return math.nan
+    return 1.0 + 1.0 / ((1.0 - exponent) * (b_over_a - 1.0))
+
+
 FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_at_critical_stiffness": ClosedForm(
         "V_0/V_* = 1 + a/(b-a)",
@@ -59,6 +81,19 @@ FORMS: Mapping[str, ClosedForm] = {
         ("b_over_a",),
         lambda b_over_a: 1.0 / (b_over_a - 1.0),
         "Gu et al. (1984), slip law, constant normal stress, load point held",
+    ),
+    "displacement_step_of_the_family": ClosedForm(
+        "D_c a/(b-a) [-ln(1 - eps k/k_cr)]/(eps k/k_cr)",
+        ("b_over_a", "law_exponent", "stiffness_ratio"),
+        displacement_step,
+        "h(u*) = -k/k_cr, constant normal stress, load point held, infinite norm",
+    ),
+    "velocity_step_of_the_family": ClosedForm(
+        "V_0/V_* = 1 + a/[(1 - eps)(b-a)]",
+        ("b_over_a", "law_exponent"),
+        velocity_step,
+        "invariant line of the orbits at k = k_cr, constant normal stress, infinite norm; eps = 0 "
+        "is that of Gu et al. (1984)",
     ),
     "net_weakening": ClosedForm(
         "(a-b) sigma_*",

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.slider.assembly import functions, numbers_of_friction
+from rsfstudy.slider.assembly import functions
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.forms import Point
@@ -27,8 +27,15 @@ LONGEST_STEP = 1e9
 LONGEST_STRIDE, FEW = 3.0, 10.0
 
 
-def _any_step(_point: Point) -> float:
+def any_step(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
+    """Steps of a clock that is not slip."""
     return LONGEST_STEP
+
+
+def stride(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
+    """Longest step of a form whose clock is slip plus load point displacement."""
+    stationary = max(1.0, (log_load_rate - log_rate) / FEW)
+    return min(LONGEST_STRIDE * stationary * max(1.0, normal_stress), LONGEST_STEP)
 
 
 @dataclass(frozen=True)
@@ -50,8 +57,13 @@ class Equations:
     p : tuple of float
         The numbers of the scene.
     longest : callable
-        ``longest(point)``: longest step of the clock, beyond which an integrator's estimate of its
-        local error cannot be trusted.
+        ``longest(log_rate, normal_stress, log_load_rate)``: longest step of the clock, beyond which
+        an integrator's estimate of its local error cannot be trusted.
+    states : int
+        How many states the scene has.
+    balance : callable or None
+        ``balance(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress;
+        between ruptures only.
     """
 
     regime: str
@@ -60,7 +72,9 @@ class Equations:
     rate: Function
     point: Function
     p: Numbers
-    longest: Callable[[Point], float] = _any_step
+    longest: Callable[[float, float, float], float] = any_step
+    states: int = 1
+    balance: Function | None = None
 
     def rates(self, state: Numbers) -> Numbers:
         """Derivatives of the unknowns."""
@@ -88,77 +102,81 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 
 def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
-    forms, count = functions(scene, dynamics), scene.parts.law.states
-    unknowns: tuple[str, ...] = ("spring", *_states(0, count))
+    forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
+    unknowns: tuple[str, ...] = ("spring", *_states(scene))
     scales, rate = (scene.a,) * len(unknowns), forms["rate"]
     if clock:
         unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms["rate_with_time"]
-    return Equations(
-        dynamics.regime, unknowns, scales, rate, forms["point"], scene.numbers, stride(scene)
-    )
+    point, balance = forms["point"], forms["balance"]
+    p, count = scene.numbers, scene.states
+    return Equations(dynamics.regime, unknowns, scales, rate, point, p, stride, count, balance)
 
 
-def _states(first: int, count: int) -> list[str]:
-    """Names of states from one on."""
-    return ["psi"] if count == 1 > first else [f"psi_{i + 1}" for i in range(first, count)]
+def _states(scene: Scene) -> tuple[str, ...]:
+    """Names of the states."""
+    count = scene.parts.law.states
+    of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
+    return (*of_law, *(unknown.name for unknown in scene.parts.fluid.unknowns))
 
 
 def in_rupture(scene: Scene) -> Equations:
     """The full equations of a scene with mass, in inertial time T/(2 pi): f, ln(V/V_*) and g, and
     the states but the first.
     """
-    forms, a = functions(scene), scene.a
+    forms, a, others = scene.functions, scene.a, _states(scene)[1:]
     rate, point = forms["rupture_rate"], forms["rupture_point"]
-    others = _states(1, scene.parts.law.states)
     unknowns, scales = ("spring", "log_rate", "friction", *others), (a, 1.0, a, *[a] * len(others))
-    return Equations(IN_RUPTURE, unknowns, scales, rate, point, scene.numbers)
+    return Equations(IN_RUPTURE, unknowns, scales, rate, point, scene.numbers, states=scene.states)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:
     """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
-    forms, p = functions(scene), (*scene.numbers, log_rate)
-    unknowns = ("friction", *_states(1, scene.parts.law.states))
-    scales = (scene.a,) * len(unknowns)
-    return Equations(RIGID, unknowns, scales, forms["rigid_rate"], forms["rigid_point"], p)
+    forms, p, unknowns = (
+        scene.functions,
+        (*scene.numbers, log_rate),
+        ("friction", *_states(scene)[1:]),
+    )
+    scales, rate, point = (scene.a,) * len(unknowns), forms["rigid_rate"], forms["rigid_point"]
+    return Equations(RIGID, unknowns, scales, rate, point, p, states=scene.states)
 
 
-def stride(scene: Scene) -> Callable[[Point], float]:
-    """Longest step of a form whose clock is slip plus load point displacement."""
-    load = scene.log_load_rate
-
-    def longest(point: Point) -> float:
-        stationary = max(1.0, (load - point.log_rate) / FEW)
-        stretched = max(1.0, point.normal_stress)
-        return min(LONGEST_STRIDE * stationary * stretched, LONGEST_STEP)
-
-    return longest
-
-
-def relation_of(scene: Scene) -> Callable[[float], tuple[float, float, float, float]]:
-    """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift)."""
-    relation, p = functions(scene)["strength"], numbers_of_friction(scene)
+def relation_of(
+    scene: Scene, psis: Numbers = ()
+) -> Callable[[float], tuple[float, float, float, float]]:
+    """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
+    pore pressure of steady sliding, unless states are given.
+    """
+    relation, p = scene.functions["strength"], scene.numbers_of_friction
+    known = psis or (0.0,) * scene.states
 
     def at(friction: float) -> tuple[float, float, float, float]:
-        values: tuple[float, float, float, float] = relation(friction, p)
+        values: tuple[float, float, float, float] = relation(friction, known, p)
         return values
 
     return at
 
 
-def normal_stress_at(scene: Scene, friction: float) -> float:
-    """Normal stress over sigma_* under a deviation of frictional stress."""
-    return 1.0 + float(functions(scene)["normal_stress"](friction, numbers_of_friction(scene))[0])
+def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float:
+    """Effective normal stress over sigma_* under a deviation of frictional stress, at steady
+    sliding unless states are given.
+    """
+    at = psis or (0.0,) * scene.states
+    stress = scene.functions["effective_stress"](friction, at, scene.numbers_of_friction)
+    return 1.0 + float(stress[0])
 
 
 def log_rate_at(scene: Scene, spring: float, psi: float) -> float:
-    """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act."""
+    """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
+    there is no pore pressure.
+    """
     massless = scene.dynamics if scene.dynamics.rupture_rate is None else QuasiStatic()
-    return float(functions(scene, massless)["balance"](spring, (psi,), scene.numbers)[0])
+    psis = (psi, *(0.0,) * (scene.states - 1))
+    return float(functions(scene, massless)["balance"](spring, psis, scene.numbers)[0])
 
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolutions, p = functions(scene)["evolutions"], numbers_of_friction(scene)
+    evolutions, p = scene.functions["evolutions"], scene.numbers_of_friction
 
     def at(log_rate: float, state: float) -> float:
         return float(evolutions(log_rate, (state,), 0.0, 1.0, p)[0])
@@ -168,7 +186,7 @@ def evolution_of(scene: Scene) -> Callable[[float, float], float]:
 
 def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
-    evolutions, p = functions(scene)["evolutions"], numbers_of_friction(scene)
+    evolutions, p = scene.functions["evolutions"], scene.numbers_of_friction
 
     def at(log_rate: float, psis: Numbers, shift: float) -> Numbers:
         changes: Numbers = evolutions(log_rate, psis, shift, 1.0, p)
@@ -179,5 +197,5 @@ def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
 
 def resting_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
-    psis: Numbers = functions(scene)["resting"](log_rate, shift, numbers_of_friction(scene))
+    psis: Numbers = scene.functions["resting"](log_rate, shift, scene.numbers_of_friction)
     return psis

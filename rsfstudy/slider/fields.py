@@ -9,39 +9,9 @@ from typing import Any, NamedTuple, get_type_hints
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider import dynamics, laws, loading, normal_stress, own
-from rsfstudy.slider.parts import Part, checked, is_flag, names_of, number, quantities_of
-
-_POSITIVE = "must be greater than 0"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Slider(Part):
-    """The numbers that every slider has."""
-
-    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=_POSITIVE)
-    mu_star: float = number(
-        0.76,
-        r"$\mu_*$",
-        "1",
-        "steady-state friction coefficient at the reference rate",
-        rule=_POSITIVE,
-    )
-    stiffness_ratio: float | None = number(
-        None, r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star", rule=_POSITIVE
-    )
-    stiffness: float | None = number(
-        None, r"$k D_c/\sigma_*$", "1", "stiffness", rule=_POSITIVE, scale="sigma_*/D_c"
-    )
-    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=_POSITIVE)
-    reference_rate: float = number(
-        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=_POSITIVE
-    )
-    instability_norm: float = number(
-        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
-    )
-
-    name = "slider"
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
+from rsfstudy.slider.numbers import SPRING, Slider
+from rsfstudy.slider.parts import Part, checked, is_flag, names_of, quantities_of
 
 
 @dataclass(frozen=True)
@@ -83,7 +53,7 @@ class Slot:
 
 
 SLOTS: tuple[Slot, ...] = (
-    Slot("law", laws.Law, laws.PARTS, "slip", "state evolution law"),
+    Slot("law", laws.LawOfStates, laws.PARTS, "slip", "state evolution law"),
     Slot(
         "normal_stress",
         normal_stress.NormalStress,
@@ -91,6 +61,7 @@ SLOTS: tuple[Slot, ...] = (
         "variable",
         "normal stress condition",
     ),
+    Slot("fluid", fluid.Fluid, fluid.PARTS, "drained", "fluid in the pores of the fault"),
     Slot(
         "dynamics",
         dynamics.Dynamics,
@@ -119,12 +90,10 @@ FIELDS: tuple[str, ...] = tuple(
 SLOT_FIELDS: frozenset[str] = frozenset(slot.name for slot in NAMED)
 #: What names a part of the user's own in each slot.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
+#: Those that call for a part by their values.
+CALLERS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.callers)
 #: Those that decide neither what fills a slot nor which of two fields sets the spring.
-PLAIN_FIELDS: frozenset[str] = frozenset(FIELDS) - {
-    *SLOT_FIELDS,
-    *(name for slot in SLOTS for name in slot.callers),
-    *("stiffness_ratio", "stiffness"),
-}
+PLAIN_FIELDS: frozenset[str] = frozenset(FIELDS) - {*SLOT_FIELDS, *CALLERS, *SPRING}
 #: What they mean.
 QUANTITIES: tuple[Quantity, ...] = (
     *(Quantity(slot.name, "", "", slot.long_name) for slot in NAMED),
@@ -138,7 +107,7 @@ def _kind(name: str) -> Any:
     kind = get_type_hints(part)[name]
     chosen = (
         part is Slider
-        or part.called_by
+        or name == part.called_by
         or all(
             name in names_of(choice)
             for slot in SLOTS
@@ -268,23 +237,29 @@ def without_meaning(values: Mapping[str, Any], parts: Iterable[type[Part]] = ())
         Parts of the user's own that may be among those.
     """
     try:
-        return _without_meaning(tuple(map(values.get, _SLOT_ORDER)), tuple(parts))
-    except TypeError:  # what is no name, and cannot be looked up as one
+        calling = tuple(name for name in CALLERS if values.get(name))
+        return _without_meaning(
+            tuple(values.get(slot.name) for slot in SLOTS), calling, tuple(parts)
+        )
+    except (TypeError, ValueError):  # what is no name or number, and cannot be looked up as one
         return frozenset()
 
 
-_SLOT_ORDER = tuple(slot.name for slot in SLOTS)
-
-
 @cache
-def _without_meaning(named: tuple[Any, ...], parts: tuple[type[Part], ...]) -> frozenset[str]:
+def _without_meaning(
+    named: tuple[Any, ...], calling: tuple[str, ...], parts: tuple[type[Part], ...]
+) -> frozenset[str]:
     names: set[str] = set()
     for slot, name in zip(SLOTS, named, strict=True):
-        by_name = slot.choices.get(name) or slot.own.get(name)
-        part = name if isinstance(name, type) else by_name
+        part = name if isinstance(name, type) else slot.choices.get(name) or slot.own.get(name)
+        meant, every = (FIELDS if part is None else names_of(part)), part is not None
+        if name is None and slot.callers:
+            called = [slot.callers[caller] for caller in calling if caller in slot.callers]
+            # of two that are called for, one is refused
+            meant = (*names_of([*called, slot.choices[slot.default]][0]), *slot.callers)
+            every = True
         others = [other for other in parts if _CHECKED[other] is slot]
-        others += slot.choices.values() if part is not None else []
-        meant = FIELDS if part is None else names_of(part)
+        others += slot.choices.values() if every else []
         names |= {name for other in others for name in names_of(other)} - set(meant)
     return frozenset(names)
 

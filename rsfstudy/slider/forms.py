@@ -4,12 +4,12 @@ Between ruptures spring stress f and the state Psi (or the states of a law that 
 that changes, against slip plus load point displacement, ds = (V + V_0) dt, in which every rate is
 of order one from arrest to rupture:
 
-    df/ds = -K tanh[(x - x_0)/2],   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
+    df/ds = K (V_0 - V)/(V + V_0),   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
 
 with x = ln(V/V_*) and x_0 = ln(V_0/V_*). How x follows from f and Psi is for the dynamics to say.
 
 They are functions of floats in which `assembly` fills in the parts of a scene, and the number of
-states of its law.
+its states.
 """
 
 from __future__ import annotations
@@ -19,15 +19,18 @@ from typing import NamedTuple
 
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.slots import (
-    LARGEST_EXPONENT,
     LOAD_VELOCITY,
     LOG_LOAD_RATE,
     MU_STAR,
     STIFFNESS,
+    A,
     B,
     balance,
+    effective_stress,
+    effective_stress_change,
     evolution,
     evolutions,
+    felt,
     growth,
     normal_stress,
     resting,
@@ -42,7 +45,7 @@ SLOWEST = -290.0 * math.log(10.0)
 #: less than exp(-100) of itself over all the slip there is.
 STATIONARY = 100.0
 
-#: How many states the law has, and where unknowns begin that are none.
+#: How many states there are, and where unknowns begin that are none.
 STATES, BEYOND = 1, 2
 
 
@@ -58,9 +61,9 @@ class Point(NamedTuple):
     spring, friction : float
         Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
     psis : tuple of float
-        States freed of stress.
+        States freed of stress, and those of a fluid.
     psi : float
-        Their sum.
+        The sum of those of the law.
     state : float
         State variable Theta (the sum, where a law has several).
     imbalance : float
@@ -70,7 +73,10 @@ class Point(NamedTuple):
     coefficient : float
         Friction coefficient.
     normal_stress : float
-        Normal stress over sigma_*.
+        Effective normal stress over sigma_*.
+    reading_growth : float
+        Derivative of the friction coefficient that is read, that of spring stress over effective
+        normal stress, with respect to the clock of the equations.
     """
 
     log_rate: float
@@ -84,11 +90,39 @@ class Point(NamedTuple):
     unrest: float
     coefficient: float
     normal_stress: float
+    reading_growth: float
 
 
 def unchanged_normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """Constant normal stress."""
     return 0.0, 0.0
+
+
+def normal_stress_alone(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    """Effective normal stress where no pore pressure changes it."""
+    return normal_stress(friction, p)
+
+
+def normal_stress_change(
+    friction: float, friction_change: float, changes: Numbers, p: Numbers
+) -> float:
+    """Its change where frictional stress and the states change so."""
+    return normal_stress(friction, p)[1] * friction_change
+
+
+def reading_growth(
+    spring: float,
+    spring_change: float,
+    friction: float,
+    friction_change: float,
+    psis: Numbers,
+    changes: Numbers,
+    p: Numbers,
+) -> float:
+    """Change of the friction coefficient that is read, ``(mu_* + f)/s``."""
+    ratio = 1.0 + effective_stress(friction, psis, p)[0]
+    ratio_change = effective_stress_change(friction, friction_change, changes, p)
+    return (spring_change - (p[MU_STAR] + spring) / ratio * ratio_change) / ratio
 
 
 def evolutions_of_one(
@@ -103,46 +137,53 @@ def resting_of_one(log_rate: float, shift: float, p: Numbers) -> Numbers:
     return (shift - p[B] * log_rate,)
 
 
-def combined_rate(log_rate: float, load_velocity: float) -> float:
-    """Rate (V + V_0)/V_* of slip and load point displacement together."""
-    return math.exp(max(min(log_rate, LARGEST_EXPONENT), SLOWEST)) + load_velocity
+def pace(log_rate: float, p: Numbers) -> tuple[float, float, float]:
+    """ln(V/V_*), V_0/V, and the share V/(V + V_0) that slip has in slip and load point displacement
+    together.
 
-
-def evolving(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
-    """Evolution of the states per unit of slip and load point displacement together:
-    ``V/(V + V_0) dTheta/d(delta)``.
-
-    Evolution per unit slip may grow like 1/V as slip slows down, so that the product has a limit,
-    that of stationary contact. There it is taken a little faster than slip goes, because its
-    factors would underflow and overflow.
+    Where slip is much slower than the load point, ln V is that of stationary contact: evolution per
+    unit slip may grow like 1/V there, so that its product with the share has a limit, whose factors
+    would underflow and overflow.
     """
-    load = p[LOG_LOAD_RATE]
-    x = max(log_rate, load - STATIONARY)
-    return evolutions(x, psis, shift, 1.0 / (1.0 + math.exp(load - x)), p)
+    x = max(log_rate, p[LOG_LOAD_RATE] - STATIONARY)
+    slower = math.exp(p[LOG_LOAD_RATE] - x)
+    return x, slower, 1.0 / (1.0 + slower)
 
 
-def evolving_alone(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
-    """The same, for a law of one state."""
-    load = p[LOG_LOAD_RATE]
-    x = max(log_rate, load - STATIONARY)
-    return (evolution(x, psis[0] - shift, p) / (1.0 + math.exp(load - x)),)
+def duration(x: float, slower: float, share: float, p: Numbers) -> float:
+    """Time over slip and load point displacement together, ``1/(V + V_0)``."""
+    if p[LOAD_VELOCITY] > 0.0:
+        return slower * share / p[LOAD_VELOCITY]
+    return math.exp(-max(x, SLOWEST))
 
 
 def rate(state: Numbers, p: Numbers) -> Numbers:
     """Derivatives of f and Psi between ruptures."""
     psis = state[1:BEYOND]
-    x, _friction, shift = balance(state[0], psis, p)
-    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
-    return (loading, *evolving(x, psis, shift, p))
+    log_rate, _friction, shift = balance(state[0], psis, p)
+    x, slower, share = pace(log_rate, p)
+    loading = p[STIFFNESS] * (slower - 1.0) * share
+    return (loading, *evolutions(x, psis, shift, share, p))
 
 
 def rate_with_time(state: Numbers, p: Numbers) -> Numbers:
     """The same, and time as a passenger."""
     psis = state[1:BEYOND]
-    x, _friction, shift = balance(state[0], psis, p)
-    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
-    lasts = 1.0 / combined_rate(x, p[LOAD_VELOCITY])
-    return (loading, *evolving(x, psis, shift, p), lasts)
+    log_rate, _friction, shift = balance(state[0], psis, p)
+    x, slower, share = pace(log_rate, p)
+    loading = p[STIFFNESS] * (slower - 1.0) * share
+    return (loading, *evolutions(x, psis, shift, share, p), duration(x, slower, share, p))
+
+
+def rate_either_way(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives between ruptures where slip may reverse: it then loads the spring, and the clock
+    is its magnitude plus load point displacement.
+    """
+    changes = rate(state, p)
+    if p[MU_STAR] + state[0] >= 0.0:
+        return changes
+    _x, _slower, share = pace(balance(state[0], state[1:BEYOND], p)[0], p)
+    return (changes[0] + 2.0 * p[STIFFNESS] * share, *changes[1:])
 
 
 def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
@@ -150,16 +191,25 @@ def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
     unknowns = state[:BEYOND]
     spring, psis = unknowns[0], unknowns[1:]
     x, friction, _shift = balance(spring, psis, p)
-    change = growth(unknowns, rates[:BEYOND], x, friction, p)
-    return point_at(x, change, spring, friction, psis, p)
+    change, changes = growth(unknowns, rates[:BEYOND], x, friction, p), rates[1:BEYOND]
+    slope = strength(friction, psis, p)[1]
+    friction_change = (p[A] * change + felt(changes, friction, psis, p)) / slope
+    reads = reading_growth(spring, rates[0], friction, friction_change, psis, changes, p)
+    return point_at(x, change, spring, friction, psis, reads, p)
 
 
 def point_at(
-    log_rate: float, growth: float, spring: float, friction: float, psis: Numbers, p: Numbers
+    log_rate: float,
+    growth: float,
+    spring: float,
+    friction: float,
+    psis: Numbers,
+    reading_growth: float,
+    p: Numbers,
 ) -> Point:
     """The point, with what friction says of it."""
-    value, _slope, shift, _shift_slope = strength(friction, p)
-    ratio = 1.0 + normal_stress(friction, p)[0]
+    _value, _slope, shift, _shift_slope = strength(friction, psis, p)
+    ratio = 1.0 + effective_stress(friction, psis, p)[0]
     rest = resting(log_rate, shift, p)
     psi, unrest = total(psis), 0.0
     for i in range(STATES):
@@ -174,8 +224,9 @@ def point_at(
         psi - shift,
         psi - total(rest),
         unrest,
-        p[MU_STAR] + value - shift,
+        (p[MU_STAR] + friction) / ratio,
         ratio,
+        reading_growth,
     )
 
 
@@ -183,12 +234,14 @@ def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
     """A rigid slider at the ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi`` against
     slip. Unknowns are g, and the states but the first.
     """
-    value, slope, shift, _shift_slope = strength(state[0], p)
-    changes = evolutions(p[-1], states_at(value, p[-1], state[1:], p), shift, 1.0, p)
-    return (total(changes) / slope, *changes[1:])
+    others = state[1:]
+    value, slope, shift, _shift_slope = strength(state[0], others, p)
+    changes = evolutions(p[-1], states_at(value, p[-1], others, p), shift, 1.0, p)
+    return (felt(changes, state[0], others, p) / slope, *changes[1:])
 
 
 def rigid_point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
     """What a rigid slider does."""
-    psis = states_at(strength(state[0], p)[0], p[-1], state[1:], p)
-    return point_at(p[-1], 0.0, state[0], state[0], psis, p)
+    psis = states_at(strength(state[0], state[1:], p)[0], p[-1], state[1:], p)
+    reads = reading_growth(state[0], rates[0], state[0], rates[0], psis, rates, p)
+    return point_at(p[-1], 0.0, state[0], state[0], psis, reads, p)

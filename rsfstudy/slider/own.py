@@ -98,7 +98,8 @@ def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, t
     if owner is not None:
         same = stated.metadata == owner.__dataclass_fields__[name].metadata
         if not same or owner not in slot.choices.values():
-            raise _taken(part, name, owner.name)
+            common = name in slot.base.__dataclass_fields__
+            raise _taken(part, name, f"every {slot.long_name}" if common else owner.name)
 
 
 def _field_of(part: type[Part]) -> str:

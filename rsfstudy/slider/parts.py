@@ -1,10 +1,10 @@
 """What a part is: one choice of a slot of the slider, with its fields and its functions of floats.
 
-A scene fills four slots: state evolution law, normal stress, dynamics and loading. Each choice is
-one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule, symbol,
-units and description. Its functions are plain functions of floats: they take the numbers of a scene
-as one flat tuple ``p``, in which those of the part begin at ``p[OWN]``. `assembly` puts them
-together.
+A scene fills five slots: state evolution law, normal stress, fluid, dynamics and loading. Each
+choice is one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule,
+symbol, units and description. Its functions are plain functions of floats: they take the numbers of
+a scene as one flat tuple ``p``, in which those of the part begin at ``p[OWN]``. `assembly` puts
+them together.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,10 +23,24 @@ from rsfstudy.quantity import Quantity
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-Number = float | None
 #: A function of floats, the last argument being the numbers of a scene.
 Function = Callable[..., Any]
 Numbers = tuple[float, ...]
+
+
+Check = Callable[[Any, "Scene"], None]
+
+
+def reads(*names: str) -> Callable[[Check], Check]:
+    """State the fields of a scene that a part's check draws on; a lattice is then checked along
+    those, and not cell by cell.
+    """
+
+    def stated(check: Check) -> Check:
+        check.reads = frozenset(names)  # type: ignore[attr-defined]
+        return check
+
+    return stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +54,16 @@ class Part:
     name: ClassVar[str]
     called_by: ClassVar[str] = ""
 
+    @classmethod
+    def what_it_is(cls) -> object:
+        """What parts of a user's own that are the same have in common, and no others."""
+        return cls
+
     def numbers(self, scene: Scene) -> Numbers:
         """What the functions of the part read at ``p[OWN]``, ``p[OWN + 1]``, ..."""
         return ()
 
+    @reads()
     def check(self, scene: Scene) -> None:
         """Raise InvalidValue where its values do not go with one another or with the scene."""
 
@@ -56,6 +76,13 @@ class Part:
     def functions(cls) -> tuple[str, ...]:
         """Names of the functions that the part must state."""
         return ()
+
+    @classmethod
+    def checked_by(cls) -> frozenset[str] | None:
+        """Fields of a scene that decide whether the part goes with it; None where any may."""
+        if hasattr(cls, "__post_init__"):
+            return None
+        return getattr(cls.check, "reads", None)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
@@ -90,6 +117,7 @@ RULES: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     "must be greater than 0": lambda value: value > 0.0,
     "must be 0 or greater": lambda value: value >= 0.0,
+    "must lie between 0 and 1": lambda value: 0.0 <= value <= 1.0,
 }
 
 
@@ -150,10 +178,28 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
     return plain
 
 
+def copier(part: Part) -> Callable[[Mapping[str, Any]], Part]:
+    """What makes copies of a part with other values, which must have been checked."""
+    kind = type(part)
+    if hasattr(kind, "__post_init__"):
+        return lambda values: replace(part, **values)
+    kept = {name: part.__dict__[name] for name in names_of(kind)}
+
+    def copy(values: Mapping[str, Any]) -> Part:
+        made: Part = object.__new__(kind)
+        made.__dict__.update(kept)
+        made.__dict__.update(values)
+        return made
+
+    return copy
+
+
 def found_in(package: str, path: Iterable[str]) -> dict[str, type[Part]]:
     """The parts of a folder, by name: one in each of its files."""
     parts: dict[str, type[Part]] = {}
     for file in sorted(module.name for module in pkgutil.iter_modules(path)):
+        if file.startswith("_"):  # what several share
+            continue
         module = importlib.import_module(f"{package}.{file}")
         own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]
         parts |= {p.name: p for p in own if p.__module__ == module.__name__}

@@ -1,15 +1,15 @@
-"""The Scene: which slider. Four parts and the numbers every slider has, checked when made."""
+"""The Scene: which slider. Five parts and the numbers every slider has, checked when made."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import FrozenInstanceError, replace
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import FrozenInstanceError
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import assembly, dynamics, laws, loading, normal_stress, steady
+from rsfstudy.slider import assembly, dynamics, fluid, laws, loading, normal_stress, steady
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fields import (
     SLOT_NAMES,
@@ -22,14 +22,16 @@ from rsfstudy.slider.fields import (
     without_meaning,
 )
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.parts import Numbers, Part, checked
+from rsfstudy.slider.numbers import SPRING, with_spring
+from rsfstudy.slider.parts import Numbers, Part, checked, copier
 
 
 class Parts(NamedTuple):
     """What fills the slots of a scene."""
 
-    law: laws.Law
+    law: laws.LawOfStates
     normal_stress: normal_stress.NormalStress
+    fluid: fluid.Fluid
     dynamics: dynamics.Dynamics
     loading: loading.Loading
 
@@ -43,12 +45,23 @@ class Scene:
 
     Parameters
     ----------
-    law : {"slip", "slowness"}, or type
-        State evolution law; any file of `rsfstudy.slider.laws`, or a class of your own, whose
-        fields are then fields of the scene.
+    law : str or type
+        State evolution law: "slip" (default), "slowness" or any other file of
+        `rsfstudy.slider.laws`, or a class of your own, whose fields are then fields of the scene.
+    law_exponent : float, optional
+        Exponent of the family of laws, from 0 (slip law) to 1 (slowness law); 0.5.
+    cutoff_velocity_ratio : float, optional
+        V_c/V_*, above which contact no longer heals by the composite law, and the evolution effect
+        is left behind by the law with a cut-off; 100.
+    stress_dependence : float
+        c of Nagata et al. (2012): shear stress lowers the state variable by c dtau/sigma; 0.
     normal_stress : {"constant", "variable"}, or type
         Constant, or coupled to shear stress by a driving stress inclined at `phi`; or a class of
         your own.
+    fluid : {"drained", "dilatant"}, or type
+        Pore pressure that never changes, or that falls where pores open with slip rate; or a class
+        of your own. Stress is in units of the effective normal stress of steady sliding at V_*, so
+        that pore pressure is counted from that of the surroundings, where it begins.
     dynamics, loading : type, optional
         A class of your own in these slots, which other fields fill without it.
     alpha : float, optional
@@ -57,25 +70,39 @@ class Scene:
     phi : float, optional
         Angle in degrees between the driving stress and the fault normal (variable normal stress
         only; 60).
+    dilatancy, drainage : float, optional
+        eps/(beta sigma_*), by which undrained pore pressure falls for each unit of ln V, and rate
+        c* D_c/V_* at which it drains (dilatant fluid only; 0.01 and 1).
     a, b_over_a : float
         Direct effect, and evolution effect over direct effect. Rate weakening is b > a; without it
         there is no critical stiffness, and `stiffness` must be given.
+    regularised : bool
+        Whether slip reverses with shear stress (arcsinh form; quasi-static motion only).
+    b1_over_a, b2_over_a, length_ratio : float, optional
+        The same for each of two states (laws of two states only, instead of `b_over_a`), and the
+        slip distance of the second over D_c, which is that of the first. Negative b are allowed.
     mu_star : float
         Steady-state friction coefficient at V_*.
     stiffness_ratio : float, optional
-        Stiffness over the critical stiffness at V_*. Default: 1.
+        Stiffness over the critical stiffness at V_*, above which steady sliding is stable. Default:
+        1. With several states a ratio below 1 need not be unstable.
     stiffness : float, optional
         Stiffness itself, k D_c/sigma_*, instead of its ratio.
     load_velocity_ratio : float, optional
         Load point velocity over V_* after the step. Default: 1, or 0 after a displacement step.
     displacement_step : float
         Instantaneous displacement of the load point in D_c.
+    hold_time : float
+        Time in D_c/V_* for which the load point is held, before it moves on at
+        `load_velocity_ratio`. Zero is no hold.
+    velocity_steps, velocity_ratio, displacement_between_steps : float
+        How many steps of load point velocity there are, from V_* to `velocity_ratio` V_* and back
+        in turn, and how far in D_c it moves from one to the next (10; 20). Zero is no step.
     inertia : bool
         Whether the slider has mass.
     radiation_damping : float
         eta V_*/sigma_*: stress that waves carry away at V_* (quasi-dynamic motion, instead of
-        mass). Zero leaves the effect out; T V_*/(2 pi D_c) times the stiffness is the impedance of
-        spring and mass.
+        mass); T V_*/(2 pi D_c) times the stiffness is the impedance of spring and mass.
     period : float
         Period of free oscillation T in s; with `reference_rate` it sets inertia and the instability
         norm.
@@ -87,7 +114,7 @@ class Scene:
     Attributes
     ----------
     parts : Parts
-        What fills the slots: ``law``, ``normal_stress``, ``dynamics`` and ``loading``.
+        What fills the slots: ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and ``loading``.
 
     Raises
     ------
@@ -120,7 +147,7 @@ class Scene:
                 refuse_unless_idle(name, value, layout.refusing[name])
             else:
                 own[place][name] = checked(layout.parts[place], name, value)
-        own[0].update(_spring(own[0]))
+        own[0].update(with_spring(own[0]))
         made = [part(**values) for part, values in zip(layout.parts, own, strict=True)]
         self._fill(layout, made)
 
@@ -131,7 +158,11 @@ class Scene:
         self.__dict__["parts"] = Parts(*parts)  # type: ignore[arg-type]
         for part in (slider, *parts):
             self.__dict__.update(part.__dict__)
-        for part in parts:
+        self._check()
+
+    def _check(self) -> None:
+        """The law last: it may ask what all of friction makes of steady sliding."""
+        for part in reversed(self.parts):
             part.check(self)
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
@@ -141,16 +172,20 @@ class Scene:
         raise FrozenInstanceError(f"cannot delete field {name!r}")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and self.as_dict() == other.as_dict()
+        return isinstance(other, Scene) and self._what_it_is() == other._what_it_is()
 
     def __hash__(self) -> int:
-        return hash(tuple(self.as_dict().values()))
+        return hash(self._what_it_is())
+
+    def _what_it_is(self) -> tuple[object, ...]:
+        """Its fields, and its parts of the user's own: a name may stand for several."""
+        return *self.as_dict().values(), *(part.what_it_is() for part in self.own_parts)
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, ({**self.as_dict(), **self._layout.own},)
+        return partial(Scene, **{**self.as_dict(), **self._layout.own}), ()
 
     # ---- what follows from the parameters -------------------------------------------------------
 
@@ -171,9 +206,14 @@ class Scene:
         return self._with_parts(self.parts._replace(dynamics=QuasiStatic()))
 
     @property
+    def states(self) -> int:
+        """How many states there are: those of the law, and the unknowns of the fluid."""
+        return self.parts.law.states + len(self.parts.fluid.unknowns)
+
+    @property
     def b(self) -> float:
-        """Evolution effect parameter."""
-        return float(self.a * self.b_over_a)
+        """Evolution effect parameter, of all states together."""
+        return float(self.a * self.parts.law.b_over_a)
 
     @cached_property
     def critical_stiffness(self) -> float:
@@ -185,28 +225,46 @@ class Scene:
         """All numbers, as the functions of the equations read them (see `assembly`)."""
         return assembly.numbers(self)
 
+    @cached_property
+    def numbers_of_friction(self) -> Numbers:
+        """The same for functions that friction alone decides."""
+        return assembly.numbers_of_friction(self)
+
+    @cached_property
+    def functions(self) -> assembly.Functions:
+        """The functions of the equations, by name (see `assembly`)."""
+        return assembly.functions(self)
+
     @property
     def stiffness(self) -> float:
         """K = k D_c/sigma_*."""
         given = self.__dict__["stiffness"]
-        return float(
-            self.__dict__["stiffness_ratio"] * self.critical_stiffness if given is None else given
-        )
+        return float(given) if given is not None else self._relative_stiffness
+
+    @cached_property
+    def _relative_stiffness(self) -> float:
+        ratio = self.__dict__["stiffness_ratio"]
+        if not 0.0 < self.critical_stiffness < math.inf:
+            rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
+            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
+        return float(ratio * self.critical_stiffness)
 
     @property
     def stiffness_ratio(self) -> float:
-        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough."""
+        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough. One below 1
+        need not be unstable with several states, which may be so between two stiffnesses only.
+        """
         given = self.__dict__["stiffness_ratio"]
         if given is not None:
             return float(given)
         return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
 
-    @property
+    @cached_property
     def load_velocity(self) -> float:
         """V_0/V_* after the last step."""
         return self.parts.loading.segments[-1].load_velocity
 
-    @property
+    @cached_property
     def log_load_rate(self) -> float:
         """ln(V_0/V_*), and -inf for a load point at rest."""
         return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
@@ -222,14 +280,15 @@ class Scene:
         history = self.parts.loading.segments
         if len(history) == 1:
             return ((self, history[0].duration),)
-        return tuple((self._under(segment), segment.duration) for segment in history)
+        return tuple((self.under(segment), segment.duration) for segment in history)
 
-    def _under(self, segment: loading.Segment) -> Scene:
+    def under(self, segment: loading.Segment) -> Scene:
         """The same slider, loaded by one segment."""
-        step = Step(
-            load_velocity_ratio=segment.load_velocity, displacement_step=segment.displacement
-        )
-        return self._with_parts(self.parts._replace(loading=step))
+        velocity, displacement, _lasts = segment
+        step = Step(load_velocity_ratio=velocity, displacement_step=displacement)
+        scene = self._with_parts(self.parts._replace(loading=step))
+        scene.__dict__.update({name: getattr(self, name) for name in _UNLOADED})
+        return scene
 
     def _with_parts(self, parts: Parts) -> Scene:
         """A copy with other parts in the slots."""
@@ -237,7 +296,7 @@ class Scene:
         scene._fill(layout_of(tuple(type(part) for part in parts)), [self._slider, *parts])
         return scene
 
-    @property
+    @cached_property
     def inertial_time(self) -> float:
         """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
 
@@ -267,26 +326,69 @@ class Scene:
         kept = {**self.as_dict(), **self._layout.own}
         for name in without_meaning({**kept, **changes}, self._layout.own.values()):
             kept.pop(name, None)
-        if any(changes.get(name) is not None for name in _SPRING):
-            kept |= dict.fromkeys(_SPRING)
+        if any(changes.get(name) is not None for name in SPRING):
+            kept |= dict.fromkeys(SPRING)
         return Scene(**kept | changes)
 
     def _with_numbers(self, changes: Mapping[str, Any]) -> Scene:
         """A copy with the same parts, of which those that change are made and checked anew."""
-        layout = self._layout
-        made: list[Part] = [self._slider, *self.parts]
+        layout, values = self._layout, list[Any]()
         for name, value in changes.items():
             place = layout.places.get(name)
             if place is None:
                 raise layout.refusing[name].refuse(name, value)
-            made[place] = replace(made[place], **{name: checked(layout.parts[place], name, value)})
-        scene = Scene.__new__(Scene)
-        scene._fill(layout, made)
+            values.append(checked(layout.parts[place], name, value))
+        (scene,) = self.varied(tuple(changes), [values])
+        scene._check()
         return scene
+
+    def varied(self, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Scene]:
+        """Copies with other numbers in fields of its parts, which must have been checked.
+
+        Parameters
+        ----------
+        names : sequence of str
+            The fields, each one of a part that this scene has.
+        rows : iterable of sequence of float
+            Their values in each copy.
+        """
+        layout, parts = self._layout, (self._slider, *self.parts)
+        kept = {**layout.elsewhere, "_layout": layout, "_slider": self._slider}
+        for part in parts:
+            kept |= part.__dict__
+        copiers = []
+        for place, part in enumerate(parts):
+            own = [(name, i) for i, name in enumerate(names) if layout.places[name] == place]
+            copiers += [(place, copier(part), own)] if own else []
+        if all(place == len(parts) - 1 for place, _copy, _own in copiers):
+            kept |= {name: self.__dict__[name] for name in _UNLOADED if name in self.__dict__}
+        for row in rows:
+            scene, made = Scene.__new__(Scene), list(parts)
+            scene.__dict__.update(kept)
+            for place, copy, own in copiers:
+                made[place] = copy({name: row[i] for name, i in own})
+                scene.__dict__.update(made[place].__dict__)
+            scene.__dict__["_slider"], scene.__dict__["parts"] = made[0], Parts._make(made[1:])
+            yield scene
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
         return {name: self.__dict__[name] for name in self._layout.fields}
+
+    def describe(self) -> dict[str, Any]:
+        """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
+        stated = self.parts.loading.segments if "loading" in self._layout.own else ()
+        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
+
+    def owner(self, name: str) -> type[Part] | None:
+        """The kind of its part that owns a field, if one does."""
+        place = self._layout.places.get(name)
+        return None if place is None else self._layout.parts[place]
+
+    @property
+    def combination(self) -> int:
+        """Number of its combination of parts, in this process."""
+        return id(self._layout)
 
     @property
     def own_parts(self) -> tuple[type[Part], ...]:
@@ -294,18 +396,5 @@ class Scene:
         return tuple(self._layout.own.values())
 
 
-#: The fields of which one sets the spring.
-_SPRING = ("stiffness_ratio", "stiffness")
-
-
-def _spring(values: dict[str, Any]) -> dict[str, Any]:
-    """The numbers of a slider with one field for its spring."""
-    given = [name for name in _SPRING if name in values]
-    if len(given) == 2:
-        rule = f"and stiffness_ratio = {values['stiffness_ratio']:g} both set the spring"
-        raise InvalidValue("stiffness", values["stiffness"], rule, remedy="Give one of them.")
-    return values if given else {**values, "stiffness_ratio": 1.0}
-
-
-def _made(values: dict[str, Any]) -> Scene:
-    return Scene(**values)
+#: What follows from a scene whatever loads it, once it has been asked for.
+_UNLOADED = ("critical_stiffness", "numbers_of_friction", "functions")

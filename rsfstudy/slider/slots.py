@@ -10,28 +10,48 @@ from typing import Any, NoReturn
 
 from rsfstudy.slider.parts import Numbers
 
-#: Direct and evolution effect parameters a and b, mu_*, K = k D_c/sigma_*, V_0/V_*, its logarithm.
-A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE = range(6)
+#: Direct and evolution effect parameters a and b, mu_*, K = k D_c/sigma_*, V_0/V_*, its logarithm,
+#: the effect c of shear stress on the state, and how far ln V moves the states, which is b for one.
+A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, SIZE = range(8)
 #: Where the numbers of the first part begin.
-FIRST_OWN = 6
+FIRST_OWN = 8
 
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
 #: ln(V/V_*) = 276 (`slip_rate_unbounded`).
 LARGEST_EXPONENT = 300.0
+#: Normal stress ratios outside of these only occur in trial steps; clamps keep them finite.
+SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
 
 
 def _open(*_arguments: float | Numbers) -> NoReturn:
     raise TypeError("a slot of the equations that no part of a scene has filled")
 
 
-def strength(friction: float, p: Numbers) -> tuple[float, float, float, float]:
-    """The friction relation (see `friction`)."""
-    _open(friction, p)
+def strength(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+    """The friction relation (see `friction`); the first of the states may be missing."""
+    _open(friction, psis, p)
+
+
+def one_way(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+    """The friction relation of slip forward, where slip may reverse."""
+    _open(friction, psis, p)
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """Normal stress over its reference value less 1, and its derivative (see `normal_stress`)."""
     _open(friction, p)
+
+
+def effective_stress(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    """The same of effective normal stress."""
+    _open(friction, psis, p)
+
+
+def effective_stress_change(
+    friction: float, friction_change: float, changes: Numbers, p: Numbers
+) -> float:
+    """Change of effective normal stress (see `forms`)."""
+    _open(friction, friction_change, changes, p)
 
 
 def state_effect(friction: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
@@ -44,6 +64,11 @@ def other_state_effect(
 ) -> tuple[float, float]:
     """The same by another part."""
     _open(friction, ratio, change, p)
+
+
+def felt(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
+    """What changes of the states take from a ln(V/V_*) (see `states`)."""
+    _open(changes, friction, psis, p)
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -61,11 +86,36 @@ def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
     _open(log_rate, shift, p)
 
 
-def evolving(log_rate: float, psis: Numbers, shift: float, p: Numbers) -> Numbers:
-    """Evolution of all states per unit of slip and load point displacement together (see
-    `forms`).
-    """
-    _open(log_rate, psis, shift, p)
+def evolutions_of_law(
+    log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+) -> Numbers:
+    """The same of the states of the law alone, where a fluid has others."""
+    _open(log_rate, psis, shift, share, p)
+
+
+def resting_of_law(log_rate: float, shift: float, p: Numbers) -> Numbers:
+    """The states of the law in steady sliding, where a fluid has others."""
+    _open(log_rate, shift, p)
+
+
+def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+    """Changes of the states of a fluid per unit slip, times a share (see `fluid`)."""
+    _open(log_rate, states, share, p)
+
+
+def seeped(log_rate: float, p: Numbers) -> Numbers:
+    """The states of a fluid in steady sliding (see `fluid`)."""
+    _open(log_rate, p)
+
+
+def strength_of_pressure(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    """Derivatives of strength and shift with respect to pore pressure (see `saturated`)."""
+    _open(friction, psis, p)
+
+
+def pace(log_rate: float, p: Numbers) -> tuple[float, float, float]:
+    """ln(V/V_*), V_0/V and V/(V + V_0) (see `forms`)."""
+    _open(log_rate, p)
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
@@ -78,8 +128,27 @@ def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers
     _open(state, rates, x, friction, p)
 
 
+def reading_growth(
+    spring: float,
+    spring_change: float,
+    friction: float,
+    friction_change: float,
+    psis: Numbers,
+    changes: Numbers,
+    p: Numbers,
+) -> float:
+    """Change of the friction coefficient that is read (see `forms`)."""
+    _open(spring, spring_change, friction, friction_change, psis, changes, p)
+
+
 def point_at(
-    log_rate: float, growth: float, spring: float, friction: float, psis: Numbers, p: Numbers
+    log_rate: float,
+    growth: float,
+    spring: float,
+    friction: float,
+    psis: Numbers,
+    reading_growth: float,
+    p: Numbers,
 ) -> tuple[Any, ...]:
     """What the slider does at one instant (see `forms.Point`)."""
-    _open(log_rate, growth, spring, friction, psis, p)
+    _open(log_rate, growth, spring, friction, psis, reading_growth, p)

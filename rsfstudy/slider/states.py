@@ -19,6 +19,16 @@ def only(numbers: Numbers) -> float:
     return numbers[0]
 
 
+def felt(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
+    """What changes of the states take from a ln(V/V_*): ``a d ln V = strength'(g) dg - felt``."""
+    return total(changes)
+
+
+def felt_of_one(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
+    """The same, of one state."""
+    return changes[0]
+
+
 def states_at(value: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
     """All states, where friction has this strength: the first is what the others leave."""
     return (value - p[A] * log_rate - total((0.0, *others)), *others)

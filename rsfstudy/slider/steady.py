@@ -11,6 +11,10 @@ the states with respect to one another, to x and to the shift,
 
     [D - S 1.(p - M)^-1 E_s] dg = p [a + 1.(p - M)^-1 E_x] du.
 
+Pore pressure P, the last state where there is a fluid, takes -dstrength/dP from a x in the place of
+the 1 of a state of the law, and porosity nothing; P moves the shift too, so that E_s dshift/dP is
+part of its column of M.
+
 Spring, waves and mass balance it where K (1 + w**2 p**2) + eta V p + G(p) = 0, w being
 V T/(2 pi D_c). The critical stiffness is the K at which p is imaginary. Nothing here depends on
 which parts the scene has.
@@ -19,16 +23,15 @@ which parts the scene has.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.slider.equations import evolutions_of, relation_of, resting_of
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.states import total
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -36,14 +39,22 @@ if TYPE_CHECKING:
 #: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
 _STRONGEST = 1e9
 #: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
-#: States take a part of it, over b, because each of several may have a small part of b.
-_STEP, _PART = 0.05, 0.05
+#: States take a part of it over b; each of several, over what ln V moves it by, if it does.
+_STEP, _PART, _MOVES = 0.05, 0.05, 1e-9
 _WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
 
-#: Critical stiffness over a that rounding leaves where there is none.
-_ROUNDING = 1e-12
+#: ln(V/V_*) below which steady sliding is not followed.
+_SLOWEST = -1e6
+
+#: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
+_ROUNDING, _STILL = 1e-12, 1e-9
+
+#: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
+#: growth rates without it.
+_LIGHT, _POLISHED = 1e-6, 2
 
 Polynomial = list[float]
+Matrix = list[list[float]]
 
 
 @dataclass(frozen=True)
@@ -67,13 +78,17 @@ class Steady:
 
 def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
     """Steady sliding of a scene at ln(V/V_*); None where no stress is as weak or as strong."""
-    excess = scene.a * log_rate + total(resting_of(scene, log_rate, 0.0))
-    friction = stress_at(scene, excess)
+    friction = stress_at(scene, steady_excess(scene, log_rate))
     if friction is None:
         return None
     spring = friction + scene.dynamics.radiated(log_rate)
     shift = relation_of(scene)(friction)[2]
     return Steady(log_rate, friction, spring, resting_of(scene, log_rate, shift))
+
+
+def steady_excess(scene: Scene, log_rate: float) -> float:
+    """Steady friction coefficient at ln(V/V_*), less mu_*: (a - b) ln(V/V_*) by most laws."""
+    return float(scene.a * log_rate + scene.functions["total"](resting_of(scene, log_rate, 0.0)))
 
 
 def stress_at(scene: Scene, excess: float) -> float | None:
@@ -86,16 +101,22 @@ def stress_at(scene: Scene, excess: float) -> float | None:
         value, _slope, shift, _shift_slope = relation(friction)
         return value - shift - excess
 
-    return _root(missing, excess, scene.parts.normal_stress.weakest(scene))
+    return _root(missing, excess, _weakest(scene))
 
 
-def stress_after_jump(scene: Scene, excess: float) -> float | None:
+def stress_after_jump(scene: Scene, excess: float, psis: Numbers = ()) -> float | None:
     """Deviation of frictional stress at which strength is `excess`: that of a sudden change; None
-    where it never is.
+    where it never is. At the pore pressure of steady sliding, unless states are given.
     """
-    relation = relation_of(scene)
-    lowest = scene.parts.normal_stress.weakest(scene)
-    return _root(lambda friction: relation(friction)[0] - excess, excess, lowest)
+    relation = relation_of(scene, psis)
+    return _root(lambda friction: relation(friction)[0] - excess, excess, _weakest(scene))
+
+
+def _weakest(scene: Scene) -> float:
+    """Deviation of frictional stress above which slip is forward and normal stress positive."""
+    weakest = scene.parts.normal_stress.weakest(scene)
+    # where slip may reverse, strength grows with stress of either sign
+    return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 
 def _root(missing: Callable[[float], float], near: float, lowest: float) -> float | None:
@@ -130,9 +151,17 @@ def slowest_steady(scene: Scene) -> float:
     there is none.
     """
     value, _slope, shift, _shift_slope = relation_of(scene)(_STRONGEST)
-    if value - shift > 1e6 or scene.b <= scene.a:
+    strongest = value - shift
+    if strongest > 1e6:
         return -math.inf
-    return (value - shift) / (scene.a - scene.b)
+    if scene.parts.law.resting is None:
+        return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
+    slower = -1.0
+    while steady_excess(scene, slower) <= strongest:
+        slower *= 2.0
+        if slower < _SLOWEST:
+            return -math.inf
+    return float(brentq(lambda x: steady_excess(scene, x) - strongest, slower, 0.0, xtol=1e-12))
 
 
 def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = False) -> float:
@@ -161,20 +190,78 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
     steady = steady_sliding(scene, log_rate)
     if steady is None:
         return math.nan
-    damping = 0.0 if quasi_static else scene.dynamics.damping(log_rate)
-    norm = 0.0 if quasi_static else scene.dynamics.norm(scene, log_rate)
-    above, below = response(scene, steady)
+    around = _around(scene, steady, quasi_static=quasi_static)
+    crossings = _crossings(around, _ROUNDING * scene.a)
+    critical = crossings[-1] if crossings else 0.0
+    # of one state drained, no perturbation grows beyond the only crossing
+    if scene.states == 1 or critical == math.inf:
+        return critical
+    return math.inf if _grows(around, 2.0 * critical or scene.a) else critical
+
+
+def critical_stiffnesses(scene: Scene, log_rate: float) -> list[float]:
+    """Every stiffness at which small changes of steady sliding come to grow or to decay, or more of
+    them grow, from the smallest up: several states may have more than one.
+    """
+    steady = steady_sliding(scene, log_rate)
+    return [] if steady is None else _crossings(_around(scene, steady), _ROUNDING * scene.a)
+
+
+class _Around(NamedTuple):
+    """What balances a spring around steady sliding: friction above(p)/below(p), waves and mass."""
+
+    above: Polynomial
+    below: Polynomial
+    damping: float
+    norm: float
+
+
+def _around(scene: Scene, steady: Steady, *, quasi_static: bool = False) -> _Around:
+    damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_rate)
+    norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_rate)
+    return _Around(*response(scene, steady), damping, norm)
+
+
+def _crossings(around: _Around, least: float) -> list[float]:
+    """Stiffnesses above the least at which a growth rate is imaginary, from the smallest up;
+    ``math.inf`` for one that mass leaves none for.
+    """
     # at p = i omega, as polynomials in omega**2
-    (a_even, a_odd), (b_even, b_odd) = _parts(above), _parts(below)
+    (a_even, a_odd), (b_even, b_odd) = _parts(around.above), _parts(around.below)
     size = _sum(_product(b_even, b_even), [0.0, *_product(b_odd, b_odd)])
     resists = _sum(_product(a_even, b_even), [0.0, *_product(a_odd, b_odd)])
     turns = _sum(_product(a_odd, b_even), [-x for x in _product(a_even, b_odd)])
-    critical = 0.0
-    for squared in _positive_roots(_sum(resists, [damping * x for x in size])):
+    crossings = []
+    for squared in _positive_roots(_sum(resists, [around.damping * x for x in size])):
         elastic = squared * _value(turns, squared) / _value(size, squared)
-        inertial = 1.0 - norm**2 * squared
-        critical = max(critical, elastic / inertial if inertial > 0.0 else math.inf)
-    return critical if critical > _ROUNDING * scene.a else 0.0
+        inertial = 1.0 - around.norm**2 * squared
+        crossings.append(elastic / inertial if inertial > 0.0 else math.inf)
+    return sorted(stiffness for stiffness in crossings if stiffness > least)
+
+
+def _rates(around: _Around, stiffness: float) -> np.ndarray:
+    """Growth rates p at a stiffness, the fastest first."""
+    spring = [stiffness, around.damping, stiffness * around.norm**2]
+    polynomial = _sum(_product(spring, around.below), [0.0, *around.above])
+    light = 0.0 < abs(polynomial[-1]) < _LIGHT * abs(polynomial[-2]) and around.norm > 0.0
+    roots = _with_one_far_off(polynomial) if light else np.roots(polynomial[::-1])
+    return np.asarray(roots[np.argsort(-roots.real)])
+
+
+def _with_one_far_off(polynomial: Polynomial) -> np.ndarray:
+    """Roots of which a small mass makes one, 1e20 of the others: next to it they would lose digits,
+    and are found without it.
+    """
+    falling = polynomial[::-1]
+    roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
+    for _ in range(_POLISHED):
+        off, slope = np.polyval(falling, roots), np.polyval(np.polyder(falling), roots)
+        roots -= np.divide(off, slope, out=np.zeros_like(roots), where=slope != 0.0)
+    return roots
+
+
+def _grows(around: _Around, stiffness: float) -> bool:
+    return bool(_rates(around, stiffness)[0].real > _STILL)
 
 
 def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
@@ -183,24 +270,42 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
     by_rate, by_shift, by_state = slopes_of_law(scene, steady)
+    weights, shifting = _actions(scene, steady)
+    for row, of_shift in zip(by_state, by_shift, strict=True):
+        row[-1] += of_shift * shifting
     denominator, adjugate = resolvent(by_state)
     above = [scene.a * x for x in denominator]
     below = [slope * x for x in denominator]
     for power, matrix in enumerate(adjugate):
-        above[power] += float((matrix @ by_rate).sum())
-        below[power] -= shift_slope * float((matrix @ by_shift).sum())
+        for weight, row in zip(weights, matrix, strict=True):
+            above[power] += weight * _dot(row, by_rate)
+            below[power] -= shift_slope * (weight * _dot(row, by_shift))
     return above, below
 
 
-def slopes_of_law(scene: Scene, steady: Steady) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
+    """What a change of each state takes from a ln V, and by how much the last moves the shift."""
+    law, fluid = scene.parts.law.states, len(scene.parts.fluid.unknowns)
+    if not fluid:
+        return [1.0] * law, 0.0
+    by_pressure = scene.functions["strength_of_pressure"]
+    gained, shifted = by_pressure(steady.friction, steady.psis, scene.numbers_of_friction)
+    return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
+
+
+def _dot(first: Sequence[float], second: Sequence[float]) -> float:
+    return sum(x * y for x, y in zip(first, second, strict=True))
+
+
+def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:
     """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
     ln V, to the shift, and to each state (columns).
     """
-    evolutions, b = evolutions_of(scene), scene.b
+    evolutions = evolutions_of(scene)
     shift = relation_of(scene)(steady.friction)[2]
     at, columns = [steady.log_rate, shift, *steady.psis], []
-    for place, value in enumerate(at):
-        step = _STEP if place == 0 else _STEP * _PART * b
+    for place, (value, scale) in enumerate(zip(at, _scales(scene, steady, shift), strict=True)):
+        step = _STEP * scale
         slopes = [0.0] * len(steady.psis)
         for number, weight in _WEIGHTS:
             at[place] = value + number * step
@@ -211,20 +316,35 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[np.ndarray, np.ndarray,
                 slopes[state] += weight * (more - less) / step
         at[place] = value
         columns.append(slopes)
-    matrix = np.array(columns).T
-    return matrix[:, 0], matrix[:, 1], matrix[:, 2:]
+    by_rate, by_shift, *by_state = columns
+    return by_rate, by_shift, [list(row) for row in zip(*by_state, strict=True)]
 
 
-def resolvent(matrix: np.ndarray) -> tuple[Polynomial, list[np.ndarray]]:
+def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
+    """What the evolution bends over: in ln V, in the shift, and in each state."""
+    size = _PART * scene.a * scene.parts.law.size_over_a
+    # b of several states may be next to nothing where each has a large one
+    of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
+    if len(steady.psis) == 1:
+        return [1.0, of_shift, size]
+    slow, fast = (resting_of(scene, steady.log_rate + x, shift) for x in (-1.0, 1.0))
+    moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
+    return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
+
+
+def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
     """Characteristic polynomial of a matrix M, and the adjugate of p - M, whose quotient is the
     inverse of p - M: coefficients from the constant one up (Faddeev and LeVerrier).
     """
-    size = len(matrix)
-    coefficients, terms = [1.0], [np.eye(size)]
-    for order in range(1, size + 1):
-        product = matrix @ terms[0]
-        coefficients.insert(0, -float(np.trace(product)) / order)
-        terms.insert(0, product + coefficients[0] * np.eye(size))
+    places = range(len(matrix))
+    coefficients, terms = [1.0], [[[float(i == j) for j in places] for i in places]]
+    for order in range(1, len(matrix) + 1):
+        columns = list(zip(*terms[0], strict=True))
+        term = [[_dot(row, column) for column in columns] for row in matrix]
+        coefficients.insert(0, -sum(term[i][i] for i in places) / order)
+        for i in places:
+            term[i][i] += coefficients[0]
+        terms.insert(0, term)
     return coefficients, terms[1:]
 
 
@@ -240,15 +360,7 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
     steady = steady_sliding(scene, log_rate)
     if steady is None:
         raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
-    above, below = response(scene, steady)
-    spring = [
-        scene.stiffness,
-        scene.dynamics.damping(log_rate),
-        scene.stiffness * scene.dynamics.norm(scene, log_rate) ** 2,
-    ]
-    polynomial = _sum(_product(spring, below), [0.0, *above])
-    roots = np.roots(polynomial[::-1])
-    return np.asarray(roots[np.argsort(-roots.real)])
+    return _rates(_around(scene, steady), scene.stiffness)
 
 
 def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:

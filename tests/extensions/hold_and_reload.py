@@ -16,7 +16,7 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True, kw_only=True)
 class HoldAndReload(Loading):
-    hold_time: float = number(
+    rest_time: float = number(
         100.0, "$t_h$", "1", "time of the hold", rule="must be greater than 0", scale="D_c/V_*"
     )
 
@@ -24,12 +24,12 @@ class HoldAndReload(Loading):
 
     @property
     def segments(self):
-        return Segment(load_velocity=0.0, duration=self.hold_time), Segment(load_velocity=1.0)
+        return Segment(load_velocity=0.0, duration=self.rest_time), Segment(load_velocity=1.0)
 
 
 @dataclass(frozen=True)
-class Healing(Measure):
-    name = "healing"
+class PeakAfterRest(Measure):
+    name = "peak_after_rest"
     headline = "peak_stress"
     quantities = (
         Quantity("peak_stress", "", "1", "rise of stress to its peak on reloading", "sigma_*"),
@@ -59,6 +59,6 @@ study = Study(
     base=Scene(
         law="slowness", normal_stress="constant", loading=HoldAndReload, stiffness_ratio=3.0
     ),
-    axes=[Axis("hold_time", [1e4, 1e6])],
-    measure=Healing(),
+    axes=[Axis("rest_time", [1e4, 1e6])],
+    measure=PeakAfterRest(),
 )

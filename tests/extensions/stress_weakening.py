@@ -1,7 +1,7 @@
 """A state that stress wears away (Nagata et al. 2012), on top of the slowness law.
 
 What evolves by the law alone is ``Psi = Theta + c (mu - mu_*)``: the state effect states that shift
-and its slope.
+and its slope. (At constant normal stress the field `stress_dependence` of every law does the same.)
 """
 
 from dataclasses import dataclass

@@ -31,6 +31,8 @@ class Dynamics(Part):
     balance: ClassVar[Function]
     growth: ClassVar[Function]
     rupture_rate: ClassVar[Function | None] = None
+    #: Whether slip may reverse, in the regularised form of friction.
+    reverses: ClassVar[bool] = False
     rupture_point: ClassVar[Function | None] = None
 
     @classmethod

@@ -16,12 +16,13 @@ from rsfstudy.slider.parts import Numbers, flag
 from rsfstudy.slider.slots import (
     LARGEST_EXPONENT,
     LOAD_VELOCITY,
-    LOG_LOAD_RATE,
     STIFFNESS,
     A,
     evolutions,
-    evolving,
+    felt,
+    pace,
     point_at,
+    reading_growth,
     strength,
 )
 from rsfstudy.slider.states import states_at, total
@@ -59,17 +60,19 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
     # the bound is far more than the motion meets before it leaves the slow manifold, so that trial
     # steps beyond keep their sense of direction
     friction = spring - max(-a, min(resistance, a))
-    value, _slope, shift, _shift_slope = strength(friction, p)
+    value, _slope, shift, _shift_slope = strength(friction, psis, p)
     return (value - total(psis)) / a, friction, shift
 
 
 def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
     """ln(V/V_*) and its growth, both quasi-static."""
     a = p[A]
-    value, slope, shift, _shift_slope = strength(spring, p)
+    value, slope, shift, _shift_slope = strength(spring, psis, p)
     x = (value - total(psis)) / a
-    loading = -p[STIFFNESS] * math.tanh(0.5 * (x - p[LOG_LOAD_RATE]))
-    return x, (slope * loading - total(evolving(x, psis, shift, p))) / a
+    clamped, slower, share = pace(x, p)
+    loading = p[STIFFNESS] * (slower - 1.0) * share
+    changes = evolutions(clamped, psis, shift, share, p)
+    return x, (slope * loading - felt(changes, spring, psis, p)) / a
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
@@ -86,16 +89,16 @@ def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
     with w = V T/(2 pi D_c), from m d2(delta)/dt2 = k (delta_0 - delta) - tau and m/k = (T/2 pi)**2.
     Keeping g as an unknown needs no inverse of `strength`.
     """
-    spring, x, friction = state[0], state[1], state[2]
+    spring, x, friction, others = state[0], state[1], state[2], state[3:]
     a, stiffness = p[A], p[STIFFNESS]
     norm = math.exp(max(min(x + p[OWN + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
-    value, slope, shift, _shift_slope = strength(friction, p)
+    value, slope, shift, _shift_slope = strength(friction, others, p)
     faster = bounded((spring - friction) / (stiffness * norm))
-    changes = evolutions(x, states_at(value, x, state[3:], p), shift, norm, p)
+    changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
     return (
         bounded(stiffness * (p[LOAD_VELOCITY] * p[OWN] - norm)),
         faster,
-        bounded((a * faster + total(changes)) / slope),
+        bounded((a * faster + felt(changes, friction, others, p)) / slope),
         *changes[1:],
     )
 
@@ -108,8 +111,9 @@ def bounded(rate: float) -> float:
 def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[Any, ...]:
     """What the slider does where mass acts."""
     spring, x, friction = state[0], state[1], state[2]
-    psis = states_at(strength(friction, p)[0], x, state[3:], p)
-    return point_at(x, rates[1], spring, friction, psis, p)
+    psis = states_at(strength(friction, state[3:], p)[0], x, state[3:], p)
+    reads = reading_growth(spring, rates[0], friction, rates[2], psis, rates, p)
+    return point_at(x, rates[1], spring, friction, psis, reads, p)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.parts import Numbers, number
-from rsfstudy.slider.slots import LARGEST_EXPONENT, A, strength
+from rsfstudy.slider.slots import LARGEST_EXPONENT, A, felt, strength
 from rsfstudy.slider.states import total
 
 if TYPE_CHECKING:
@@ -57,13 +57,13 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
     """
     a, damping, psi = p[A], p[OWN], total(psis)
     # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
-    low, high = -math.inf, min((strength(spring + damping, p)[0] - psi) / a, _FASTEST)
+    low, high = -math.inf, min((strength(spring + damping, psis, p)[0] - psi) / a, _FASTEST)
     # a good guess where radiation takes most of the stress
     x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
     before = math.inf
     for _ in range(_MOST_ITERATIONS):
         friction = spring - damping * math.expm1(x)
-        value, slope, shift, _shift_slope = strength(friction, p)
+        value, slope, shift, _shift_slope = strength(friction, psis, p)
         missing = value - psi - a * x
         if missing > 0.0:
             low = x
@@ -81,14 +81,15 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
         else:
             x += change
     friction = spring - damping * math.expm1(x)
-    return x, friction, strength(friction, p)[2]
+    return x, friction, strength(friction, psis, p)[2]
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
     """``[a + strength'(g) eta V] d ln V = strength'(g) df - dPsi``."""
-    slope = strength(friction, p)[1]
+    psis = state[1:]
+    slope = strength(friction, psis, p)[1]
     resists = p[A] + slope * p[OWN] * math.exp(min(x, LARGEST_EXPONENT))
-    return (slope * rates[0] - total(rates[1:])) / resists
+    return (slope * rates[0] - felt(rates[1:], friction, psis, p)) / resists
 
 
 @dataclass(frozen=True, kw_only=True)

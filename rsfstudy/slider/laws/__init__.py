@@ -4,49 +4,91 @@ The state variable is written so that every law shares
 
     tau = sigma (mu_* + a ln(V/V_*) + Theta),
 
-which for the slowness law means Theta = b ln(theta/theta_*).
+which for the slowness law means Theta = b ln(theta/theta_*). Friction is mu_* at V_* by any law:
+the state variable is measured from its value in steady sliding at V_*.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
+from rsfstudy.slider.parts import Function, Numbers, Part, flag, found_in, number, reads
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
+#: What is known of some laws, and what stands for it where it is not.
+_KNOWN: tuple[tuple[str, object], ...] = (
+    ("orbits_close", False),
+    ("scale_free", False),
+    ("stress_left", None),
+)
+#: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
+#: motion stop at slip rates of 10^-290 V_*.
+LARGEST_EXPONENT = 700.0
+
+
+#: Fields of a scene that decide whether the effects of a law go with it.
+OF_EFFECTS = (
+    *("stress_dependence", "normal_stress", "fluid"),
+    *("regularised", "dynamics", "inertia", "radiation_damping"),
+)
+
+
+def cutoff_velocity() -> Any:
+    """The field that laws with a slip rate of their own have in common."""
+    return number(
+        100.0,
+        "$V_c/V_*$",
+        "1",
+        "cut-off velocity of the evolution effect",
+        rule="must be greater than 0",
+        remedy="For a law without a cut-off, set law.",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
-class Law(Part):
-    """Base of the laws.
+class LawOfStates(Part):
+    """Base of all laws; one with a single b is derived from `Law`.
 
     A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
     slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
     states ``resting(log_rate, shift, p)``: the states Psi of steady sliding, of which stress has
     taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
 
-    A law of several states says how many, and states ``evolutions(log_rate, psis, shift, share,
-    p)`` instead, all of them times a share, and `resting`.
+    A law of several states says how many (``states = 3``), and states ``evolutions(log_rate, psis,
+    shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
+    `resting`. Both say how much of the shift each state has; the parts add up to all of it. What
+    the states together have for b it says as `b_over_a`, a field or a property; `two_slip_states`
+    is an example.
     """
 
-    b_over_a: float = number(
-        2.0,
-        "$b/a$",
+    stress_dependence: float = number(
+        0.0,
+        "$c$",
         "1",
-        "ratio of evolution effect to direct effect",
-        rule="must be greater than 0",
+        "effect of shear stress on the state variable",
+        rule="must be 0 or greater",
+        remedy="Zero leaves the effect out.",
     )
+    regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
 
     #: How many states the law has.
     states: ClassVar[int] = 1
     #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
     #: effect on it: where evolution changes with its own state in proportion to itself.
     orbits_close: ClassVar[bool] = False
+    #: Whether the state is ``Theta = b ln(theta/theta_*)``, so that there is a theta to tell of.
+    logarithmic: ClassVar[bool] = True
+    #: Whether the law has no slip rate of its own, so that V_* could be any other.
+    scale_free: ClassVar[bool] = False
     #: ``stress_left(rate, slip)``: the stress in units of b that is left above its steady value
-    #: after so much slip at constant ln(V/V_*), at constant normal stress; closed forms only.
+    #: after so much slip at constant ln(V/V_*), at constant normal stress; closed forms only. A
+    #: method where it draws on numbers of the law.
     stress_left: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
@@ -59,7 +101,7 @@ class Law(Part):
         """A law with an evolution of its own does not inherit what is known of another's."""
         super().__init_subclass__()
         if {"evolution", "evolutions"} & vars(cls).keys():
-            for name, unknown in (("orbits_close", False), ("stress_left", None)):
+            for name, unknown in _KNOWN:
                 if name not in vars(cls) and getattr(cls, name) != unknown:
                     setattr(cls, name, unknown)
 
@@ -67,19 +109,102 @@ class Law(Part):
     def functions(cls) -> tuple[str, ...]:
         return ("evolution",) if cls.states == 1 else ("evolutions", "resting")
 
+    @property
+    def b_over_a(self) -> float:
+        """Evolution effect of all states together, over the direct effect."""
+        raise TypeError(f"{type(self).__name__} states no b_over_a")
+
+    @property
+    def size_over_a(self) -> float:
+        """How far ln V moves the states, over the direct effect: positive, whatever their signs."""
+        return self.b_over_a
+
+    @property
+    def feels_stress(self) -> bool:
+        """Whether stress itself changes the state variable."""
+        return self.state_effect is not None or self.stress_dependence > 0.0
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
+        return tuple(name for name, acts in named.items() if acts)
+
+    @reads(*OF_EFFECTS)
+    def check(self, scene: Scene) -> None:
+        """Normal stress of which the integral of ``dtau/sigma`` is known, and motion that may
+        reverse, where that matters.
+        """
+        stress, fluid = scene.parts.normal_stress, scene.parts.fluid
+        bends = stress.normal_stress is not None and not stress.coupling
+        unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
+        if self.stress_dependence and unknown:
+            raise InvalidValue(
+                "stress_dependence",
+                self.stress_dependence,
+                f"is known for normal stress in proportion to shear stress, not for {unknown}",
+                remedy="Leave it out, or state `coupling` where the proportion is constant.",
+            )
+        one_way = fluid if fluid.unknowns else None if scene.dynamics.reverses else scene.dynamics
+        if self.regularised and one_way:
+            raise InvalidValue(
+                "regularised",
+                self.regularised,
+                f"has no meaning for {one_way.name}, whose equations hold ln V",
+                remedy="Leave one of them out.",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law(LawOfStates):
+    """Base of the laws with one b."""
+
+    b_over_a: float = number(
+        2.0,
+        "$b/a$",
+        "1",
+        "ratio of evolution effect to direct effect",
+        rule="must be greater than 0",
+    )
+
     def numbers(self, scene: Scene) -> Numbers:
         """b."""
         return (scene.a * self.b_over_a,)
 
+    @property
+    def least_weakening(self) -> float:
+        """What b/a must exceed for steady friction to fall with slip rate at V_*."""
+        return 1.0
+
+    @classmethod
+    def checked_by(cls) -> frozenset[str] | None:
+        """Anything may decide how states rest that do so in their own way."""
+        return super().checked_by() if cls.resting is None else None
+
+    @reads("b_over_a", "stiffness", *OF_EFFECTS)
     def check(self, scene: Scene) -> None:
-        """Rate weakening, where the spring is given by its ratio to the critical stiffness."""
-        if self.b_over_a <= 1.0 and scene.as_dict()["stiffness"] is None:
+        """A critical stiffness, where the spring is given by its ratio to it; rate weakening is
+        enough.
+        """
+        super().check(scene)
+        least = self.least_weakening
+        if self.b_over_a <= least and lacks_threshold(scene):
             raise InvalidValue(
                 "b_over_a",
                 self.b_over_a,
-                "must exceed 1: without rate weakening there is no critical stiffness",
-                remedy="Steady sliding is then stable at every stiffness: give stiffness itself.",
+                f"must exceed {least:.6g}: without rate weakening there is no critical stiffness",
+                remedy=GIVE_STIFFNESS,
             )
+
+
+#: What to do where there is no critical stiffness.
+GIVE_STIFFNESS = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
+
+
+def lacks_threshold(scene: Scene) -> bool:
+    """Whether the spring is given by its ratio to a critical stiffness that there is not: stable or
+    unstable is then every spring.
+    """
+    return scene.as_dict()["stiffness"] is None and not 0.0 < scene.critical_stiffness < math.inf
 
 
 PARTS = found_in(__name__, __path__)

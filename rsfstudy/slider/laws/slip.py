@@ -50,4 +50,5 @@ class SlipLaw(Law):
     name = "slip"
     evolution = staticmethod(evolution)
     stress_left = staticmethod(stress_left)
+    scale_free = True
     orbits_close = True  # Gu et al. (1984)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import Law
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
 from rsfstudy.slider.parts import Numbers
 
 OWN = 0
-#: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
-#: motion stop at slip rates of 10^-290 V_*.
-LARGEST_EXPONENT = 700.0
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -55,4 +52,5 @@ class SlownessLaw(Law):
     name = "slowness"
     evolution = staticmethod(evolution)
     stress_left = staticmethod(stress_left)
+    scale_free = True
     orbits_close = True  # Ranjith and Rice (1999)

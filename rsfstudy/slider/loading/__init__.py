@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from rsfstudy.slider.parts import Part, found_in
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import Part, found_in, number
 
 
 class Segment(NamedTuple):
@@ -29,6 +30,15 @@ class Segment(NamedTuple):
     displacement: float = 0.0
     duration: float = math.inf
 
+    def as_dict(self) -> dict[str, float]:
+        """The segment as `protocol` takes it."""
+        stated = {"velocity": self.load_velocity}
+        if self.displacement:
+            stated["step"] = self.displacement
+        if self.duration < math.inf:
+            stated["duration"] = self.duration
+        return stated
+
 
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
@@ -38,6 +48,33 @@ class Loading(Part):
     def segments(self) -> tuple[Segment, ...]:
         """The history; its last segment goes on for ever."""
         raise TypeError(f"{type(self).__name__} loads nothing")
+
+    @property
+    def is_a_step(self) -> bool:
+        """Whether it changes anything about steady sliding at V_*."""
+        return any(s.load_velocity != 1.0 or s.displacement for s in self.segments)
+
+    @classmethod
+    def refuse(cls, name: str, value: Any) -> InvalidValue:
+        callers = {p.called_by for p in PARTS.values() if name in p.__dataclass_fields__} - {name}
+        wanted = " or ".join(filter(None, callers))
+        remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
+        return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy=remedy)
+
+
+def last_velocity() -> Any:
+    """The field of the load point velocity that a history of several segments ends with, or that a
+    step leads to.
+    """
+    return number(
+        None,
+        "$V_0/V_*$",
+        "1",
+        "load point velocity after the step",
+        rule="must be 0 or greater",
+        remedy="0 holds the load point.",
+        scale="V_*",
+    )
 
 
 PARTS = found_in(__name__, __path__)

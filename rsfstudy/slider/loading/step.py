@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.loading import Loading, Segment, last_velocity
 from rsfstudy.slider.parts import number
 
 
@@ -12,15 +12,7 @@ from rsfstudy.slider.parts import number
 class Step(Loading):
     """Load point velocity after the step, and displacement in the step."""
 
-    load_velocity_ratio: float | None = number(
-        None,
-        "$V_0/V_*$",
-        "1",
-        "load point velocity after the step",
-        rule="must be 0 or greater",
-        remedy="0 holds the load point.",
-        scale="V_*",
-    )
+    load_velocity_ratio: float | None = last_velocity()
     displacement_step: float = number(
         0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", scale="D_c"
     )

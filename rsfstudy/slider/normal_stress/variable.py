@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import Function, Numbers, number
+from rsfstudy.slider.parts import Function, Numbers, number, reads
+from rsfstudy.slider.slots import LARGEST_RATIO, SMALLEST_RATIO
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 OWN = 0
-#: Normal stress ratios outside of this only occur in trial steps; the clamp keeps them finite.
-SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -111,6 +110,7 @@ class Variable(NormalStress):
     def weakest(self, scene: Scene) -> float:
         return -1.0 / self.cot_phi
 
+    @reads("phi", "mu_star")
     def check(self, scene: Scene) -> None:
         """An angle at which normal stress varies, and sigma_3 is positive."""
         if self.phi >= 90.0:

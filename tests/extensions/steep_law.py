@@ -1,6 +1,5 @@
-"""A law of state evolution: that of Perrin, Rice and Zheng (1995), symmetric about steady sliding.
-
-``dtheta/dt = 1 - (theta V/(2 D_c))**2`` is ``dTheta = -b sinh(Theta/b + ln V)`` per slip in D_c.
+"""A law of state evolution that is symmetric about steady sliding, and steep away from it:
+``dTheta = -(b/2) sinh[2 (Theta/b + ln V)]`` per slip in D_c.
 """
 
 import math
@@ -17,21 +16,21 @@ FARTHEST = 300.0
 
 def evolution(log_rate, state, p):
     b = p[OWN]
-    return -b * math.sinh(max(-FARTHEST, min(state / b + log_rate, FARTHEST)))
+    return -0.5 * b * math.sinh(2.0 * max(-FARTHEST, min(state / b + log_rate, FARTHEST)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class PerrinRiceZheng(Law):
-    name = "perrin_rice_zheng"
+class SteepLaw(Law):
+    name = "steep"
     evolution = staticmethod(evolution)
 
 
 study = Study(
-    name="symmetric_law",
-    title="Critical displacement step of a law that is symmetric about steady sliding",
+    name="steep_law",
+    title="Critical displacement step of a law that is steep away from steady sliding",
     base=Scene(normal_stress="constant", instability_norm=1e6),
     axes=[
-        Axis("law", ["slip", PerrinRiceZheng]),
+        Axis("law", ["slip", SteepLaw]),
         Axis("stiffness_ratio", [0.5, 1.0, 2.0]),
     ],
     measure=CriticalStep(of="displacement_step"),

@@ -1,0 +1,213 @@
+"""The cells of a study as columns of numbers: blocks of cells whose scenes differ in numbers only.
+
+What an axis sets decides with which parts a scene is made; most of its rows differ in nothing but a
+number. So the values along each axis are checked once, and no scene is made of a cell before it is
+computed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.declare.axis import Row, kinds
+from rsfstudy.declare.cell import Rows
+from rsfstudy.declare.study import Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import checked
+from rsfstudy.slider.scene import Scene
+
+
+@dataclass(frozen=True)
+class Block:
+    """The cells whose rows are of the same kind on each axis.
+
+    Attributes
+    ----------
+    rows : tuple of ndarray of int
+        Their rows on each axis.
+    head : Scene
+        The scene of the first.
+    names : tuple of str
+        Fields of the scene in which the others differ from it.
+    """
+
+    rows: tuple[np.ndarray, ...]
+    head: Scene
+    names: tuple[str, ...]
+
+
+class Table:
+    """The cells of a study, checked along its axes.
+
+    Parameters
+    ----------
+    study : Study
+
+    Attributes
+    ----------
+    blocks : list of Block
+        In the order of their first cells.
+
+    Raises
+    ------
+    InvalidValue
+        For a cell that makes no meaningful scene, naming its place on the axes; and for a field
+        that no cell has.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self._of_scene = frozenset(study.scene_fields)
+        #: The axis of each field of the measure that varies, and of each of the scene.
+        self._of_measure = [p for p, a in enumerate(study.axes) if set(a.fields) - self._of_scene]
+        self._places = {
+            name: place
+            for place, axis in enumerate(study.axes)
+            for name in axis.fields
+            if name in self._of_scene
+        }
+        self._kind = [kinds(axis.rows) for axis in study.axes]
+        self._shape = tuple(int(kind.max()) + 1 for kind in self._kind)
+        self._columns = {name: self._column(name) for name in self._places}
+        self.blocks: list[Block] = []
+        wrong: list[int] = []
+        for kind in np.ndindex(self._shape):
+            rows = tuple(np.flatnonzero(k == n) for k, n in zip(self._kind, kind, strict=True))
+            wrong += self._add(rows)
+        if wrong:
+            study.cell(min(wrong))  # which raises
+        study.refuse(self._unused())
+
+    def _column(self, name: str) -> np.ndarray:
+        """A field along its axis; NaN where it is no number."""
+        values = (row.get(name) for row in self.study.axes[self._places[name]].rows)
+        return np.array([v if isinstance(v, float) else math.nan for v in values])
+
+    def _unused(self) -> set[str]:
+        scenes = [block.head.as_dict() for block in self.blocks]
+        return {n for n in self._places if all(scene.get(n) is None for scene in scenes)}
+
+    # ---- checking -------------------------------------------------------------------------------
+
+    def _add(self, rows: tuple[np.ndarray, ...]) -> list[int]:
+        """Add the block of the cells with these rows; the numbers of the first that are no
+        meaningful scenes.
+        """
+        first = [int(along[0]) for along in rows]
+        number = self._number(first)
+        try:
+            head = self.study.scene(number)
+        except InvalidValue:
+            return [number]
+        block = Block(rows, head, self._varying(head, rows))
+        self.blocks.append(block)
+        wrong = [
+            self._number([*first[:place], row, *first[place + 1 :]])
+            for name in block.names
+            for place in [self._places[name]]
+            for row in rows[place].tolist()
+            if not _is_right(head, name, float(self._columns[name][row]))
+        ]
+        return wrong or self._at_odds(block, first)
+
+    def _varying(self, head: Scene, rows: tuple[np.ndarray, ...]) -> tuple[str, ...]:
+        """The fields of the block's scenes that hold numbers of their own."""
+        return tuple(
+            name
+            for name, place in self._places.items()
+            if head.owner(name) and not np.isnan(self._columns[name][rows[place][0]])
+        )
+
+    def _at_odds(self, block: Block, first: Sequence[int]) -> list[int]:
+        """The cells that a part refuses: of each part, the first."""
+        found = []
+        for part in {type(part): part for part in block.head.parts}.values():
+            read = part.checked_by()
+            names = tuple(n for n in block.names if read is None or n in read)
+            axes = sorted({self._places[name] for name in names})
+            for rows in itertools.product(*(block.rows[place].tolist() for place in axes)):
+                at = dict(zip(axes, rows, strict=True))
+                values = [float(self._columns[n][at[self._places[n]]]) for n in names]
+                if not _goes_together(block.head, names, values, type(part)):
+                    found.append(self._number([at.get(p, f) for p, f in enumerate(first)]))
+                    break
+        return found
+
+    def _number(self, rows: Sequence[int]) -> int:
+        return int(np.ravel_multi_index(tuple(rows), self.study.shape))
+
+    # ---- cells ----------------------------------------------------------------------------------
+
+    @cached_property
+    def _block_of(self) -> dict[int, Block]:
+        """The blocks, by the numbers of their kinds."""
+        return {int(self._kinds_at([r[:1] for r in b.rows])[0]): b for b in self.blocks}
+
+    def _kinds_at(self, rows: Sequence[np.ndarray]) -> np.ndarray:
+        along = [kind[row] for kind, row in zip(self._kind, rows, strict=True)]
+        return np.asarray(np.ravel_multi_index(along, self._shape))
+
+    def split(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, Block, list[np.ndarray]]]:
+        """Cells by their blocks: their places among the numbers, the block, and their rows."""
+        rows = np.unravel_index(numbers, self.study.shape)
+        found = self._kinds_at(rows)
+        for kind in np.unique(found).tolist():
+            at = np.flatnonzero(found == kind)
+            yield at, self._block_of[kind], [along[at] for along in rows]
+
+    def columns(self, block: Block, rows: Sequence[np.ndarray]) -> np.ndarray:
+        """The numbers that vary in a block, a row of them for each field."""
+        values = [self._columns[name][rows[self._places[name]]] for name in block.names]
+        return np.array(values).reshape(len(values), len(rows[0]))
+
+    def changes(self, rows: Sequence[np.ndarray]) -> list[dict[str, Any]]:
+        """What cells change of the fields of the measure; nothing, where no axis varies them."""
+        if not self._of_measure:
+            return []
+        axes = [(self.study.axes[p].rows, rows[p].tolist()) for p in self._of_measure]
+        return [
+            {n: v for (all_, _), r in zip(axes, at, strict=True) for n, v in self._of(all_[r])}
+            for at in zip(*(places for _all, places in axes), strict=True)
+        ]
+
+    def _of(self, row: Row) -> Iterator[tuple[str, Any]]:
+        return ((n, v) for n, v in row.items() if n not in self._of_scene)
+
+    def rows(self, numbers: np.ndarray) -> Iterator[Rows]:
+        """Cells, block after block, to be computed."""
+        for _at, block, rows in self.split(numbers):
+            yield Rows(block.head, block.names, self.columns(block, rows), self.changes(rows))
+
+    def ordered(self, numbers: np.ndarray) -> np.ndarray:
+        """The same cells, block after block."""
+        return np.concatenate([numbers[at] for at, _block, _rows in self.split(numbers)])
+
+
+def _is_right(head: Scene, name: str, value: float) -> bool:
+    owner = head.owner(name)
+    assert owner is not None
+    try:
+        checked(owner, name, value)
+    except InvalidValue:
+        return False
+    return True
+
+
+def _goes_together(
+    head: Scene, names: tuple[str, ...], values: Sequence[float], kind: type
+) -> bool:
+    try:
+        (scene,) = head.varied(names, [values])
+        for part in scene.parts:
+            if type(part) is kind:
+                part.check(scene)
+    except InvalidValue:
+        return False
+    return True

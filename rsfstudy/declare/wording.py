@@ -1,0 +1,29 @@
+"""Values as a reader wants them: in tables, titles and messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+#: Most values of a list that are shown.
+_MOST_SHOWN = 8
+
+
+def settings(overrides: Mapping[str, Any]) -> str:
+    """Overrides as one types them, long lists cut short."""
+    texts = {
+        name: value if isinstance(value, list) else [value] for name, value in overrides.items()
+    }
+    return ", ".join(f"{name}={_listed(values)}" for name, values in texts.items())
+
+
+def _listed(values: Sequence[Any]) -> str:
+    shown = [short(value) for value in values]
+    return ",".join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
+
+
+def short(value: Any) -> str:
+    """A value with the digits a reader wants."""
+    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)

@@ -1,0 +1,197 @@
+"""What a motion is like after many events: their peaks, after how many it repeats itself, and the
+Floquet multipliers of the cycle of one event, which tell where its period doubles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rsfstudy.boundaries.cycles import LN10, Cycle
+from rsfstudy.boundaries.periods import Course, Orbit, ReturnMap, course
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, without_period
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.loading import Segment
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_BY_CHANCE = 0.02
+
+_QUANTITIES = (
+    PERIOD,
+    Quantity("event", "", "1", "number of the event, of those that are kept"),
+    Quantity("event_interval", "$t_r V_*/D_c$", "1", "time from an event to the next", "D_c/V_*"),
+    Quantity(
+        "peak_spread", "", "1", "decimal logarithm of the fastest over the slowest of the peaks"
+    ),
+    Quantity(
+        "floquet_multiplier",
+        r"$\mathrm{Re}\,\Lambda_1$",
+        "1",
+        "Floquet multiplier of the cycle of one event that is largest in size, its real part",
+    ),
+    Quantity(
+        "floquet_multiplier_imaginary",
+        r"$\mathrm{Im}\,\Lambda_1$",
+        "1",
+        "imaginary part of that Floquet multiplier",
+    ),
+    Quantity(
+        "floquet_multiplier_size",
+        r"$|\Lambda_1|$",
+        "1",
+        "size of that Floquet multiplier: the cycle of one event attracts below 1",
+    ),
+    Quantity(
+        "one_event_log10_peak",
+        r"$\log_{10}(V_{peak}/V_*)$",
+        "1",
+        "decimal logarithm of the peak slip rate over V_star of the cycle of one event, whether it "
+        "attracts or not",
+    ),
+    Quantity(
+        "lyapunov_exponent",
+        r"$\lambda$",
+        "1",
+        "logarithm of the growth of small departures per event, in the mean: positive in chaos",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Bifurcation(Measure):
+    """Peaks of slip rate after a transient, event by event, under a steady load point velocity.
+
+    A cycle of one event is looked for too, whether it attracts or not, close to where the motion
+    comes closest to repeating itself. Its Floquet multipliers are the eigenvalues of the derivative
+    of the map of states from one maximum of spring stress to the next: where one passes -1, the
+    period doubles. The period is that of a cycle that closes to the accuracy and attracts; without
+    one the motion ends as `not_periodic`, with all numbers but those of a period. Peaks of chaotic
+    motion have no error estimate, because no accuracy would reproduce them; the number of events in
+    a period has none because it is whole.
+
+    Parameters
+    ----------
+    transient : int
+        Events that are left out.
+    events : int
+        Events that are kept, along `event`.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; Becker (2000), in AGU
+    Geophys. Monogr. 120, 5-26.
+    """
+
+    transient: int = 64
+    events: int = 32
+    name: ClassVar[str] = "bifurcation"
+
+    def __post_init__(self) -> None:
+        if self.transient < 0:
+            raise InvalidValue("transient", self.transient, "must be 0 or greater")
+        if self.events < 4:
+            raise InvalidValue("events", self.events, "must be at least 4")
+
+    @property
+    def headline(self) -> str:
+        return "period_events"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        scalars = (
+            "period_events",
+            "period_events_error",
+            "floquet_multiplier",
+            "floquet_multiplier_error",
+            "floquet_multiplier_imaginary",
+            "floquet_multiplier_size",
+            "one_event_log10_peak",
+            "one_event_log10_peak_error",
+            "lyapunov_exponent",
+            "peak_spread",
+            "critical_stiffness",
+        )
+        along = dict.fromkeys(("peak_log10_slip_rate", "event_interval"), ("event",))
+        return dict.fromkeys(scalars, ()) | along
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"event": np.arange(1, self.events + 1)}
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
+
+    @property
+    def typical_work(self) -> int:
+        return 120_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the events, and close the cycle of one event at two accuracies."""
+        if scene.log_load_rate == -math.inf:
+            return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
+        if not scene.parts.loading.is_a_step:
+            scene = scene.under(Segment(1.0, NUDGE))
+        came = course(scene, accuracy, meter, self.transient + self.events, to_its_end=True)
+        if came is None:
+            return SETTLES
+        values = self._of_events(scene, came.seen[-self.events :])
+        values |= _of_one_event(scene, accuracy, came, meter)
+        if came.orbit is None:
+            kept = came.seen[-self.events :]
+            values["lyapunov_exponent"] = ReturnMap(scene, accuracy, meter).growth(kept)
+            ended = without_period(scene, came)
+            return Outcome(ended.status, values, ended.message)
+        values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
+        values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
+        return Outcome(Status.OK, values)
+
+    def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
+        """What is told of the events that are kept."""
+        peaks = np.array([cycle.fastest / LN10 for cycle in seen])
+        return {
+            "peak_log10_slip_rate": peaks,
+            "event_interval": np.array([cycle.interval for cycle in seen]),
+            "peak_spread": float(np.ptp(peaks)),
+            "critical_stiffness": scene.critical_stiffness,
+        }
+
+
+def _of_one_event(
+    scene: Scene, accuracy: Accuracy, came: Course, meter: Meter
+) -> dict[str, float | np.ndarray]:
+    """The cycle of one event, if the motion comes close to one."""
+    one = ReturnMap(scene, accuracy, meter).of_one_event(came.seen)
+    if one is None:
+        return {}
+    begin, swing = np.array(one.events[0].begin.psis), one.events[0].swing
+    again = ReturnMap(scene, accuracy.refined(), meter).orbit(begin, 1, swing)
+    if again is None:
+        return {}
+    chance = _BY_CHANCE * accuracy.rtol
+    (first, *_), (same, *_) = one.multipliers, again.multipliers
+    peaks = [orbit.events[0].fastest / LN10 for orbit in (one, again)]
+    return {
+        "floquet_multiplier": float(first.real),
+        "floquet_multiplier_error": error_between(first.real, same.real, chance),
+        "floquet_multiplier_imaginary": float(abs(first.imag)),
+        "floquet_multiplier_size": float(abs(first)),
+        "one_event_log10_peak": peaks[0],
+        "one_event_log10_peak_error": error_between(peaks[0], peaks[1], chance),
+    }
+
+
+def _growth_of_cycle(orbit: Orbit) -> float:
+    """The Lyapunov exponent of a cycle."""
+    size = float(abs(orbit.multipliers[0]))
+    return math.log(size) / orbit.period if size else -math.inf

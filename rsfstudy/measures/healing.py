@@ -1,0 +1,200 @@
+"""Healing: what a hold of the load point does to friction, as an experimenter reads it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event, Kind, maximum, settling
+from rsfstudy.motion.readings import (
+    FRICTION,
+    LOAD_POINT,
+    friction_at,
+    friction_of,
+    load_point_of,
+    watched,
+)
+from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_BY_CHANCE = 0.01
+#: Part of the largest distance from steady sliding at which there is no more peak to come.
+_SETTLED = 1e-6
+
+_READ = (
+    Quantity(
+        "healing",
+        r"$\Delta\mu$",
+        "1",
+        "healing: peak friction on reloading less friction before the hold",
+    ),
+    Quantity(
+        "relaxation",
+        r"$\Delta\mu_c$",
+        "1",
+        "change of friction during the hold: that at its end less that before",
+    ),
+    Quantity(
+        "peak_displacement",
+        r"$\delta_0/D_c$",
+        "1",
+        "load point displacement from reloading to the peak of friction",
+        "D_c",
+    ),
+)
+
+
+class _Record(NamedTuple):
+    """What a motion tells of a hold: its beginning, reloading, the peak, and what was recorded."""
+
+    begin: Event
+    reload: Event
+    peak: Event | None
+    rows: np.ndarray
+
+
+@dataclass(frozen=True)
+class Healing(Measure):
+    """What the first hold of a loading shows, by the definitions of the laboratory.
+
+    With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
+    mu_h - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
+
+    Parameters
+    ----------
+    record : float
+        Load point displacement after the peak that is recorded, in D_c.
+    phases : int
+        Points of the record that are kept along `phase`.
+
+    References
+    ----------
+    Dieterich (1972), J. Geophys. Res. 77, 3690-3697; Marone (1998), Nature 391, 69-72.
+    """
+
+    record: float = 10.0
+    phases: int = 300
+    name: ClassVar[str] = "healing"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.record < math.inf:
+            raise InvalidValue("record", self.record, "must be positive and finite")
+        if self.phases < 2:
+            raise InvalidValue("phases", self.phases, "must be at least 2")
+
+    @property
+    def headline(self) -> str:
+        return "healing"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        read = [about.name for about in _READ]
+        profiles = ("time", "load_point_displacement", "slip", "friction_coefficient")
+        return dict.fromkeys((*read, *(f"{name}_error" for name in read)), ()) | dict.fromkeys(
+            (*profiles, "log10_slip_rate"), ("phase",)
+        )
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return (*_READ, FRICTION, LOAD_POINT)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"phase": np.linspace(0.0, 1.0, self.phases)}
+
+    @property
+    def typical_work(self) -> int:
+        return 4_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the motion, and once more with smaller tolerances for the errors."""
+        history = scene.parts.loading.segments
+        holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
+        if not holds:
+            return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
+        if history[holds[0] + 1].load_velocity == 0.0:
+            return Outcome(Status.NOT_APPLICABLE, message="the hold is followed by another")
+        if any(segment.displacement for segment in history[holds[0] : holds[0] + 2]):
+            why = "the load point is displaced as the hold begins or ends"
+            return Outcome(Status.NOT_APPLICABLE, message=why)
+        first = _follow(scene, holds[0], accuracy, meter)
+        if first.peak is None:
+            values = {"relaxation": _relaxation(scene, first)}
+            return Outcome(Status.NOT_APPLICABLE, values, "no peak of friction on reloading")
+        goes_on = self.record / history[holds[0] + 1].load_velocity
+        ends = math.fsum(segment.duration for segment in history[: holds[0] + 2])
+        until = min(first.peak.time + goes_on, ends)
+        again = _follow(scene, holds[0], accuracy.refined(), meter, until)
+        if again.peak is None:
+            return Outcome(Status.UNVERIFIED, message="smaller tolerances find no peak")
+        values, finer = _read(scene, first, first.peak), _read(scene, again, again.peak)
+        errors = {
+            f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
+            for name, value in values.items()
+        }
+        return Outcome(Status.OK, {**values, **errors, **self._shown(scene, again)})
+
+    def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
+        """The record itself, from the beginning of the hold on."""
+        path = along_path(record.rows, self.phases)
+        rows = np.column_stack([path[name] for name in OBSERVED])
+        moved = load_point_of(scene, rows)
+        return {
+            "time": path["time"] - record.begin.time,
+            "load_point_displacement": moved - moved[0],
+            "slip": path["slip"] - path["slip"][0],
+            "friction_coefficient": friction_of(rows),
+            "log10_slip_rate": path["log10_slip_rate"],
+        }
+
+
+def _follow(
+    scene: Scene, hold: int, accuracy: Accuracy, meter: Meter, until: float = math.inf
+) -> _Record:
+    """From before the hold to the peak, or to where friction has settled or the next segment begins
+    without one; or as long as told, or as the motion can go on after the peak.
+    """
+    begun: list[Event] = []
+    peak, recording, watch = None, Recording(), maximum(watched(scene)[0])
+    watches = (watch, settling(_SETTLED, ends=until == math.inf))
+    motion = follow(scene, accuracy, meter, watches, clock=True, recording=recording, until=until)
+    try:
+        for event in motion:
+            if event.kind in (Kind.START, Kind.SEGMENT):
+                begun.append(event)
+            elif event.watch == watch and len(begun) == hold + 2 and peak is None:
+                peak = event
+            over = peak is not None or len(begun) > hold + 2
+            if over and until == math.inf:
+                break
+    except Halt:
+        if peak is None:
+            raise
+    rows = recording.seen(scene)
+    return _Record(begun[hold], begun[hold + 1], peak, rows[rows[:, 0] >= begun[hold].time])
+
+
+def _relaxation(scene: Scene, record: _Record) -> float:
+    return friction_at(scene, record.reload.point) - friction_at(scene, record.begin.point)
+
+
+def _read(scene: Scene, record: _Record, peak: Event) -> dict[str, float]:
+    before = friction_at(scene, record.begin.point)
+    longer = (peak.point.spring - record.reload.point.spring) / scene.stiffness
+    return {
+        "healing": friction_at(scene, peak.point) - before,
+        "relaxation": _relaxation(scene, record),
+        "peak_displacement": peak.slip - record.reload.slip + longer,
+    }

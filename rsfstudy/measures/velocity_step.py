@@ -1,0 +1,316 @@
+"""A step of load point velocity, as an experimenter reads it off friction against displacement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
+from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_at, friction_of, watched
+from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.steady import steady_excess
+from rsfstudy.status import Status
+
+#: Part of the record, at its end, over which friction must stay, and within which part of the
+#: direct effect.
+_LAST, _STAYS = 0.1, 0.01
+#: Part of ln r within which slip is steady before the step.
+_STEADY = 1e-3
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_BY_CHANCE = 0.01
+
+_READ = (
+    Quantity("apparent_a", "$a$", "1", "direct effect parameter as read off"),
+    Quantity("apparent_b", "$b$", "1", "evolution effect parameter as read off"),
+    Quantity("apparent_a_minus_b", "$a-b$", "1", "rate dependence of friction as read off"),
+    Quantity(
+        "apparent_slip_distance",
+        "$D_c$",
+        "1",
+        "load point displacement from the peak until 1/e of the evolution is left",
+        "D_c",
+    ),
+    Quantity(
+        "corrected_slip_distance",
+        "$D_c$",
+        "1",
+        "slip from the peak until 1/e of the evolution is left",
+        "D_c",
+    ),
+    Quantity("peak_friction", r"$\mu$", "1", "friction coefficient at the peak after the step"),
+    Quantity("friction_before", r"$\mu$", "1", "friction coefficient just before the step"),
+    Quantity("friction_after", r"$\mu$", "1", "friction coefficient at the end of the record"),
+)
+_OTHERS = (
+    Quantity("settled", "", "1", "whether friction has settled at the end of the record"),
+    Quantity(
+        "closed_form_departure",
+        "",
+        "1",
+        "largest departure of friction, from the peak on, from that of a stiff slider",
+    ),
+    FRICTION,
+    LOAD_POINT,
+)
+
+
+class _Step(NamedTuple):
+    """The step that is read: velocities in V_*, when it begins, and how long it is recorded."""
+
+    before: float
+    after: float
+    begins: float
+    lasts: float
+
+    @property
+    def ratio(self) -> float:
+        """ln r, the logarithm of the velocity after over that before."""
+        return math.log(self.after / self.before)
+
+
+class _Record(NamedTuple):
+    """What a motion tells of a step: where the record begins and ends, the peak between if there is
+    one, and what was recorded.
+    """
+
+    begin: Event
+    peak: Event | None
+    end: Event
+    rows: np.ndarray
+
+
+@dataclass(frozen=True)
+class VelocityStep(Measure):
+    """What one step of load point velocity shows, by the definitions of the laboratory.
+
+    With mu_0 before the step by a factor r, mu_p at the first extremum after it (a peak of a step
+    up, a trough of a step down) and mu_1 at the end of the record:
+
+        a = (mu_p - mu_0)/ln r,   b = (mu_p - mu_1)/ln r,   a - b = (mu_1 - mu_0)/ln r;
+
+    D_c is the displacement from the extremum until mu_1 + (mu_p - mu_1)/e, of the load point as
+    recorded, and of slip, which is that less the shortening of the spring. Nothing is corrected for
+    the stiffness of the rig: what a soft spring does to the numbers is what is measured. Friction
+    has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record.
+
+    Parameters
+    ----------
+    step_number : int
+        Which segment of the loading to read.
+    record : float
+        Longest load point displacement after the step that is recorded, in D_c; at the next step
+        the record ends.
+    phases : int
+        Points of the record that are kept along `phase`.
+
+    References
+    ----------
+    Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696, Fig. 3.
+    """
+
+    step_number: int = 1
+    record: float = 20.0
+    phases: int = 400
+    name: ClassVar[str] = "velocity_step"
+
+    def __post_init__(self) -> None:
+        if self.step_number < 1:
+            raise InvalidValue("step_number", self.step_number, "must be at least 1")
+        if not 1.0 <= self.record < math.inf:
+            raise InvalidValue("record", self.record, "must be at least 1 D_c, and finite")
+        if self.phases < 2:
+            raise InvalidValue("phases", self.phases, "must be at least 2")
+
+    @property
+    def headline(self) -> str:
+        return "apparent_a_minus_b"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        read = [about.name for about in _READ]
+        scalars = (*read, *(f"{name}_error" for name in read))
+        others = ("settled", "closed_form_departure")
+        profiles = ("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
+        return dict.fromkeys((*scalars, *others), ()) | dict.fromkeys(profiles, ("phase",))
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return (*_READ, *_OTHERS)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"phase": np.linspace(0.0, 1.0, self.phases)}
+
+    @property
+    def typical_work(self) -> int:
+        return 8_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the motion twice, the second time told where 1/e is left; and both once more with
+        smaller tolerances for the errors.
+        """
+        step = self._step(scene)
+        if isinstance(step, Outcome):
+            return step
+        record = self._follow(scene, step, accuracy, meter)
+        values = self._read(scene, step, record, accuracy, meter)
+        finer = accuracy.refined()
+        again = self._read(scene, step, self._follow(scene, step, finer, meter), finer, meter)
+        errors = {
+            f"{name}_error": error_between(value, again[name], _BY_CHANCE * accuracy.rtol)
+            for name, value in values.items()
+        }
+        shown = self._shown(scene, step, record)
+        return Outcome(Status.OK, {**values, **errors, **shown})
+
+    def _step(self, scene: Scene) -> _Step | Outcome:
+        """The step to read; or why there is none."""
+        history = scene.parts.loading.segments
+        if self.step_number > len(history):
+            text = f"the loading has {len(history)} segments"
+            return Outcome(Status.NOT_APPLICABLE, message=text)
+        earlier, own = history[: self.step_number - 1], history[self.step_number - 1]
+        before = earlier[-1].load_velocity if earlier else 1.0
+        if own.load_velocity == before:
+            return Outcome(Status.NO_STEP, message="the load point goes on as before")
+        if not own.load_velocity or not before or own.displacement:
+            text = "a hold or a displacement is no step of velocity"
+            return Outcome(Status.NOT_APPLICABLE, message=text)
+        begins = math.fsum(segment.duration for segment in earlier)
+        lasts = min(own.duration, self.record / own.load_velocity)
+        return _Step(before, own.load_velocity, begins, lasts)
+
+    def _follow(self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter) -> _Record:
+        turn, recording = _turn(scene, step), Recording()
+        begun: list[Event] = []
+        peak = None
+        for event in _events(scene, step, accuracy, meter, turn, recording):
+            if event.kind in (Kind.START, Kind.SEGMENT):
+                begun.append(event)
+            elif event.watch == turn and len(begun) == self.step_number and peak is None:
+                peak = event
+        rows = recording.seen(scene)
+        begin = begun[self.step_number - 1]
+        return _Record(begin, peak, event, rows[rows[:, 0] >= begin.time])
+
+    def _read(
+        self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
+    ) -> dict[str, float]:
+        """What is read off; of the peak nothing, where there is none."""
+        before, after = (friction_at(scene, e.point) for e in (record.begin, record.end))
+        top = friction_at(scene, record.peak.point) if record.peak else math.nan
+        left = self._left(scene, step, record, accuracy, meter)
+        moved, slipped = math.nan, math.nan
+        if left is not None and record.peak is not None:
+            moved = step.after * (left.time - record.peak.time)
+            slipped = left.slip - record.peak.slip
+        return {
+            "apparent_a": (top - before) / step.ratio,
+            "apparent_b": (top - after) / step.ratio,
+            "apparent_a_minus_b": (after - before) / step.ratio,
+            "apparent_slip_distance": moved,
+            "corrected_slip_distance": slipped,
+            "peak_friction": top,
+            "friction_before": before,
+            "friction_after": after,
+        }
+
+    def _left(
+        self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
+    ) -> Event | None:
+        """Where 1/e of the evolution is left, after the peak."""
+        if record.peak is None:
+            return None
+        after, top = (friction_at(scene, e.point) for e in (record.end, record.peak))
+        of, above = watched(scene)
+        level = after + (top - after) / math.e - above
+        watch = fall(of, level) if step.ratio > 0.0 else rise(of, level)
+        for event in _events(scene, step, accuracy, meter, watch):
+            if event.watch == watch and event.time > record.peak.time:
+                return event
+        return None
+
+    def _shown(self, scene: Scene, step: _Step, record: _Record) -> dict[str, float | np.ndarray]:
+        """Whether friction has settled, how far it departs from that of a stiff slider, and the
+        record itself.
+        """
+        rows, friction = record.rows, friction_of(record.rows)
+        late = record.end.time - _LAST * step.lasts
+        # there may be few samples, in long steps
+        last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
+        turned = record.peak or record.end
+        direct = friction_at(scene, turned.point) - friction[0]
+        path = along_path(rows, self.phases)
+        path_rows = np.column_stack([path[name] for name in OBSERVED])
+        return {
+            "settled": float(np.ptp(last) < _STAYS * abs(direct)),
+            "closed_form_departure": _departure(scene, step, record),
+            "load_point_displacement": step.after * (path["time"] - record.begin.time),
+            "slip": path["slip"] - rows[0, OBSERVED.index("slip")],
+            "friction_coefficient": friction_of(path_rows),
+            "log10_slip_rate": path["log10_slip_rate"],
+        }
+
+
+def _turn(scene: Scene, step: _Step) -> Watch:
+    of, _above = watched(scene)
+    return maximum(of) if step.ratio > 0.0 else minimum(of)
+
+
+def _events(
+    scene: Scene,
+    step: _Step,
+    accuracy: Accuracy,
+    meter: Meter,
+    watch: Watch,
+    recording: Recording | None = None,
+) -> Sequence[Event]:
+    """What happens up to the end of the record."""
+    end = step.begins + step.lasts
+    return list(follow(scene, accuracy, meter, [watch], clock=True, recording=recording, until=end))
+
+
+def _departure(scene: Scene, step: _Step, record: _Record) -> float:
+    """Largest departure of friction, from the peak on, from what a stiff slider shows after so much
+    slip: the steady change, ``(a - b) ln r`` by most laws, and ``b stress_left(ln r, slip)``; NaN
+    where there is no such form.
+    """
+    stress_left = scene.parts.law.stress_left
+    if stress_left is None or record.peak is None or not _has_closed_form(scene, step, record):
+        return math.nan
+    before, after = math.log(step.before), math.log(step.after)
+    steady = steady_excess(scene, after) - steady_excess(scene, before)
+    steady += scene.dynamics.radiated(after) - scene.dynamics.radiated(before)
+    slip = record.rows[:, OBSERVED.index("slip")]
+    later = record.rows[:, 0] >= record.peak.time
+    left = np.array([stress_left(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
+    expected = steady + scene.b * left
+    seen = (friction_of(record.rows) - friction_at(scene, record.begin.point))[later]
+    return float(np.abs(seen - expected).max())
+
+
+def _has_closed_form(scene: Scene, step: _Step, record: _Record) -> bool:
+    """Whether friction alone acts, and slides steadily before the step, at a rate from which the
+    law counts.
+    """
+    law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
+    stress_acts = stress.normal_stress or stress.state_effect or law.feels_stress
+    if stress_acts or stress.effects or fluid.unknowns:
+        return False
+    if not law.scale_free and step.before != 1.0:
+        return False
+    begin = record.begin.point
+    size = scene.a * law.size_over_a
+    away = max(abs(begin.log_rate - math.log(step.before)), begin.unrest / size)
+    return away < _STEADY * abs(step.ratio)

@@ -1,0 +1,1 @@
+"""Motions compiled by Numba: the same equations, the same events, much faster."""

@@ -1,0 +1,235 @@
+"""Compiles the motion of a combination of parts, once, and finds it again in a cache on disk.
+
+The functions of the equations are those that SciPy calls. Together with the plain functions of this
+folder they are copied, each name in them standing for its compiled copy, and compiled as one. What
+is compiled lies in a folder of its own, named by a digest of all that decides it, which is written
+aside, renamed when complete, and never changed; what does not hold its own digest is thrown away.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import json
+import os
+import shutil
+import sys
+import tempfile
+import time
+import types
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+import numpy as np
+from numba.core import config
+
+from rsfstudy.motion.engines import compiling
+
+#: Functions of this package know their places by name; those of equations are complete.
+_OURS = __package__
+_ENTRY = "motion.py"
+#: Modules that are as their version, or that of Python, says.
+_KNOWN_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
+_OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "nogil": True}
+_POINTERS = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
+#: Changes where what is kept is laid out or named in another way.
+_LAYOUT = 2
+#: Compiled functions whose addresses are in use.
+_ALIVE: list[Any] = []
+
+
+def cache_folder() -> Path:
+    """Where compiled motions are kept: in the folder that the system has for such things."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "rsfstudy" / "compiled"
+
+
+def filled(function: Callable[..., Any], places: Mapping[str, Any]) -> Callable[..., Any]:
+    """A copy of a function of this folder, and of those it reaches, with names for other things."""
+    copies: dict[int, Callable[..., Any]] = {}
+
+    def copy(plain: Any) -> Any:
+        if not isinstance(plain, types.FunctionType) or not plain.__module__.startswith(_OURS):
+            return plain
+        if id(plain) not in copies:
+            known, reached = plain.__globals__, {}
+            for name in plain.__code__.co_names:
+                if name in known:
+                    reached[name] = places[name] if name in places else copy(known[name])
+            copies[id(plain)] = types.FunctionType(
+                plain.__code__, {**known, **reached}, plain.__name__
+            )
+        return copies[id(plain)]
+
+    return copy(function)  # type: ignore[no-any-return]
+
+
+def digest_of(*functions: Callable[..., Any]) -> str:
+    """Digest of functions and of all that they reach, of the compiler and of the processor."""
+    content = _Content()
+    content.add(functions)
+    processor = llvmlite.binding.get_host_cpu_name(), str(llvmlite.binding.get_host_cpu_features())
+    content.add((_LAYOUT, numba.__version__, np.__version__, str(config.CPU_NAME), str(config.OPT)))
+    content.add(processor)
+    return content.digest.hexdigest()[:32]
+
+
+class _Content:
+    """Digests whatever a compiler can make a constant of."""
+
+    def __init__(self) -> None:
+        self.digest = hashlib.sha256()
+        self._seen: dict[int, int] = {}
+
+    def add(self, value: Any) -> None:
+        """Add a value, and what it refers to."""
+        if isinstance(value, types.FunctionType):
+            known = id(value) in self._seen
+            number = self._seen.setdefault(id(value), len(self._seen))
+            self._text(f"function {number}")
+            if not known:
+                self._code(value.__code__, value.__globals__)
+        elif isinstance(value, tuple | list | frozenset):
+            parts = sorted(value, key=repr) if isinstance(value, frozenset) else value
+            self._text(f"{len(value)} together")
+            for part in parts:
+                self.add(part)
+        elif isinstance(value, np.ndarray):
+            self._text(f"array {value.dtype} {value.shape}")
+            self.digest.update(value.tobytes())
+        elif isinstance(value, type):
+            members = list(value) if issubclass(value, Enum) else getattr(value, "_fields", ())
+            self._text(f"class {value.__qualname__} {members}")
+        else:
+            self._text(repr(value))
+
+    def _code(self, code: types.CodeType, known: Mapping[str, Any]) -> None:
+        self.digest.update(code.co_code)
+        self.add(code.co_varnames)
+        for constant in code.co_consts:
+            if isinstance(constant, types.CodeType):
+                self._code(constant, known)
+            else:
+                self.add(constant)
+        for name in code.co_names:
+            self._text(name)
+            value = known.get(name)
+            if not isinstance(value, types.ModuleType):
+                self.add(value)
+            elif value.__name__.partition(".")[0] not in _KNOWN_BY_VERSION:
+                # a compiler takes what is read from a module for a constant
+                self.add([getattr(value, read, None) for read in code.co_names])
+
+    def _text(self, text: str) -> None:
+        self.digest.update(text.encode() + b"\0")
+
+
+def called_from_python(function: Callable[..., Any], signature: Any) -> Any:
+    """A compiled function."""
+
+    def compile_for(entry: str) -> Any:
+        dispatcher = numba.njit(_reaching(function, entry), cache=bool(entry), **_OPTIONS)
+        dispatcher.compile(signature)
+        return dispatcher
+
+    return _kept(digest_of(function), compile_for)
+
+
+def called_by_address(
+    functions: Sequence[Callable[..., Any]], places: Mapping[str, Any]
+) -> tuple[int, ...]:
+    """Addresses of compiled functions of pointers to numbers, their names filled in."""
+    ready = [filled(function, places) for function in functions]
+
+    def compile_for(entry: str) -> list[Any]:
+        roots = (_reaching(function, entry) for function in ready)
+        return [numba.cfunc(_POINTERS, cache=bool(entry), **_OPTIONS)(root) for root in roots]
+
+    pointers = _kept(digest_of(*ready), compile_for)
+    _ALIVE.append(pointers)
+    return tuple(pointer.address for pointer in pointers)
+
+
+def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
+    """What is compiled, from the folder of that name where it is there and whole."""
+    folder = cache_folder() / name
+    if _whole(folder):
+        with contextlib.suppress(Exception):  # whatever a cache can be damaged by
+            return compile_for(str(folder / _ENTRY))
+    shutil.rmtree(folder, ignore_errors=True)
+    began = time.perf_counter()
+    with compiling.aside():
+        try:
+            return _compiled_aside(folder, compile_for)
+        except OSError:  # nothing can be kept
+            return compile_for("")
+        finally:
+            compiling.programs += 1
+            compiling.seconds += time.perf_counter() - began
+
+
+def _compiled_aside(folder: Path, compile_for: Callable[[str], Any]) -> Any:
+    """Compile in a folder of its own, which is then renamed."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    try:
+        entry = aside / _ENTRY
+        entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
+        os.utime(entry, (0, 0))  # Numba looks at its age
+        ready = compile_for(str(entry))
+        _seal(aside)
+        with contextlib.suppress(OSError):  # somebody else was faster
+            os.rename(aside, folder)
+        return ready
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _reaching(function: Any, entry: str = "") -> Any:
+    """A copy of a function whose names stand for compiled functions, as if it stood in a file.
+
+    Its own name tells its content: a linker takes functions of one name for one function, wherever
+    they come from, and Numba numbers its names anew in each process.
+    """
+    reached = {
+        name: _jitted(value)
+        for name in function.__code__.co_names
+        if isinstance(value := function.__globals__.get(name), types.FunctionType)
+    }
+    code = function.__code__.replace(co_filename=entry) if entry else function.__code__
+    copy = types.FunctionType(code, {**function.__globals__, **reached}, function.__name__)
+    content = _Content()
+    content.add(function)
+    copy.__qualname__ = f"{function.__name__}_{content.digest.hexdigest()[:32]}"
+    return copy
+
+
+@functools.cache
+def _jitted(function: Any) -> Any:
+    """A compiled function that only others call; those of several equations share it."""
+    inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return numba.njit(_reaching(function), **_OPTIONS, **inner)
+
+
+def _seal(folder: Path) -> None:
+    """Write down the digests of all files."""
+    files = {str(f.relative_to(folder)): _digest(f) for f in folder.rglob("*") if f.is_file()}
+    (folder / "digests.json").write_text(json.dumps(files))
+
+
+def _whole(folder: Path) -> bool:
+    """Whether a folder holds what was written."""
+    try:
+        files = json.loads((folder / "digests.json").read_text())
+        return all(_digest(folder / name) == digest for name, digest in files.items())
+    except (OSError, ValueError):
+        return False
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()

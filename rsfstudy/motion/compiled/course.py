@@ -1,0 +1,186 @@
+"""The course of a compiled motion: step by step through its regimes, until it is time to hand over.
+
+One compiled function serves all equations; `engine` calls it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rsfstudy.motion.compiled.calls import evaluate
+from rsfstudy.motion.compiled.happenings import (
+    EXCESS,
+    PASSED,
+    excess,
+    located,
+    passed_at_end,
+    record,
+    record_point,
+    tell,
+    tell_beginning,
+    tell_watched,
+)
+from rsfstudy.motion.compiled.order_eight import STAGES, copy
+from rsfstudy.motion.compiled.room import room
+from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, fill_point, take_step
+from rsfstudy.motion.compiled.table import (
+    CHANGE,
+    CHANGES,
+    END,
+    ENDED,
+    FAST,
+    FRICTION,
+    GROWTH,
+    HALTED,
+    HANDS_OVER,
+    LOG_RATE,
+    NO_LENGTH,
+    PSIS,
+    RATIO,
+    SLOW,
+    SPRING,
+)
+from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed
+from rsfstudy.motion.recording import SAMPLES
+from rsfstudy.slider.slots import LOAD_VELOCITY
+
+
+def advance(memory, y, scales, last, watches, told, rows, numbers, p):
+    """Follow a motion from where `memory` and `y` are.
+
+    Parameters
+    ----------
+    memory : ndarray of NOW, shape (1,)
+    y : ndarray
+        Unknowns, and behind them their rates.
+    scales : ndarray
+        Of the unknowns; those in a rupture follow those between ruptures.
+    last : ndarray
+        The last point of the regime before.
+    watches, told, rows : ndarray
+        What is watched for, what happens, and what is recorded.
+    numbers : tuple of float
+        The limits of the regimes.
+    p : ndarray
+        The numbers of the scene.
+
+    Returns
+    -------
+    int
+        Why it returns.
+    """
+    now = memory[0]
+    limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
+    end = CHANGES
+    while end == CHANGES:
+        of_regime = scales[: now.unknowns] if now.regime == SLOW else scales[now.unknowns :]
+        place = room(y, of_regime, now.states, len(watches))
+        end = through_regime(now, place, last, watches, told, rows, limits, p)
+        if end == CHANGES:
+            change_regime(now, y, last)
+            if is_full(now, watches, told, rows):
+                end = HANDS_OVER
+    return end
+
+
+def is_full(now, watches, told, rows):
+    """Whether the tables have no room for all that one more step may add to them."""
+    full = len(told) - now.told < 2 * len(watches) + 3
+    return full or (len(rows) > 0 and len(rows) - now.recorded < 2 * SAMPLES)
+
+
+def change_regime(now, y, last):
+    """Begin the other regime at the last point of one."""
+    y[0] = last[SPRING]
+    if now.regime == SLOW:
+        y[1], y[2] = last[LOG_RATE], last[FRICTION]
+        for i in range(1, now.states):
+            y[2 + i] = last[PSIS + i]
+    else:
+        for i in range(now.states):
+            y[1 + i] = last[PSIS + i]
+        y[1 + now.states] = 0.0
+    now.regime, now.begins = FAST - now.regime, CHANGE
+
+
+def through_regime(now, place, last, watches, told, rows, limits, p):
+    """Follow one regime; returns why it ends, or why the call has to."""
+    unknowns, recording = len(place.new), len(rows) > 0
+    if now.begins:
+        begin(now, place, p)
+    else:
+        for i in range(unknowns):
+            place.stages[0, i] = place.y[unknowns + i]
+    fill_point(now, place.y, place.stages[0], p, place.before)
+    while True:
+        taken = take_step(now, place, limits, p)
+        if taken != TAKEN:
+            return taken
+        fill_point(now, place.new, place.stages[STAGES], p, place.after)
+        if math.isnan(place.after[LOG_RATE]):
+            return NO_LENGTH
+        if now.ends_by_fate:
+            now.stress = place.after[RATIO]
+            now.fate = fate(place.after[LOG_RATE], now.stress, p[LOAD_VELOCITY])
+            if now.fate != GOES_ON:
+                return HALTED
+        leaves, over = cut_short(now, place, watches, limits, p)
+        if now.begins:
+            if recording:
+                record_point(now, rows, now.started, place.before, p)
+            if tell_beginning(now, place, last, watches, told, limits, p):
+                return ENDED
+        if recording:
+            record(now, place, rows, limits, p)
+        urgent = tell_watched(now, place, watches, told, limits, p)
+        if now.begins:
+            urgent, now.begins = max(urgent, 2 if now.begins != CHANGE else 1), 0
+        if urgent == 3:
+            return ENDED
+        if over:
+            tell(now, told, float(END), now.end, passed_at_end(now, place, limits), place.after, p)
+            return ENDED
+        if leaves or lands(now, place, limits, p):
+            now.started = passed_at_end(now, place, limits)
+            copy(place.after, last)
+            return CHANGES
+        move_on(now, place)
+        if urgent == 2 or is_full(now, watches, told, rows):
+            for i in range(unknowns):
+                place.y[unknowns + i] = place.stages[0, i]
+            return HANDS_OVER
+
+
+def cut_short(now, place, watches, limits, p):
+    """Let the step end where the regime has to be left, and where time is over; whether it is."""
+    before, after = excess(now, place.before, limits), excess(now, place.after, limits)
+    leaves = after >= 0.0 > before
+    if leaves:
+        cut(now, place, located(EXCESS, before, after, now, place, watches, limits, p), p)
+    over = passed_at_end(now, place, limits) >= now.lasts
+    if over:
+        at_begin = now.started + elapsed(now, now.clock, place.y, limits) - now.lasts
+        at_end = passed_at_end(now, place, limits) - now.lasts
+        cut(now, place, located(PASSED, at_begin, at_end, now, place, watches, limits, p), p)
+    return leaves, over
+
+
+def lands(now, place, limits, p):
+    """Whether the full equations have done their work."""
+    if now.regime == SLOW:
+        return False
+    columns, below = place.after, place.between
+    place.within[0] = columns[SPRING]
+    for i in range(now.states):
+        place.within[1 + i] = columns[PSIS + i]
+    evaluate(now.balance, place.within, place.within, p, below)
+    missing = columns[SPRING] - below[1]
+    return has_landed(columns[LOG_RATE], columns[GROWTH], below[0], missing, limits)
+
+
+def move_on(now, place):
+    """The end of a step is the beginning of the next."""
+    now.clock = now.end
+    copy(place.new, place.y)
+    copy(place.stages[STAGES], place.stages[0])
+    copy(place.after, place.before)

@@ -1,0 +1,66 @@
+"""Where the compiled motion finds and leaves its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: What a motion remembers from one call to the next.
+NOW = np.dtype(
+    [
+        ("direction", "f8"),  # of the clock: 1 or -1
+        ("tolerance", "f8"),
+        ("finer", "f8"),  # part of the longest steps at this tolerance
+        ("lasts", "f8"),  # time at which to end
+        ("started", "f8"),  # time at which the regime began
+        ("time", "f8"),  # time, slip and spring stress at the start
+        ("slip", "f8"),
+        ("spring", "f8"),
+        ("clock", "f8"),  # at the beginning of a step, and at its end
+        ("end", "f8"),
+        ("taken", "f8"),  # length of the step; its end may have been brought forward
+        ("length", "f8"),  # of the next step
+        ("budget", "i8"),  # right-hand sides, in all and spent by regime
+        ("spent_slow", "i8"),
+        ("spent_fast", "i8"),
+        ("steps", "i8"),
+        ("regime", "i8"),
+        ("begins", "i8"),  # what to tell before the first event of a regime
+        ("ends_by_fate", "i8"),  # whether the motion ends where it cannot go on
+        ("has_mass", "i8"),  # whether there are two regimes
+        ("has_clock", "i8"),  # whether time is an unknown between ruptures
+        ("strides", "i8"),  # whether the clock between ruptures is slip, which limits steps
+        ("anew", "i8"),  # whether the clock may start anew
+        ("is_dense", "i8"),  # whether dense output of the step is there
+        ("told", "i8"),  # rows of the table of events, and of the recording
+        ("recorded", "i8"),
+        ("fate", "i8"),  # why the motion cannot go on, and normal stress there
+        ("stress", "f8"),
+        ("unknowns", "i8"),  # between ruptures
+        ("states", "i8"),
+        ("slow_rates", "i8"),  # addresses of the equations
+        ("slow_point", "i8"),
+        ("fast_rates", "i8"),
+        ("fast_point", "i8"),
+        ("balance", "i8"),
+    ]
+)
+SLOW, FAST = 0, 1
+
+#: Columns of the table of watches.
+WATCHED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
+MAXIMUM, MINIMUM, RISE, FALL, SETTLED, MOMENT = range(6)
+
+#: Columns of the table of events; from POINT on, those of a point.
+CODE, REGIME, CLOCK, TIME, SLIP, STEPS, SPENT_SLOW, SPENT_FAST, POINT = range(9)
+#: Codes of events that are not asked for; those of others are the places of their watches.
+BEGIN, CHANGE, END = -1, -2, -3
+
+#: Columns of a point; its states follow.
+LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, UNREST, COEFFICIENT, RATIO = range(10)
+READING_GROWTH, PSIS = 10, 11
+#: What is watched that is no column: the friction coefficient that is read.
+READING = -1
+
+#: Why a call returns: to hand over what it has told; because the motion has ended; because the
+#: regime changes; or because it cannot go on.
+HANDS_OVER, ENDED, CHANGES, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH = range(7)

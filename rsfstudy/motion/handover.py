@@ -1,0 +1,115 @@
+"""When to change between the slow manifold and the full equations, and where motions end.
+
+Plain functions of floats, which every engine calls.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.forms import SLOWEST
+from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.slots import LARGEST_EXPONENT
+
+#: Normal stress over sigma_* at which the fault counts as open, and as locked.
+LOST, LOCKED = 1e-9, 1e6
+#: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
+UNBOUNDED = 120.0 * math.log(10.0)
+#: How a motion goes on, or why it cannot.
+GOES_ON, IS_LOST, IS_LOCKED, HAS_STOPPED, IS_UNBOUNDED = range(5)
+
+
+class Limits(NamedTuple):
+    """The numbers that decide when to change.
+
+    Attributes
+    ----------
+    norm : float
+        Slip rate norm at which to leave the slow manifold, which is a series in (K/a) w**2.
+    correction : float
+        Change of ln V by inertia up to which the slow manifold may be used.
+    landing : float
+        Slip in D_c that may remain when the full equations hand back.
+    softness : float
+        K/a.
+    a : float
+        Direct effect.
+    inertial_time : float
+        T V_*/(2 pi D_c).
+    """
+
+    norm: float
+    correction: float
+    landing: float
+    softness: float
+    a: float
+    inertial_time: float
+
+
+def limits(scene: Scene, accuracy: Accuracy) -> Limits:
+    """The limits of a scene with mass, at an accuracy."""
+    softness = scene.stiffness / scene.a
+    return Limits(
+        accuracy.switch_norm / math.sqrt(min(1.0, softness)),
+        accuracy.switch_correction,
+        accuracy.landing,
+        softness,
+        scene.a,
+        scene.inertial_time,
+    )
+
+
+def norm_at(log_rate: float, given: Limits) -> float:
+    """w = V T/(2 pi D_c)."""
+    return given.inertial_time * math.exp(min(log_rate, LARGEST_EXPONENT))
+
+
+def weight_of_mass(log_rate: float, missing: float, given: Limits) -> float:
+    """How much mass matters where friction differs from spring stress by what is `missing`: 1 where
+    the slow manifold has to be left.
+    """
+    correction = abs(missing) / given.a / given.correction
+    return max(norm_at(log_rate, given) / given.norm, correction)
+
+
+def slip_of_rise(log_rate: float, after: float, given: Limits) -> float:
+    """Slip in D_c, times the change of ln V, while slip rate goes to its value `after` a step; left
+    out, the state would miss the evolution of that slip.
+    """
+    norm = max(norm_at(log_rate, given), norm_at(after, given))
+    return given.softness * norm**2 * abs(after - log_rate)
+
+
+def has_landed(log_rate: float, growth: float, below: float, missing: float, given: Limits) -> bool:
+    """Whether the full equations have done their work at ln(V/V_*) and its growth, where the slow
+    manifold has ln(V/V_*) `below`, and friction differs from spring stress by what is `missing`.
+
+    The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
+    (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
+    unnoticed. And the slow manifold must not hand straight back.
+    """
+    if growth > 0.0 and log_rate > below + 1.0:
+        return False
+    norm = max(norm_at(log_rate, given), norm_at(below, given))
+    remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_rate - below))
+    settled = max(norm / given.norm, weight_of_mass(below, missing, given)) < 0.5
+    return settled and remaining < given.landing
+
+
+def fate(log_rate: float, normal_stress: float, load_velocity: float) -> int:
+    """Whether a motion goes on: not where normal stress vanishes, or normal stress or slip rate
+    grow without bound, or slip stops.
+
+    Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
+    """
+    if normal_stress <= LOST:
+        return IS_LOST
+    if normal_stress >= LOCKED:
+        return IS_LOCKED
+    if log_rate <= SLOWEST and load_velocity == 0.0:
+        return HAS_STOPPED
+    if log_rate >= UNBOUNDED:
+        return IS_UNBOUNDED
+    return GOES_ON

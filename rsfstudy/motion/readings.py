@@ -1,0 +1,49 @@
+"""What a rig reads of a motion: friction coefficient and load point displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsfstudy.motion.recording import OBSERVED
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.forms import Point
+from rsfstudy.slider.scene import Scene
+
+FRICTION = Quantity(
+    "friction_coefficient",
+    r"$\mu$",
+    "1",
+    "friction coefficient as a load cell reads it: stress of the spring over normal stress",
+)
+LOAD_POINT = Quantity(
+    "load_point_displacement", r"$\delta_0/D_c$", "1", "load point displacement", "D_c"
+)
+
+
+def friction_at(scene: Scene, point: Point) -> float:
+    """The friction coefficient that is read at a point of a motion."""
+    return (scene.mu_star + point.spring) / point.normal_stress
+
+
+def watched(scene: Scene) -> tuple[str, float]:
+    """What an engine watches to tell extrema and levels of the friction coefficient that is read,
+    and what it is above it: spring stress itself where nothing changes normal stress.
+    """
+    parts = scene.parts
+    if parts.normal_stress.normal_stress is None and not parts.fluid.unknowns:
+        return "spring", scene.mu_star
+    return "reading", 0.0
+
+
+def friction_of(table: np.ndarray) -> np.ndarray:
+    """The friction coefficient along a recorded motion."""
+    stress = table[:, OBSERVED.index("shear_stress")]
+    return np.asarray(stress / table[:, OBSERVED.index("normal_stress_ratio")])
+
+
+def load_point_of(scene: Scene, table: np.ndarray) -> np.ndarray:
+    """Load point displacement along a recorded motion, since before its first step: slip, and by
+    how much the spring is longer.
+    """
+    longer = (table[:, OBSERVED.index("shear_stress")] - scene.mu_star) / scene.stiffness
+    return np.asarray(table[:, OBSERVED.index("slip")] + longer)

@@ -1,0 +1,102 @@
+"""Options that several commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT
+from rsfstudy.files import places
+from rsfstudy.motion.engines import ENGINES
+
+#: Endings of figures, as `rsfstudy.plots` writes them.
+FIGURES = ("png", "pdf", "svg")
+
+every = click.option("--all", "every", is_flag=True, help="Every named study.")
+
+
+def directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
+    """A directory for results."""
+    return places.directory(value)
+
+
+output = click.option(
+    "--output",
+    type=click.Path(file_okay=False),
+    callback=directory,
+    default=places.DEFAULT,
+    show_default=True,
+    help="Directory of the results.",
+)
+drawn = click.option(
+    "--output",
+    type=click.Path(),
+    callback=directory,
+    help="Directory of the results and of the figure, or the figure itself, such as fig.pdf.  "
+    "[default: outputs, and beside a FILE]",
+)
+settings = click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="AXIS=VALUES",
+    help="Other values: a comma list, start:stop:count or start:stop:count:log.",
+)
+rtol = click.option(
+    "--rtol",
+    type=float,
+    help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
+)
+engine = click.option(
+    "--engine",
+    type=click.Choice(ENGINES),
+    help="What integrates motions; compiled, which needs Numba, is much faster.  "
+    "[default: the study's, scipy]",
+)
+workers = click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=2,
+    show_default=True,
+    help="Worker processes of this machine.",
+)
+serial = click.option("--serial", is_flag=True, help="Compute in this process.")
+scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
+time_limit = click.option(
+    "--time-limit",
+    type=float,
+    default=DEFAULT_TIME_LIMIT,
+    show_default=True,
+    help="Seconds of CPU time after which a worker gives a cell up.",
+)
+study = click.option(
+    "--study",
+    type=click.Path(path_type=Path),
+    help="File that declares the study, if its measure, a part or the figure is its own.",
+)
+quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
+
+
+def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
+    """A style that there is, found out before any work."""
+    if value is not None:
+        from rsfstudy.plots import styled
+
+        with styled(value):
+            pass
+    return value
+
+
+style = click.option(
+    "--style",
+    metavar="FILE",
+    callback=_style,
+    help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
+)
+figure = click.option(
+    "--figure",
+    "form",
+    type=click.Choice(FIGURES),
+    help="File format of figures.  [default: png]",
+)

@@ -1,0 +1,143 @@
+"""Axes of a lattice as axes of a figure: which are numbers, which of those want a log scale, and
+what their points are called.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from rsfstudy.plots._text import label, number, pretty, symbol, wrapped
+from rsfstudy.reduce.base import stated_by
+from rsfstudy.vocabulary import coverage, quantity
+
+#: Values that span more than this are drawn on a log axis.
+_WIDE = 100.0
+#: Log axes that span less than this have numbers between decades too.
+_NARROW = 50.0
+
+
+def is_numeric(dataset: xr.Dataset, dimension: str) -> bool:
+    """Whether the points of a dimension are numbers, not names or flags."""
+    points = dataset[dimension]
+    return points.dtype.kind in "fiu" and "flag_values" not in points.attrs
+
+
+def is_number(values: xr.DataArray) -> bool:
+    """Whether a variable holds numbers to be drawn."""
+    return values.dtype.kind in "fiub" and "flag_values" not in values.attrs
+
+
+def measured(dataset: xr.Dataset) -> list[str]:
+    """What was measured in each cell: numbers, no error estimates nor costs, the headline first."""
+    cells = set(dataset["status"].dims)
+    values = {str(name): dataset[name] for name in dataset.data_vars}
+    beside = tuple(f"{name}_{end}" for name in values for end in ("stable", "unstable"))
+    return [
+        name
+        for name, found in values.items()
+        if set(found.dims) == cells
+        and is_number(found)
+        and coverage(name) == "modelResult"
+        and name not in beside
+        and bool(np.isfinite(found).any())
+    ]
+
+
+def varied(dataset: xr.Dataset) -> list[str]:
+    """Of what was measured, the headline and all that is not the same everywhere."""
+    names = measured(dataset)
+    return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
+
+
+def is_log_spaced(points: np.ndarray) -> bool:
+    """Whether points are spaced by factors rather than by differences."""
+    at = np.sort(points.astype(float))
+    if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
+        return False
+    factors, differences = np.diff(np.log(at)), np.diff(at)
+    return bool(factors.max() / factors.min() < differences.max() / differences.min())
+
+
+def is_wide(values: np.ndarray) -> bool:
+    """Whether values are positive and span decades."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0.0 and known.max() > _WIDE * known.min())
+
+
+def place(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
+    """Where something is on one dimension, in a few words."""
+    value = cell[dimension].item()
+    about = quantity(dimension, stated_by(cell.coords.to_dataset()))
+    if isinstance(value, str):
+        return pretty(value)
+    units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {pretty(about.units)}")
+    return f"{symbol(about)} = {number(value, 4)}{units}"
+
+
+def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str, width: int = 45) -> np.ndarray:
+    """Name the x axis as a dimension, and say where its points are.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    dataset : xarray.Dataset
+    dimension : str
+    width : int
+        Characters in a line.
+    """
+    points = dataset[dimension].values
+    axes.set_xlabel(label(quantity(dimension, stated_by(dataset)), width))
+    if is_numeric(dataset, dimension):
+        return np.asarray(points, dtype=float)
+    name_points(axes.xaxis, [str(point) for point in points], max(8, 48 // points.size))
+    axes.set_xlim(-0.5, points.size - 0.5)
+    return np.arange(points.size, dtype=float)
+
+
+def log_scale(axes: Axes, which: str) -> None:
+    """Have a log axis, with numbers that do not touch each other; call it after drawing.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    which : {"x", "y"}
+    """
+    axes.set(**{f"{which}scale": "log"})
+    axis: Axis = getattr(axes, f"{which}axis")
+    low, high = sorted(axis.get_view_interval())
+    if high < _NARROW * low:
+        between = (2.0, 5.0) if high < 10.0 * low else (3.0,)
+        axis.set_major_locator(LogLocator(subs=(1.0, *between)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _place: number(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def same_height(axes: Axes, *values: xr.DataArray, log: bool = False) -> None:
+    """Have an axis along y as high as all of these need, so that panels can be compared; one of
+    which nothing is known stays as it is.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    *values : xarray.DataArray
+        What is drawn here and in the panels to compare with.
+    log : bool
+        Whether the axis is to be a log one.
+    """
+    found = np.concatenate([np.ravel(each.values) for each in values])
+    known = found[np.isfinite(found) & ((found > 0.0) | (not log))]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    if high > low:
+        margin = (high / low) ** 0.05 if log else 0.05 * (high - low)
+        axes.set_ylim(*((low / margin, high * margin) if log else (low - margin, high + margin)))
+    if log and known.size:
+        log_scale(axes, "y")
+
+
+def name_points(axis: Axis, names: list[str], width: int) -> None:
+    """Ticks at 0, 1, ... with names."""
+    axis.set_ticks(range(len(names)), [wrapped(pretty(name), width) for name in names])

@@ -1,0 +1,159 @@
+"""The picture of one motion: friction and slip rate along it, and its path on the phase plane."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.plots import Drawing
+from rsfstudy.plots._axes import log_scale
+from rsfstudy.plots._phase_plane import LN10
+from rsfstudy.plots._style import (
+    hold_ticks,
+    legend,
+    letter,
+    look,
+    make_room,
+    settle,
+    size,
+    styled,
+)
+from rsfstudy.plots._text import pretty, wrapped
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.steady import steady_excess
+
+#: Of a panel, in mm.
+HEIGHT = 48.0
+#: What a motion may be drawn against.
+AGAINST = ("load_point_displacement", "slip", "time")
+_FRICTION = r"Friction coefficient, $\mu$"
+#: Units of the rig on axes.
+_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
+
+
+def picture(
+    motion: xr.Dataset,
+    laboratory: Laboratory | None = None,
+    *,
+    against: str = "load_point_displacement",
+) -> Figure:
+    """Draw one motion.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        As `rsfstudy.simulate` gives it.
+    laboratory : Laboratory, optional
+        The rig, in whose units the axes are then.
+    against : {"load_point_displacement", "slip", "time"}
+        What friction and slip rate are drawn against.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Friction, slip rate, and the path on the plane of both with the line of steady sliding.
+
+    Raises
+    ------
+    DataError
+        Where the dataset is no motion.
+    InvalidValue
+        For another abscissa.
+    """
+    if against not in AGAINST:
+        raise InvalidValue("against", against, "is unknown", choices=AGAINST)
+    for name in (*AGAINST, "friction_coefficient", "log10_slip_rate"):
+        if name not in motion:
+            raise DataError(f"{name} is missing: it is no motion as simulate gives it")
+    shown = motion if laboratory is None else laboratory.in_units(motion, **_UNITS)
+    with styled():
+        figure = Drawing(figsize=size(2, 2, HEIGHT), layout="constrained")
+        grid = figure.add_gridspec(2, 2)
+        upper = figure.add_subplot(grid[0, 0])
+        lower = figure.add_subplot(grid[1, 0], sharex=upper)
+        plane = figure.add_subplot(grid[:, 1])
+        for axes in figure.axes:
+            hold_ticks(axes)
+        upper.plot(shown[against], shown["friction_coefficient"])
+        upper.set_ylabel(_FRICTION)
+        upper.tick_params(labelbottom=False)
+        _rate(shown, lower, against)
+        lower.set_xlabel(_labelled(shown[against], laboratory))
+        _plane(motion, shown, plane)
+        letter(figure.axes)
+        figure.suptitle(wrapped(pretty(_title(motion)), 120))
+        make_room(figure, [[upper], [lower, plane]])
+        settle(figure)
+    return figure
+
+
+def _title(motion: xr.Dataset) -> str:
+    """What it is, and how it ended if not as it should."""
+    status = motion.attrs.get("status", "ok")
+    ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
+    return f"{motion.attrs.get('title', '')}{ending}"
+
+
+def _rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
+    """Slip rate in the units of the rig, or its logarithm over V_*."""
+    if "slip_rate" in shown:
+        axes.plot(shown[against], shown["slip_rate"])
+        log_scale(axes, "y")
+        axes.set_ylabel(f"Slip rate ({_written(shown['slip_rate'].attrs['units'])})")
+    else:
+        axes.plot(shown[against], shown["log10_slip_rate"])
+        axes.set_ylabel(r"Slip rate, $\log_{10}(V/V_*)$")
+
+
+def _plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
+    """Friction against slip rate, with the line of steady sliding."""
+    logs = motion["log10_slip_rate"]
+    scale = 1.0
+    if "slip_rate" in shown:
+        scale = float((shown["slip_rate"] / 10.0**logs)[0])
+    # in ruptures the spring carries what accelerates the mass, too
+    friction = motion["frictional_stress"] / motion["normal_stress_ratio"]
+    axes.plot(scale * 10.0**logs, friction, **look(0), label="motion")
+    axes.plot(scale * 10.0 ** logs[0], friction[0], "o", color=look(0)["color"], label="its start")
+    rates = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
+    steady = _steady(json.loads(motion.attrs["scene"]), rates)
+    if steady is not None:
+        axes.plot(scale * 10.0**rates, steady, "--", color="0.4", label="steady sliding")
+    log_scale(axes, "x")
+    units = _written(shown["slip_rate"].attrs["units"]) if "slip_rate" in shown else "$V_*$"
+    axes.set_xlabel(f"Slip rate ({units})")
+    axes.set_ylabel(r"Friction coefficient of the fault, $\mu$")
+    legend(axes, 3)
+
+
+def _steady(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | None:
+    """Friction coefficient of steady sliding; None of a scene with a part that is not known here,
+    but for its loading, which does not matter.
+    """
+    try:
+        scene = Scene(**{k: v for k, v in values.items() if k not in ("loading", "segments")})
+    except InvalidValue:
+        return None
+    rates = log10_rates * LN10
+    excess = [steady_excess(scene, x) for x in rates.tolist()]
+    return np.asarray(scene.mu_star + np.array(excess))
+
+
+def _labelled(values: xr.DataArray, laboratory: Laboratory | None) -> str:
+    name = str(values.attrs["long_name"])
+    name = f"{name[0].upper()}{name[1:]}"
+    units = values.attrs.get("scale", "") if laboratory is None else values.attrs["units"]
+    scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$"}
+    return f"{name} ({scales.get(units, _written(units))})"
+
+
+def _written(units: str) -> str:
+    """Units as an axis names them."""
+    return units.replace(" s-1", "/s").replace("um", r"$\mu$m")

@@ -1,0 +1,206 @@
+"""How figures look: the style sheet, widths of journal columns, letters of panels, and legends
+that lie beside the data.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import string
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from matplotlib import rcParams, style
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.transforms import blended_transform_factory, offset_copy
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.plots._text import wrapped
+
+#: The style sheet that ships.
+SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
+MM = 1.0 / 25.4
+#: Between the two columns of a journal, in inches.
+_GAP = 6.0 * MM
+_MARKERS = "os^Dv<>P*X"
+
+
+@contextlib.contextmanager
+def styled(over: Any = None) -> Iterator[None]:
+    """Draw in the style that ships, with another laid over it.
+
+    Parameters
+    ----------
+    over : path, str, dict or list of those, optional
+        What `matplotlib.style.use` takes: a style sheet, the name of one, or settings.
+
+    Raises
+    ------
+    InvalidValue
+        Where there is no such style.
+    """
+    others = over if isinstance(over, list | tuple) else [over]
+    sheets = [SHEET, *(other for other in others if other is not None)]
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(style.context(sheets))
+        except (OSError, TypeError, UnicodeDecodeError) as error:
+            rule = "is neither a style sheet of matplotlib nor the name of one"
+            raise InvalidValue("style", str(over), rule) from error
+        yield
+
+
+def size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:
+    """Inches of a figure of panels: one journal column wide, or two.
+
+    Parameters
+    ----------
+    columns, rows : int
+        How many panels it has beside, and above each other.
+    height : float, optional
+        Of a panel, in mm; that of the style by default.
+    """
+    width, usual = rcParams["figure.figsize"]
+    each = usual if height is None else height * MM
+    return (width if columns == 1 else 2.0 * width + _GAP), rows * each
+
+
+def look(number: int) -> dict[str, Any]:
+    """Colour and line style of the `number`-th of several, from the cycle of the style."""
+    return dict(next(itertools.islice(itertools.cycle(rcParams["axes.prop_cycle"]), number, None)))
+
+
+def marker(number: int) -> str:
+    """Marker of the `number`-th of several."""
+    return _MARKERS[number % len(_MARKERS)]
+
+
+def letter(panels: Sequence[Axes]) -> None:
+    """Write (a), (b), ... left of the titles of panels, where there are several."""
+    for panel, text in zip(panels, itertools.cycle(string.ascii_lowercase), strict=False):
+        if len(panels) > 1:
+            panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
+
+
+# ---- legends ------------------------------------------------------------------------------------
+
+
+def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
+    """Name what is drawn below the axes, where it covers nothing; call it after the label of x.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    columns : int
+        Most entries beside each other; fewer where they would be wider than the panel.
+    title : str, optional
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    shown = {label: handle for handle, label in zip(handles, labels, strict=True)}
+    shown = {wrapped(label, 48): shown[label] for label in shown if _is_drawn(shown[label])}
+    if not shown:
+        return
+    lines = 1 + axes.get_xlabel().count("\n")
+    drop = rcParams["font.size"] * (2.4 + 1.3 * lines)
+    figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
+    below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
+    for beside in range(min(columns, len(shown)), 0, -1):
+        made = axes.legend(
+            list(shown.values()),
+            list(shown),
+            loc="upper center",
+            bbox_to_anchor=(0.5 * (left + right), 0.0),
+            bbox_transform=blended_transform_factory(figure.transFigure, below),
+            ncols=beside,
+            title=title,
+        )
+        if made.get_window_extent().width <= 0.97 * (right - left) * figure.bbox.width:
+            return
+
+
+def _slot(axes: Axes) -> tuple[float, float]:
+    """From where to where a panel may reach from side to side, as fractions of the figure."""
+    place = axes.get_subplotspec()
+    if place is None:
+        return 0.0, 1.0
+    columns = place.get_gridspec().ncols
+    return place.colspan.start / columns, place.colspan.stop / columns
+
+
+def _is_drawn(handle: Any) -> bool:
+    """Whether there is anything of it to be seen."""
+    if isinstance(handle, ErrorbarContainer):
+        handle = handle.lines[0]
+    if isinstance(handle, Line2D):
+        points = np.asarray(handle.get_xydata(), dtype=float)
+        return bool(np.isfinite(points).all(axis=1).any())
+    if isinstance(handle, PathCollection):
+        return np.size(handle.get_offsets()) > 0
+    return True
+
+
+def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
+    """Where most panels name the same things, or some of them, name those once, below them all."""
+    named = {panel: _texts(legend) for panel in panels if (legend := panel.get_legend())}
+    alike: list[Axes] = []
+    for fullest in named:
+        within = [panel for panel, texts in named.items() if set(texts) <= set(named[fullest])]
+        if len(within) > max(1, len(alike), len(panels) // 2):
+            alike, chosen = within, fullest
+    if not alike:
+        return
+    handles, labels = chosen.get_legend_handles_labels()
+    by_text = {wrapped(label, 48): handle for handle, label in zip(handles, labels, strict=True)}
+    title = cast(Legend, chosen.get_legend()).get_title().get_text()
+    for panel in alike:
+        cast(Legend, panel.get_legend()).remove()
+    for beside in range(min(len(named[chosen]), 5), 0, -1):
+        figure.legends.clear()
+        made = figure.legend(
+            [by_text[text] for text in named[chosen]],
+            named[chosen],
+            loc="outside lower center",
+            ncols=beside,
+            title=title,
+        )
+        if made.get_window_extent().width <= figure.bbox.width:
+            return
+
+
+def _texts(legend: Legend) -> list[str]:
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def make_room(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
+    """Make a figure as much taller as its legends are, so that they take nothing from the data."""
+    beside = [[legend for panel in row if (legend := panel.get_legend())] for row in rows]
+    heights = [max(map(_height, legends), default=0.0) for legends in (*beside, figure.legends)]
+    figure.set_figheight(figure.get_figheight() + sum(heights))
+
+
+def _height(legend: Legend) -> float:
+    """Inches, with a line between it and what it belongs to."""
+    figure = cast(Figure, legend.figure)
+    height = float(legend.get_window_extent().height)
+    return height / figure.dpi + float(rcParams["font.size"]) / 72.0
+
+
+def hold_ticks(axes: Axes) -> None:
+    """Have ticks that come when the style is no longer in force look as those that come now."""
+    axes.tick_params(axis="x", labelsize=rcParams["xtick.labelsize"])
+    axes.tick_params(axis="y", labelsize=rcParams["ytick.labelsize"])
+
+
+def settle(figure: Figure) -> None:
+    """Give everything its place: ticks take their style when they are made, and how much room they
+    need is known only then.
+    """
+    for _pass in range(2):
+        figure.draw_without_rendering()

@@ -1,0 +1,35 @@
+"""The fluid in the pores of the fault, one file a case.
+
+Stress is in units of the effective normal stress sigma_* = sigma - p_inf of steady sliding at V_*,
+and pore pressure is P = (p - p_inf)/sigma_*: no part needs p_inf itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.parts import Function, Part, found_in
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fluid(Part):
+    """Base of the cases of pore fluid.
+
+    A case with unknowns of its own says what they are, pore pressure P last, and states
+
+    - ``seepage(log_rate, states, share, p)``: their changes per unit slip in D_c, times a share;
+    - ``seeped(log_rate, p)``: what they are in steady sliding, where P is 0.
+    """
+
+    unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    seepage: ClassVar[Function | None] = None
+    seeped: ClassVar[Function | None] = None
+
+    @classmethod
+    def functions(cls) -> tuple[str, ...]:
+        return ("seepage", "seeped") if cls.unknowns else ()
+
+
+PARTS = found_in(__name__, __path__)

@@ -1,0 +1,118 @@
+"""Dilatancy with drainage: pores that open with slip rate lower pore pressure until fluid flows in
+(Segall and Rice 1995).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.fluid import Fluid
+from rsfstudy.slider.laws import lacks_threshold
+from rsfstudy.slider.parts import Numbers, number
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+#: Exponents beyond this occur in trial steps only: slip that no load moves stops at 10^-290 V_*.
+LARGEST_EXPONENT = 680.0
+
+
+def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+    """Changes of porosity and of pore pressure per unit slip in D_c, times a share.
+
+    ``D_c dphi/d(delta) = -(phi - phi_0 - eps ln(V/V_*))`` and ``dp/dt = c* (p_inf - p) -
+    (dphi/dt)/beta``, with dt = d(delta)/V; porosity is in units of beta sigma_*.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    states : tuple of float
+        Porosity (phi - phi_0)/(beta sigma_*), and pore pressure P.
+    share : float
+        What the changes are multiplied by: zero times infinity, where slip stops, has a limit.
+    p : tuple of float
+        Dilatancy eps/(beta sigma_*) at OWN, and drainage c* D_c/V_* behind it.
+
+    References
+    ----------
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
+    """
+    porosity, pressure = states
+    opening = share * (p[OWN] * log_rate - porosity)
+    time = share * math.exp(min(-log_rate, LARGEST_EXPONENT))
+    return opening, -p[OWN + 1] * time * pressure - opening
+
+
+def seeped(log_rate: float, p: Numbers) -> Numbers:
+    """Porosity of steady sliding, and no pore pressure: phi = phi_0 + eps ln(V/V_*)."""
+    return p[OWN] * log_rate, 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dilatant(Fluid):
+    """Pores that open with slip rate, in a fault that exchanges fluid with what surrounds it.
+
+    Pore pressure begins at that of the surroundings, as in steady sliding.
+    """
+
+    dilatancy: float = number(
+        0.01,
+        r"$\epsilon/(\beta\sigma_*)$",
+        "1",
+        "pore pressure that undrained dilatancy takes for each unit of ln V",
+        rule="must be 0 or greater",
+        scale="sigma_*",
+    )
+    drainage: float = number(
+        1.0,
+        "$c^*D_c/V_*$",
+        "1",
+        "rate at which pore pressure drains",
+        rule="must be greater than 0",
+        remedy="Nearly undrained is a small number, and without drainage there is no steady state.",
+        scale="V_*/D_c",
+    )
+
+    name = "dilatant"
+    unknowns = (
+        Quantity(
+            "porosity",
+            r"$(\varphi-\varphi_0)/(\beta\sigma_*)$",
+            "1",
+            "porosity above that of steady sliding at V_star",
+            "beta sigma_*",
+        ),
+        Quantity(
+            "pore_pressure",
+            r"$(p-p_\infty)/\sigma_*$",
+            "1",
+            "pore pressure above that of the surroundings",
+            "sigma_*",
+        ),
+    )
+    seepage = staticmethod(seepage)
+    seeped = staticmethod(seeped)
+
+    def check(self, scene: Scene) -> None:
+        """Some critical stiffness, where the spring is given by its ratio to that."""
+        if lacks_threshold(scene):
+            raise InvalidValue(
+                "drainage",
+                self.drainage,
+                f"and dilatancy = {self.dilatancy:g} leave no critical stiffness",
+                remedy="Give stiffness itself, or raise drainage.",
+            )
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return ("dilatancy",)
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """Dilatancy and drainage."""
+        return self.dilatancy, self.drainage

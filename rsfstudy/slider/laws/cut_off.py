@@ -1,0 +1,93 @@
+"""The slowness law with a cut-off: slip faster than V_c leaves the evolution effect behind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity
+from rsfstudy.slider.parts import Numbers
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+
+
+def evolution(log_rate: float, state: float, p: Numbers) -> float:
+    """Evolution of the state variable per unit slip at constant normal stress.
+
+    Friction is ``mu_* + a ln(V/V_*) + b ln(1 + theta V_c/D_c)``, less its last term in steady
+    sliding at V_*, and ``dtheta/dt = 1 - theta V/D_c``. With ``Theta = b ln[(1 + theta V_c/D_c)/(1
+    + V_c/V_*)]`` this reads, per unit slip, ``D_c dTheta/d(delta) = b expm1[(Theta_ss -
+    Theta)/b]``, Theta_ss being that of steady sliding at V.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    state : float
+        State variable Theta.
+    p : tuple of float
+        Evolution effect parameter b at OWN, then the parts V_c/(V_c + V_*) and V_*/(V_c + V_*).
+
+    Returns
+    -------
+    float
+        dTheta over slip in D_c.
+
+    References
+    ----------
+    Okubo (1989), J. Geophys. Res. 94, 12321-12335.
+    """
+    b = p[OWN]
+    behind = steady_over_b(log_rate, p[OWN + 1], p[OWN + 2]) - state / b
+    return b * math.expm1(min(behind, LARGEST_EXPONENT))
+
+
+def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
+    """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
+    return (shift + p[OWN] * steady_over_b(log_rate, p[OWN + 1], p[OWN + 2]),)
+
+
+def steady_over_b(log_rate: float, healing: float, cut: float) -> float:
+    """``ln(healing V_*/V + cut)``, which adds up to 0 at V_*: in each direction the form of which
+    no digits are lost, and exponents that overflow are left out of it.
+    """
+    if log_rate < 0.0:
+        exponent = min(-log_rate, LARGEST_EXPONENT)
+        return math.log1p(healing * math.expm1(exponent)) - log_rate - exponent
+    exponent = min(log_rate, LARGEST_EXPONENT)
+    return math.log1p(cut * math.expm1(exponent)) - exponent
+
+
+@dataclass(frozen=True, kw_only=True)
+class CutOff(Law):
+    """The slowness law with a cut-off."""
+
+    cutoff_velocity_ratio: float = cutoff_velocity()
+
+    name = "cut_off"
+    evolution = staticmethod(evolution)
+    resting = staticmethod(resting)
+    logarithmic = False  # in 1 + theta V_c/D_c
+
+    @property
+    def least_weakening(self) -> float:
+        """Steady friction falls as ``b/(1 + V_*/V_c) - a`` with ln V, at V_*."""
+        return 1.0 + 1.0 / self.cutoff_velocity_ratio
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """b, V_c/(V_c + V_*) and V_*/(V_c + V_*)."""
+        return (*super().numbers(scene), *self._parts())
+
+    def stress_left(self, rate: float, slip: float) -> float:
+        """``ln{1 + [(1 + V_c/V_*)/(1 + V_c/V) - 1] exp(-slip/D_c)}``."""
+        ahead = -steady_over_b(rate, *self._parts())
+        return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
+
+    def _parts(self) -> Numbers:
+        return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
+            1.0 + self.cutoff_velocity_ratio
+        )

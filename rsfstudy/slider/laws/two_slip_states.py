@@ -1,0 +1,46 @@
+"""The slip law with two states (Ruina 1983; Gu et al. 1984)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
+from rsfstudy.slider.parts import Numbers
+
+OWN = 0
+
+
+def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
+    """Evolution of the two states per unit slip at constant normal stress, times a share.
+
+    ``L_i dTheta_i/d(delta) = -(Theta_i + b_i ln(V/V_*))``
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    psis : tuple of float
+        States freed of stress.
+    shift : float
+        What stress has taken from both together.
+    share : float
+        Slip over what the clock counts.
+    p : tuple of float
+        Numbers of the law, from OWN on.
+
+    Returns
+    -------
+    tuple of float
+        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
+    """
+    first = psis[0] - p[OWN + OF_FIRST] * shift + p[OWN + FIRST] * log_rate
+    second = psis[1] - p[OWN + OF_SECOND] * shift + p[OWN + SECOND] * log_rate
+    return -share * first, -share * p[OWN + OVER] * second
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSlipStates(TwoStates):
+    """The slip law with two states."""
+
+    name = "two_slip_states"
+    evolutions = staticmethod(evolutions)

@@ -1,0 +1,65 @@
+"""The slowness (ageing) law with two states."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.laws import LARGEST_EXPONENT
+from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
+from rsfstudy.slider.parts import Numbers
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+
+
+def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
+    """Evolution of the two states per unit slip at constant normal stress, times a share.
+
+    ``dtheta_i/dt = 1 - theta_i V/L_i`` with ``Theta_i = b_i ln(theta_i V_*/L_i)`` reads, per unit
+    slip, ``L_i dTheta_i/d(delta) = b_i expm1(-(Theta_i/b_i + ln(V/V_*)))``.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    psis : tuple of float
+        States freed of stress.
+    shift : float
+        What stress has taken from both together.
+    share : float
+        Slip over what the clock counts.
+    p : tuple of float
+        Numbers of the law, from OWN on.
+
+    Returns
+    -------
+    tuple of float
+        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
+    """
+    first = (psis[0] - p[OWN + OF_FIRST] * shift) / p[OWN + FIRST] + log_rate
+    second = (psis[1] - p[OWN + OF_SECOND] * shift) / p[OWN + SECOND] + log_rate
+    return (
+        share * p[OWN + FIRST] * math.expm1(min(-first, LARGEST_EXPONENT)),
+        share * p[OWN + OVER] * p[OWN + SECOND] * math.expm1(min(-second, LARGEST_EXPONENT)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSlownessStates(TwoStates):
+    """The slowness law with two states."""
+
+    name = "two_slowness_states"
+    evolutions = staticmethod(evolutions)
+
+    def check(self, scene: Scene) -> None:
+        """And no state without effect, which theta would be unknown of."""
+        for name in ("b1_over_a", "b2_over_a"):
+            if not getattr(self, name):
+                remedy = "One state is law='slowness'."
+                raise InvalidValue(name, 0.0, "must not be 0", remedy=remedy)
+        super().check(scene)

@@ -1,0 +1,74 @@
+"""Velocity steps: the load point velocity steps from V_* to another and back, again and again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import number, reads
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+#: Each is a segment of its own, followed by itself.
+_MOST_STEPS = 100_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class VelocitySteps(Loading):
+    """How many steps, by which ratio, and the load point displacement from one to the next.
+
+    The first is from V_* to `velocity_ratio` V_*, the second back, and so on; the velocity that the
+    last leads to goes on for ever.
+    """
+
+    velocity_steps: float = number(
+        0.0,
+        "",
+        "1",
+        "number of steps of load point velocity, there and back in turn",
+        rule="must be 0 or greater",
+        remedy="0 is no step.",
+    )
+    velocity_ratio: float = number(
+        10.0,
+        "$r$",
+        "1",
+        "load point velocity after the first step over V_star",
+        rule="must be greater than 0",
+        remedy="Below 1 the first step is down; hold_time holds the load point.",
+    )
+    displacement_between_steps: float = number(
+        20.0,
+        r"$\Delta\delta_0/D_c$",
+        "1",
+        "load point displacement from one step to the next",
+        rule="must be greater than 0",
+        scale="D_c",
+    )
+
+    name = "velocity_steps"
+    called_by = "velocity_steps"
+
+    @reads("velocity_steps")
+    def check(self, scene: Scene) -> None:
+        """A whole number of steps."""
+        if self.velocity_steps % 1.0 or self.velocity_steps > _MOST_STEPS:
+            rule = f"must be a whole number, {_MOST_STEPS:,} at most"
+            raise InvalidValue("velocity_steps", self.velocity_steps, rule)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """One after each step."""
+        return tuple(self._segments())
+
+    def _segments(self) -> Iterator[Segment]:
+        last = int(self.velocity_steps)
+        for number_ in range(1, last + 1):
+            velocity = self.velocity_ratio if number_ % 2 else 1.0
+            lasts = self.displacement_between_steps / velocity if number_ < last else math.inf
+            yield Segment(velocity, duration=lasts)

@@ -1,0 +1,53 @@
+"""The numbers that every slider has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import Part, number
+
+_POSITIVE = "must be greater than 0"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slider(Part):
+    """The numbers that every slider has."""
+
+    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=_POSITIVE)
+    mu_star: float = number(
+        0.76,
+        r"$\mu_*$",
+        "1",
+        "steady-state friction coefficient at the reference rate",
+        rule=_POSITIVE,
+    )
+    stiffness_ratio: float | None = number(
+        None, r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star", rule=_POSITIVE
+    )
+    stiffness: float | None = number(
+        None, r"$k D_c/\sigma_*$", "1", "stiffness", rule=_POSITIVE, scale="sigma_*/D_c"
+    )
+    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=_POSITIVE)
+    reference_rate: float = number(
+        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=_POSITIVE
+    )
+    instability_norm: float = number(
+        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
+    )
+
+    name = "slider"
+
+
+#: The fields of which one sets the spring.
+SPRING = ("stiffness_ratio", "stiffness")
+
+
+def with_spring(values: dict[str, Any]) -> dict[str, Any]:
+    """The numbers of a slider with one field for its spring."""
+    given = [name for name in SPRING if name in values]
+    if len(given) == 2:
+        rule = f"and stiffness_ratio = {values['stiffness_ratio']:g} both set the spring"
+        raise InvalidValue("stiffness", values["stiffness"], rule, remedy="Give one of them.")
+    return values if given else {**values, "stiffness_ratio": 1.0}

@@ -1,0 +1,165 @@
+"""A loading history of a user's own, from a list of segments.
+
+The class that `protocol` makes is a part of the user's own, as any other is: its name stands for it
+in results, and its segments count for what decided the numbers.
+"""
+
+from __future__ import annotations
+
+import copyreg
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Real
+from typing import Any, ClassVar
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import is_name
+from rsfstudy.slider.loading import Loading, Segment
+
+#: What a segment of a protocol may state.
+KEYS = ("velocity", "duration", "distance", "step")
+
+
+class _Kind(type):
+    """The type of protocols, which are pickled by their segments."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol(Loading, metaclass=_Kind):
+    """Base of the protocols."""
+
+    name = "protocol"
+    history: ClassVar[tuple[Segment, ...]] = ()
+    #: Time in D_c/V_* that was stated, after which the last velocity goes on.
+    lasts: ClassVar[float] = 0.0
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """As they were stated."""
+        return self.history
+
+    @classmethod
+    def what_it_is(cls) -> object:
+        """Its name and segments."""
+        if cls.__module__ != _NOWHERE:
+            return cls
+        return cls.name, cls.history, cls.lasts
+
+
+def protocol(
+    segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol"
+) -> type[Protocol]:
+    """A loading history, as a part of your own: ``Scene(loading=protocol([...]))``.
+
+    Parameters
+    ----------
+    segments : sequence of Segment or mapping
+        What the load point does, one segment after the other. A mapping states its ``velocity`` in
+        V_*, and how long it lasts by its ``duration`` in D_c/V_* or its ``distance`` in D_c; a
+        ``step`` is a sudden displacement of the load point in D_c at its beginning. After the last
+        one, which need not say how long it lasts, the load point goes on at that velocity.
+    name : str
+        What the protocol is called in results.
+
+    Raises
+    ------
+    InvalidValue
+        For a protocol without segments, a segment that moves backwards, lasts no time, or says
+        twice or not at all how long it lasts.
+    """
+    if not is_name(name):
+        raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
+    if isinstance(segments, str | Mapping) or not isinstance(segments, Sequence):
+        remedy = "Read a file by rsfstudy.read_protocol."
+        raise InvalidValue("protocol", segments, "must be a list of segments", remedy=remedy)
+    if not segments:
+        remedy = 'State one at least, as in [{"velocity": 10}].'
+        raise InvalidValue("protocol", segments, "has no segments", remedy=remedy)
+    history = [_segment(stated, f"segment {n}") for n, stated in enumerate(segments, start=1)]
+    for number, (before, _after) in enumerate(pairwise(history), start=1):
+        if before.duration == math.inf:
+            remedy = "State its duration or its distance; only the last goes on for ever."
+            raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).at(
+                f"segment {number}"
+            )
+    lasts = math.fsum(s.duration for s in history if s.duration < math.inf)
+    history[-1] = history[-1]._replace(duration=math.inf)
+    return _made(name, tuple(history), lasts)
+
+
+def _made(name: str, history: tuple[Segment, ...], lasts: float) -> type[Protocol]:
+    # no module has it, so that it is sent to workers as it is, and its segments are looked at
+    members = {"name": name, "history": history, "lasts": lasts, "__module__": _NOWHERE}
+    return dataclass(frozen=True, kw_only=True)(type(name, (Protocol,), members))
+
+
+def _reduced(kind: type[Protocol]) -> str | tuple[Any, ...]:
+    if kind.__module__ != _NOWHERE:
+        return kind.__qualname__
+    return _made, (kind.name, kind.history, kind.lasts)
+
+
+# a class has no `__reduce__` that pickle would ask
+copyreg.pickle(_Kind, _reduced)  # type: ignore[arg-type]
+
+
+#: The module of protocols, which is none.
+_NOWHERE = "protocols_of_the_user"
+
+
+def _segment(stated: Any, place: str) -> Segment:
+    try:
+        if isinstance(stated, Segment):
+            return _checked(*stated)
+        if not isinstance(stated, Mapping):
+            remedy = 'Write {"velocity": 10, "duration": 2}.'
+            raise InvalidValue("segment", stated, "is no segment", remedy=remedy)
+        for key in stated:
+            if key not in KEYS:
+                raise InvalidValue("segment", key, "is unknown", choices=KEYS)
+        return _checked(_velocity(stated), stated.get("step", 0.0), _duration(stated))
+    except InvalidValue as error:
+        raise error.at(place) from error
+
+
+def _velocity(stated: Mapping[str, Any]) -> Any:
+    if "velocity" not in stated:
+        raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
+    return stated["velocity"]
+
+
+def _duration(stated: Mapping[str, Any]) -> Any:
+    if "distance" not in stated:
+        return stated.get("duration", math.inf)
+    distance, velocity = stated["distance"], stated["velocity"]
+    if "duration" in stated:
+        rule = f"and distance = {distance!r} both say how long it lasts"
+        raise InvalidValue("duration", stated["duration"], rule, remedy="State one of them.")
+    _check("distance", distance, "must be positive and finite", positive=True)
+    _check("velocity", velocity, "must be positive where a distance is stated", positive=True)
+    return distance / velocity
+
+
+def _checked(velocity: Any, step: Any, duration: Any) -> Segment:
+    _check("velocity", velocity, "must be 0 or greater, and finite", positive=False)
+    if not _is_number(step) or not math.isfinite(step):
+        raise InvalidValue("step", step, "must be a finite number")
+    if not _is_number(duration) or not duration > 0.0:
+        remedy = "Leave out what lasts no time."
+        raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
+    return Segment(float(velocity), float(step), float(duration))
+
+
+def _check(name: str, value: Any, rule: str, *, positive: bool) -> None:
+    right = _is_number(value) and math.isfinite(value)
+    if not right or value < 0.0 or (positive and value == 0.0):
+        remedy = ""
+        if name == "velocity":
+            remedy = "Friction is that of forward slip; 0 holds the load point."
+        raise InvalidValue(name, value, rule, remedy=remedy)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

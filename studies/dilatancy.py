@@ -1,0 +1,105 @@
+"""Dilatancy: the critical stiffness of steady sliding against drainage."""
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.linear_stability import LinearStability
+
+from ._fluids import FAULT, REFERENCE, SEGALL_RICE
+
+
+def known(drainage: float, value: float) -> Claim:
+    """D1: the closed form at E = 0.002."""
+    return Claim(
+        id="D1",
+        statement=f"E = 0.002, c* D_c/V = {drainage:g}: k_cr = {value:g} sigma_*/D_c",
+        source=f"{SEGALL_RICE}: [K + a(1+c) - b + E][K(1+c) - c(b-a)] = a c K",
+        variable="critical_stiffness",
+        where={"dilatancy": 0.004, "drainage": drainage},
+        published=value,
+        tolerance=5.1e-9,
+        reason="evaluated to eight decimals",
+    )
+
+
+def limit(drainage: float, value: float, which: str, tolerance: float, reason: str) -> Claim:
+    """D2: undrained and drained."""
+    return Claim(
+        id="D2",
+        statement=f"E = 0.002, {which}: k_cr = {value:g} sigma_*/D_c",
+        source=SEGALL_RICE,
+        variable="critical_stiffness",
+        where={"dilatancy": 0.004, "drainage": drainage},
+        published=value,
+        tolerance=tolerance,
+        reason=reason,
+    )
+
+
+def vouched(dilatancy: float, drainage: float) -> Claim:
+    """D3: the threshold of the equations as they are assembled."""
+    return Claim(
+        id="D3",
+        statement=f"dilatancy {dilatancy:g}, drainage {drainage:g}: k_cr is that of growth",
+        source="eigenvalues of the assembled equations",
+        variable="critical_stiffness_error",
+        where={"dilatancy": dilatancy, "drainage": drainage},
+        published=0.0,
+        tolerance=1e-10,
+        reason="central differences of the assembled equations",
+    )
+
+
+study = Study(
+    name="dilatancy",
+    title="Critical stiffness of a dilatant fault against drainage",
+    summary=(
+        "Where pores open with slip rate, pore pressure falls and friction rises until fluid flows "
+        "in. Drained fast, the critical stiffness is b - a, as without a fluid; undrained, it is b "
+        "- a - E with E = mu_* eps/(beta sigma_*), and no spring is soft enough for instability "
+        "where E exceeds b - a. In between, drainage within the slip distance D_c decides: even "
+        "the strongest dilatancy leaves oscillations that are slow enough to drain."
+    ),
+    base=FAULT,
+    axes=[
+        Axis("dilatancy", [0.002, 0.004, 0.008, 0.012]),
+        Axis("drainage", 10.0 ** np.linspace(-3.0, 3.0, 49)),
+    ],
+    measure=LinearStability(),
+    claims=[
+        known(0.1, 0.00306725),
+        known(1.0, 0.00444076),
+        known(10.0, 0.00499026),
+        limit(1e-3, 0.003, "undrained", 1e-5, "drainage adds a c at most, c = 0.001"),
+        limit(1e3, 0.005, "drained", 1e-8, "what is left falls with c squared, c = 1000"),
+        vouched(0.002, 1e-3),
+        vouched(0.004, 1.0),
+        vouched(0.012, 1e3),
+        Claim(
+            id="D4",
+            statement="E = 0.006 > b - a: stable almost everywhere undrained",
+            source=SEGALL_RICE,
+            variable="critical_stiffness",
+            where={"dilatancy": 0.012, "drainage": 1e-3},
+            relation="below",
+            published=1e-4,
+            tolerance=0.0,
+            reason="an inequality: a fiftieth of b - a",
+        ),
+        Claim(
+            id="D4",
+            statement="E = 0.006 > b - a: yet unstable at k = 0.75 (b - a) where c* D_c/V = 1",
+            source=SEGALL_RICE,
+            variable="critical_stiffness",
+            where={"dilatancy": 0.012, "drainage": 1.0},
+            relation="above",
+            published=0.00375,
+            tolerance=0.0,
+            reason="an inequality",
+        ),
+    ],
+    plot="dilatancy",
+    references=[REFERENCE],
+)

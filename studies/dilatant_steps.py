@@ -1,0 +1,87 @@
+"""Dilatancy: the critical step of load point velocity against drainage."""
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion.accuracy import Accuracy
+
+from ._fluids import FAULT, REFERENCE, SEGALL_RICE
+
+DRAINED = "drained"
+FAULTS: dict[str, dict[str, str | float]] = {
+    DRAINED: {"fluid": "drained"},
+    **{
+        f"dilatancy {number:g}": {"fluid": "dilatant", "dilatancy": number}
+        for number in (0.001, 0.002, 0.004)
+    },
+}
+
+
+def above_drained(fault: str, drainage: float, by: float) -> Claim:
+    """D5: dilatancy stabilises."""
+    return Claim(
+        id="D5",
+        statement=f"{fault}, drainage {drainage:.3g}: {by:g} V_* more than drained",
+        source=f"{SEGALL_RICE}: dilatancy opposes nucleation",
+        variable="critical_velocity_ratio",
+        where={"fault": fault, "drainage": drainage},
+        minus={"fault": DRAINED, "drainage": drainage},
+        relation="above",
+        published=by,
+        tolerance=0.0,
+        reason="an inequality",
+    )
+
+
+study = Study(
+    name="dilatant_steps",
+    title="Critical load point velocity step of a dilatant fault, k = 1.2 (b-a) sigma_*/D_c",
+    summary=(
+        "The spring is stiffer than critical however fast pores drain, and steady sliding stable: "
+        "it takes a step of load point velocity to trigger instability. The step grows with "
+        "dilatancy, and the more the less there is time to drain. Slip accelerates far beyond "
+        "drainage on the way to instability, so that drainage has to be a hundred times faster "
+        "than for steady sliding (study dilatancy) to bring the drained boundary back."
+    ),
+    base=FAULT.with_(stiffness=0.006, fluid="drained"),
+    axes=[
+        Axis("fault", FAULTS),
+        Axis("drainage", 10.0 ** np.linspace(-1.0, 1.5, 6)),
+    ],
+    measure=CriticalStep(),
+    accuracy=Accuracy(rtol=1e-4),
+    claims=[
+        above_drained("dilatancy 0.002", 0.1, 1.0),
+        above_drained("dilatancy 0.004", 1.0, 5.0),
+        Claim(
+            id="D6",
+            statement="dilatancy 0.004: ten times faster drainage lowers the boundary",
+            source=SEGALL_RICE,
+            variable="critical_velocity_ratio",
+            where={"fault": "dilatancy 0.004", "drainage": 10.0},
+            minus={"fault": "dilatancy 0.004", "drainage": 1.0},
+            relation="below",
+            published=-1.0,
+            tolerance=0.0,
+            reason="an inequality",
+        ),
+        Claim(
+            id="D6",
+            statement="dilatancy 0.004, drainage 1: steady sliding is as if drained, to 12 %; the "
+            "boundary is as if undrained, to 5 %",
+            source=SEGALL_RICE,
+            variable="critical_velocity_ratio",
+            where={"fault": "dilatancy 0.004", "drainage": 1.0},
+            minus={"fault": "dilatancy 0.004", "drainage": 0.1},
+            relation="above",
+            published=-0.5,
+            tolerance=0.0,
+            reason="an inequality, 5 % of the boundary",
+        ),
+    ],
+    plot="dilatant_steps",
+    references=[REFERENCE],
+)

@@ -1,0 +1,144 @@
+"""Laws: how much of the displacement boundary hangs on the state evolution law."""
+
+import math
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import OverClosedForm, RelativeDifference
+from rsfstudy.slider.scene import Scene
+
+from ._laws import (
+    COMPOSITE,
+    CUT_AT,
+    CUT_OFF,
+    HEALED,
+    HEALS_UP_TO,
+    LAWS,
+    MIDDLE,
+    NAGATA,
+    PERRIN,
+    REFERENCES,
+    SLIP,
+    SLOWNESS,
+)
+from ._paper import REFERENCE
+
+base = Scene(b_over_a=2.0, instability_norm=1e6)
+CRITICAL = {"normal_stress": "constant", "stiffness_ratio": 1.0}
+
+
+def stiffness(law: str, published: float, source: str) -> Claim:
+    """L1: critical stiffness over (b - a) sigma/D_c."""
+    return Claim(
+        id="L1",
+        statement=f"{law}, constant: k_cr is {published:.6g} (b-a) sigma/D_c",
+        source=source,
+        variable="critical_stiffness",
+        where={"evolution": law, **CRITICAL},
+        published=published * (base.b - base.a),
+        tolerance=1e-8 * base.b,
+        reason="exact; slopes of the law are taken by differences of order eight",
+    )
+
+
+def displacement(id_: str, law: str, ratio: float, published: float, tolerance: float) -> Claim:
+    """The critical displacement step in closed form."""
+    return Claim(
+        id=id_,
+        statement=f"{law}, constant, k = {ratio:g} k_cr: step over D_c a/(b-a)",
+        source="h(u*) = -k/k_cr, step u* k_cr/k, for dTheta = b h(Theta/b + ln V) d(slip)/D_c",
+        variable="critical_displacement",
+        where={"evolution": law, "normal_stress": "constant", "stiffness_ratio": ratio},
+        published=published,
+        tolerance=tolerance,
+        reason="exact for an infinite norm; a finite one lowers it, the more the slower the law",
+    )
+
+
+def moved(law: str, published: float) -> Claim:
+    """L4: variable normal stress."""
+    return Claim(
+        id="L4",
+        statement=f"{law}, k = k_cr: variable normal stress moves the step by a few per cent",
+        source="Fig. 7 of the paper, for the slip law: 'maximum difference of a few percents'",
+        variable="lowering",
+        where={"evolution": law, "normal_stress": "variable", "stiffness_ratio": 1.0},
+        published=published,
+        tolerance=0.05,
+        reason="'a few percents'",
+    )
+
+
+study = Study(
+    name="laws",
+    title="Critical displacement step and the state evolution law",
+    summary=(
+        "The load point is displaced at once and then held. For every law that falls with Theta/b "
+        "+ ln V alone the critical step has a closed form at constant normal stress, h(u*) = "
+        "-k/k_cr. Between the slip and the slowness law (eps from 0 to 1) the step grows with "
+        "stiffness, and none exists for eps k >= k_cr: what is left is the jump of slip rate at "
+        "the step itself. Laws that fall faster than the slip law far from steady sliding need "
+        "smaller steps, the smaller the stiffer the spring. That variable normal stress hardly "
+        "moves the boundary (Fig. 7) holds for the slip law and those near to it, and not for the "
+        "slowness law; nor where slip faster than a cut-off strengthens. The composite law has "
+        "V_c = 100 V_*, the cut-off is at 10^4 V_*. The norm is 1e6, so high that closed forms "
+        "for an infinite one apply."
+    ),
+    base=base,
+    axes=[
+        Axis("evolution", LAWS),
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("stiffness_ratio", np.arange(4, 17) / 8),
+    ],
+    measure=CriticalStep(of="displacement_step"),
+    reductions=[
+        RelativeDifference(
+            name="lowering",
+            of="critical_displacement",
+            along="normal_stress",
+            reference="constant",
+        ),
+        OverClosedForm(
+            name="over_closed_form",
+            of="critical_displacement",
+            form="displacement_step_of_the_family",
+        ),
+    ],
+    claims=[
+        stiffness(SLIP, 1.0, "Ruina (1983)"),
+        stiffness(MIDDLE, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
+        stiffness(PERRIN, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
+        stiffness(
+            COMPOSITE,
+            1.0 + HEALED + 2.0 * HEALED / HEALS_UP_TO,
+            "[(1 + w)(b-a) + b w V/V_c] sigma/D_c, w exp(w) = exp(-V/V_c)",
+        ),
+        stiffness(CUT_OFF, 2.0 / (1.0 + 1.0 / CUT_AT) - 1.0, "[b/(1 + V/V_c) - a] sigma/D_c"),
+        stiffness(NAGATA, 0.5, "(b-a) sigma/[(1 + c) D_c]"),
+        displacement("L2", SLIP, 1.0, 1.0, 1e-6),
+        displacement("L2", SLIP, 2.0, 1.0, 1e-5),
+        displacement("L2", MIDDLE, 1.0, 2.0 * math.log(2.0), 1e-5),
+        displacement("L2", SLOWNESS, 0.5, 2.0 * math.log(2.0), 1e-5),
+        displacement("L2", PERRIN, 1.0, math.asinh(1.0), 1e-6),
+        displacement("L2", PERRIN, 2.0, 0.5 * math.asinh(2.0), 1e-6),
+        Claim(
+            id="L3",
+            statement="slowness law, k = 2 k_cr: only a jump to the norm itself is critical",
+            source="K >= b/eps: the spring unloads faster than the state falls",
+            variable="critical_displacement",
+            where={"evolution": SLOWNESS, "normal_stress": "constant", "stiffness_ratio": 2.0},
+            published=0.5 * base.log_norm_rate,
+            tolerance=1e-6,
+            reason="exact: a ln(V/V_*)/K at the norm",
+        ),
+        moved(SLIP, 0.0),
+        moved(PERRIN, 0.0),
+        moved(COMPOSITE, 0.0),
+    ],
+    plot="laws",
+    references=[REFERENCE, *REFERENCES],
+)

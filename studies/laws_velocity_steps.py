@@ -1,0 +1,95 @@
+"""Laws: how much of the load velocity boundary hangs on the state evolution law."""
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import RelativeDifference
+from rsfstudy.slider.scene import Scene
+
+from ._laws import COMPOSITE, CUT_OFF, LAWS, MIDDLE, NAGATA, PERRIN, REFERENCES, SLIP, SLOWNESS
+from ._paper import PAPER, REFERENCE
+
+STIFF = {"normal_stress": "constant", "stiffness_ratio": 1.25}
+
+
+def order(smaller: str, larger: str) -> Claim:
+    """L5: the faster the state falls above steady sliding, the smaller the critical step."""
+    return Claim(
+        id="L5",
+        statement=f"constant, k = 1.25 k_cr: step by {larger} above that by {smaller}",
+        source="the faster the state falls above steady sliding, the smaller the step",
+        variable="critical_velocity_ratio",
+        where={"evolution": larger, **STIFF},
+        minus={"evolution": smaller, **STIFF},
+        relation="above",
+        published=0.0,
+        tolerance=0.0,
+        reason="an inequality",
+    )
+
+
+def lowered(law: str) -> Claim:
+    """L6: what C7 says of the slip law."""
+    return Claim(
+        id="L6",
+        statement=f"{law}, k = 1.25 k_cr: variable normal stress lowers the critical step",
+        source=f"{PAPER}, section 3.1, for the slip law",
+        variable="lowering",
+        where={"evolution": law, **STIFF, "normal_stress": "variable"},
+        relation="above",
+        published=0.1,
+        tolerance=0.0,
+        reason="an inequality; ours are 0.12 to 0.48",
+    )
+
+
+study = Study(
+    name="laws_velocity_steps",
+    title="Critical load point velocity step and the state evolution law",
+    summary=(
+        "The faster the state falls above steady sliding, the smaller the critical step: at 1.25 "
+        "k_cr and constant normal stress from 2.1 V_* (Perrin-Rice-Zheng) and 2.6 V_* (slip) to "
+        "53 V_* (slowness) and 146 V_* (slowness with a cut-off at 10^4 V_*); at 2 k_cr from 3.4 "
+        "V_* to 4700 V_*. That variable normal stress lowers the boundary, as the paper finds for "
+        "the slip law, holds for every law near critical stiffness; between 1.5 and 1.9 k_cr it "
+        "ends for the slowness law, alone or with c = 1. The composite law has V_c = 100 V_*."
+    ),
+    base=Scene(b_over_a=2.0),
+    axes=[
+        Axis("evolution", LAWS),
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("stiffness_ratio", [1.05, *(np.arange(9, 17) / 8)]),
+    ],
+    measure=CriticalStep(of="load_velocity_ratio"),
+    reductions=[
+        RelativeDifference(
+            name="lowering",
+            of="critical_velocity_ratio",
+            along="normal_stress",
+            reference="constant",
+        ),
+    ],
+    claims=[
+        order(PERRIN, SLIP),
+        order(SLIP, MIDDLE),
+        order(MIDDLE, SLOWNESS),
+        order(SLOWNESS, CUT_OFF),
+        *map(lowered, (SLIP, MIDDLE, SLOWNESS, PERRIN, COMPOSITE, CUT_OFF, NAGATA)),
+        Claim(
+            id="L6",
+            statement="slowness law, k = 1.75 k_cr: variable normal stress does not lower it",
+            source="the end of what the paper finds for the slip law",
+            variable="lowering",
+            where={"evolution": SLOWNESS, "normal_stress": "variable", "stiffness_ratio": 1.75},
+            relation="below",
+            published=0.0,
+            tolerance=0.0,
+            reason="an inequality; ours is -0.03",
+        ),
+    ],
+    plot="laws_velocity_steps",
+    references=[REFERENCE, *REFERENCES],
+)

@@ -1,0 +1,82 @@
+"""Laws: zeta of the rate-step boundary, from the slip law towards the slowness law."""
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import OverClosedForm, ProportionalFit
+from rsfstudy.slider.scene import Scene
+
+from ._laws import REFERENCES
+from ._paper import PAPER, REFERENCE
+
+
+def zeta(exponent: float) -> Claim:
+    """L7: eq. 10 beyond the slip law."""
+    return Claim(
+        id="L7",
+        statement=f"eps = {exponent:g}, constant normal stress: zeta = 1/(1 - eps)",
+        source="invariant line of the orbits at k = k_cr; eps = 0 is eq. 10 of the paper",
+        variable="zeta",
+        where={"law_exponent": exponent, "normal_stress": "constant"},
+        published=1.0 / (1.0 - exponent),
+        tolerance=1e-5,
+        reason="exact for an infinite norm; 1e6 lowers the largest step by less",
+    )
+
+
+def below(exponent: float) -> Claim:
+    """L8: what C7 says of the slip law."""
+    return Claim(
+        id="L8",
+        statement=f"eps = {exponent:g}: variable normal stress lowers zeta",
+        source=f"{PAPER}, Fig. 5, for the slip law",
+        variable="zeta",
+        where={"law_exponent": exponent, "normal_stress": "variable"},
+        minus={"law_exponent": exponent, "normal_stress": "constant"},
+        relation="below",
+        published=0.0,
+        tolerance=0.0,
+        reason="an inequality",
+    )
+
+
+study = Study(
+    name="laws_zeta",
+    title="zeta in V_0/V_* = 1 + zeta a/(b-a) and the state evolution law, k = k_cr",
+    summary=(
+        "At constant normal stress and critical stiffness the critical step of the family of laws "
+        "between slip (eps = 0) and slowness (eps = 1) is V_0/V_* = 1 + a/[(1 - eps)(b-a)], of "
+        "which eq. 10 of the paper is the beginning: zeta = 1/(1 - eps), and no step is critical "
+        "for every norm by the slowness law. Variable normal stress lowers zeta; closer to the "
+        "slowness law it takes the critical step away, because k_cr falls with V_0. The norm is "
+        "1e6, so high that the closed form for an infinite one applies."
+    ),
+    base=Scene(law="family", instability_norm=1e6),
+    axes=[
+        Axis("law_exponent", [0.0, 0.25, 0.5]),
+        Axis("normal_stress", ["constant", "variable"]),
+        Axis("b_over_a", 1.0 + 1.0 / (np.arange(2, 9) / 8)),
+    ],
+    measure=CriticalStep(of="load_velocity_ratio"),
+    reductions=[
+        ProportionalFit(
+            name="zeta", of="critical_velocity_ratio", minus=1.0, on="a_over_b_minus_a"
+        ),
+        OverClosedForm(
+            name="over_closed_form",
+            of="critical_velocity_ratio",
+            form="velocity_step_of_the_family",
+        ),
+    ],
+    claims=[
+        zeta(0.0),
+        zeta(0.25),
+        zeta(0.5),
+        *map(below, (0.0, 0.25, 0.5)),
+    ],
+    plot="laws_zeta",
+    references=[REFERENCE, *REFERENCES],
+)

@@ -1,0 +1,146 @@
+"""Slide-hold-slide: healing and relaxation against hold time and stiffness."""
+
+import math
+
+import numpy as np
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.healing import Healing
+from rsfstudy.reduce import DecadeFit
+from rsfstudy.slider.scene import Scene
+
+SLIP, SLOWNESS, STRENGTHENING = "slip law", "slowness law", "slowness law, b < a"
+CASES: dict[str, dict[str, str | float]] = {
+    SLIP: {"law": "slip"},
+    SLOWNESS: {"law": "slowness"},
+    STRENGTHENING: {"law": "slowness", "b_over_a": 0.2},
+}
+#: Stiffness over a; with b/a = 2 over critical stiffness.
+RATIOS = (1.5, 3.0, 10.0, 30.0)
+#: Hold times over which slopes are fitted, and the longest.
+LONG, LONGEST = (1e4, 1e8), 1e8
+
+base = Scene(normal_stress="constant", b_over_a=2.0, stiffness=0.0145)
+a, b = base.a, base.b
+FORMS = "stationary contact in closed form: slowness law, quasi-static"
+
+
+def relaxes(ratio: float) -> Claim:
+    """P1: the limit of relaxation."""
+    return Claim(
+        id="P1",
+        statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation ends",
+        source=f"{FORMS}: -a k^ ln(k^)/(k^ - 1), k^ = k/k_cr",
+        variable="relaxation",
+        where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST},
+        published=-a * ratio * math.log(ratio) / (ratio - 1.0),
+        tolerance=1e-7 * a,
+        reason="the accuracy asked for; what is left of it goes as 1/t",
+    )
+
+
+def peaks(ratio: float) -> Claim:
+    """P3: the peak on reloading after a long hold."""
+    stiffness = ratio * a
+    late = a * b * math.log(stiffness / b) / (stiffness - b)
+    return Claim(
+        id="P3",
+        statement=f"slowness law, k = {ratio:g} k_cr: peak after 1e8 D_c/V_*",
+        source=f"{FORMS}: b ln t - a b ln(K/b)/(K - b)",
+        variable="healing",
+        where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST},
+        published=b * math.log(LONGEST) - late,
+        tolerance=1e-6 * b,
+        reason="1e-6 of b: the clock tells the end of so long a hold to some 1e-7; the form to 1/t",
+    )
+
+
+def heals(ratio: float) -> Claim:
+    """P4: healing per decade."""
+    return Claim(
+        id="P4",
+        statement=f"slowness law, k = {ratio:g} k_cr: heals by b ln 10 a decade",
+        source=f"{FORMS}: b ln 10 at every stiffness",
+        variable="healing_per_decade",
+        where={"case": SLOWNESS, "stiffness": ratio * a},
+        published=b * math.log(10.0),
+        tolerance=5e-4 * b,
+        reason="what the form leaves out goes as 1/t: up to 10/t of b, fitted from 1e4 on",
+    )
+
+
+study = Study(
+    name="slide_hold_slide",
+    title="Healing and relaxation in slide-hold-slide tests",
+    summary=(
+        "The load point is held, from steady sliding at V_*, and moves on at V_*. With the "
+        "slowness law and b > a relaxation comes to an end that depends on stiffness, and healing "
+        "grows by b ln 10 a decade at every stiffness; without rate weakening relaxation never "
+        "ends. With the slip law healing per decade falls with stiffness, and relaxation never "
+        "ends either, so that what is read off says as much of the machine as of the fault."
+    ),
+    base=base,
+    axes=[
+        Axis("case", CASES),
+        Axis("stiffness", [ratio * a for ratio in RATIOS]),
+        Axis("hold_time", 10.0 ** np.linspace(0.0, 8.0, 17)),
+    ],
+    measure=Healing(),
+    reductions=[
+        DecadeFit(name="healing_per_decade", of="healing", on="hold_time", within=LONG),
+        DecadeFit(name="relaxation_per_decade", of="relaxation", on="hold_time", within=LONG),
+    ],
+    claims=[
+        *(relaxes(ratio) for ratio in RATIOS),
+        *(
+            Claim(
+                id="P2",
+                statement=f"slowness law, b < a, k = {ratio:g} a sigma_*/D_c: relaxation goes on",
+                source=f"{FORMS}: slope -(a - b) against ln t",
+                variable="relaxation_per_decade",
+                where={"case": STRENGTHENING, "stiffness": ratio * a},
+                published=-0.8 * a * math.log(10.0),
+                tolerance=1e-3 * a,
+                reason="what the form leaves out is a t^(b/a - 1): 6e-4 of a where the fit begins",
+            )
+            for ratio in RATIOS
+        ),
+        *(peaks(ratio) for ratio in RATIOS),
+        *(heals(ratio) for ratio in RATIOS),
+        *(
+            Claim(
+                id="P5",
+                statement=f"slip law: healing per decade falls from {soft:g} to {stiff:g} k_cr",
+                source="with the slip law a slider heals by the slip of its hold alone",
+                variable="healing_per_decade",
+                where={"case": SLIP, "stiffness": stiff * a},
+                minus={"case": SLIP, "stiffness": soft * a},
+                relation="below",
+                published=0.0,
+                tolerance=0.0,
+                reason="an inequality",
+            )
+            for soft, stiff in ((1.5, 3.0), (3.0, 10.0), (10.0, 30.0))
+        ),
+        Claim(
+            id="P5",
+            statement="slip law, k = 3 k_cr: relaxation goes on from 1e6 to 1e8 D_c/V_*",
+            source="with the slip law relaxation never ends",
+            variable="relaxation",
+            where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST},
+            minus={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
+            relation="below",
+            published=0.0,
+            tolerance=0.0,
+            reason="an inequality",
+        ),
+    ],
+    plot="slide_hold_slide",
+    references=[
+        "Dieterich (1972), J. Geophys. Res. 77, 3690-3697",
+        "Beeler, Tullis and Weeks (1994), Geophys. Res. Lett. 21, 1987-1990",
+        "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",
+    ],
+)

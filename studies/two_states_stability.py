@@ -1,0 +1,74 @@
+"""Two states: critical stiffness against the second evolution effect and its slip distance, down to
+friction that strengthens with slip rate.
+"""
+
+import math
+from typing import Any
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.slider.scene import Scene
+
+GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
+RUINA = "Ruina (1983), J. Geophys. Res. 88, 10359-10370"
+A, FIRST = 0.01, 1.4
+
+
+def threshold(second: float, longer: float) -> float:
+    """Critical stiffness from the cubic of small perturbations: b_2/a and L_2/L_1 to
+    k_cr L_1/sigma.
+    """
+    rho = 1.0 / longer
+    linear = FIRST - 1.0 + rho * (2.0 * FIRST + (second - 1.0) * (2.0 + rho))
+    net, apart = FIRST + second - 1.0, 1.0 + rho - FIRST - second * rho
+    root = math.sqrt(linear**2 + 4.0 * rho * (1.0 + rho) * net * apart)
+    return A * (linear + root) / (2.0 + 2.0 * rho)
+
+
+def claim(second: float, longer: float, says: str, published: float, **held: Any) -> Claim:
+    """One pair of states."""
+    return Claim(
+        id="S7",
+        statement=f"b_2 = {second:g} a, L_2 = {longer:g} D_c: {says}",
+        source=f"{GU}, {RUINA}: closed form from the cubic of small perturbations",
+        variable="critical_stiffness",
+        where={"b2_over_a": second, "length_ratio": longer},
+        published=published,
+        **held,
+    )
+
+
+DIGITS: dict[str, Any] = {"tolerance": 5e-8, "reason": "the digits given"}
+EXACT: dict[str, Any] = {
+    "tolerance": 1e-10,
+    "reason": "slopes of the law by differences, to 1e-9 of them",
+}
+
+study = Study(
+    name="two_states_stability",
+    title="Critical stiffness of two states, b_1 = 1.4 a",
+    summary=(
+        "What a second state does to the stability of steady sliding. A negative b_2 over a longer "
+        "slip distance makes steady friction strengthen with slip rate (b_1 + b_2 < a, b_2 below "
+        "-0.4 a), and steady sliding is unstable nevertheless on springs that are soft enough: the "
+        "first state weakens before the second has taken part. Over shorter distances than that of "
+        "the first, the second state only takes from the direct effect or adds to it."
+    ),
+    base=Scene(law="two_slip_states", normal_stress="constant", a=A, b1_over_a=FIRST, stiffness=A),
+    axes=[
+        Axis("b2_over_a", [-1.1, -0.9, -0.7, -0.6, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7]),
+        Axis("length_ratio", [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0]),
+    ],
+    measure=LinearStability(),
+    claims=[
+        claim(-0.6, 50.0, "unstable below, though it strengthens", 0.0038741, **DIGITS),
+        *(
+            claim(*at, "as the closed form", threshold(*at), **EXACT)
+            for at in ((-0.9, 200.0), (0.3, 10.0), (0.7, 0.2))
+        ),
+        claim(0.5, 1.0, "as one state, b_1 + b_2 - a", A * (FIRST + 0.5 - 1.0), **EXACT),
+    ],
+    references=[GU, RUINA],
+)

@@ -1,0 +1,133 @@
+"""Velocity steps: by how much a, b, a - b and D_c as read off lie, against stiffness."""
+
+import math
+
+from scipy.integrate import quad
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.reduce import OverClosedForm
+from rsfstudy.slider.scene import Scene
+
+#: Stiffness over critical stiffness, compliant to stiff.
+RATIOS = [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0]
+STEPS = [0.01, 0.1, 10.0, 100.0]
+STIFF = RATIOS[-1]
+
+base = Scene(normal_stress="constant", b_over_a=2.0, velocity_steps=1)
+a, b = base.a, base.b
+WAYS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 100.0: "up by 100"}
+
+
+def late(law: str, ratio: float) -> float:
+    """How far friction at its peak is from that of a rigid slider, to first order in a/K, in units
+    of b a/K: what does not evolve while slip speeds up, and the direct effect of the slip that is
+    faster than the load point while friction falls.
+    """
+    rate = math.log(ratio)
+    if law == "slowness":
+        return rate / ratio + 1.0 - 1.0 / ratio
+    return float(quad(lambda y: y / math.expm1(y) if y else 1.0, 0.0, rate)[0]) + rate
+
+
+def follows(law: str, ratio: float) -> Claim:
+    """P6: a stiff slider."""
+    forms = {
+        "slip": "dmu = a ln r - b ln r [1 - exp(-delta/D_c)]",
+        "slowness": "dmu = (a - b) ln r + b ln[1 + (r - 1) exp(-delta/D_c)]",
+    }
+    expected = b * abs(late(law, ratio)) * a / (STIFF * (b - a))
+    return Claim(
+        id="P6",
+        statement=f"{law} law, {WAYS[ratio]}, k = {STIFF:g} k_cr: a rigid slider's but for O(a/K)",
+        source=f"closed form: {forms[law]}, and its first order in a/K",
+        variable="closed_form_departure",
+        where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFF},
+        published=expected,
+        tolerance=0.1 * expected,
+        reason="second order: (a/K) times the steepest evolution, over b, is 0.003 to 0.02",
+    )
+
+
+def reads_too_little(law: str, ratio: float) -> Claim:
+    """P7: the direct effect of a machine that is ten times as stiff as critical."""
+    return Claim(
+        id="P7",
+        statement=f"{law} law, {WAYS[ratio]}, k = 10 k_cr: a is read at least a tenth too small",
+        source="evolution begins before the spring has loaded the slider",
+        variable="apparent_a",
+        where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 10.0},
+        relation="below",
+        published=0.9 * a,
+        tolerance=0.0,
+        reason="an inequality",
+    )
+
+
+def reads_right(law: str, ratio: float) -> Claim:
+    """P8: a - b does not depend on the machine."""
+    return Claim(
+        id="P8",
+        statement=f"{law} law, {WAYS[ratio]}, k = 3 k_cr: a - b is read right",
+        source="steady friction: (a - b) ln r at every stiffness",
+        variable="apparent_a_minus_b",
+        where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 3.0},
+        published=a - b,
+        tolerance=1e-6 * a,
+        reason="oscillations die as exp[-(k^ - 1)/2] a D_c: exp(-20) is left",
+    )
+
+
+def reads_distance(ratio: float) -> Claim:
+    """P9: 1/e of a slowness-law evolution is not left after D_c."""
+    left = math.log((ratio - 1.0) / (ratio ** (1.0 / math.e) - 1.0))
+    return Claim(
+        id="P9",
+        statement=f"slowness law, {WAYS[ratio]}, k = {STIFF:g} k_cr: D_c by 1/e is {left:.3f} D_c",
+        source="closed form: ln{(r - 1)/[r^(1/e) - 1]}",
+        variable="corrected_slip_distance",
+        where={"law": "slowness", "velocity_ratio": ratio, "stiffness_ratio": STIFF},
+        published=left,
+        tolerance=0.02,
+        reason="(a/K) ln(K/a) of slip comes before the peak, from which it is counted",
+    )
+
+
+study = Study(
+    name="velocity_steps",
+    title="Velocity steps as an experimenter reads them, b/a = 2",
+    summary=(
+        "Load point velocity steps from V_* to r V_*, and friction is recorded over 20 D_c. Read "
+        "off are the direct effect, the evolution after it and the displacement over which it "
+        "falls to 1/e. The softer the machine, the smaller a and b: at 10 k_cr tenfold steps give "
+        "an a that is 14 to 40 % too small. a - b is right wherever friction has settled. D_c lies "
+        "by the machine and, with the slowness law, by the direction of the step, which no "
+        "correction for stiffness mends. With the slip law, large steps up on soft machines end in "
+        "instability."
+    ),
+    base=base,
+    axes=[
+        Axis("law", ["slip", "slowness"]),
+        Axis("velocity_ratio", STEPS),
+        Axis("stiffness_ratio", RATIOS),
+    ],
+    measure=VelocityStep(),
+    reductions=[
+        OverClosedForm(name="a_minus_b_over_true", of="apparent_a_minus_b", form="net_weakening"),
+    ],
+    claims=[
+        *(follows("slip", ratio) for ratio in STEPS),
+        *(follows("slowness", ratio) for ratio in (10.0, 100.0)),
+        *(reads_too_little(law, ratio) for law in ("slip", "slowness") for ratio in (0.1, 10.0)),
+        *(reads_right(law, ratio) for law in ("slip", "slowness") for ratio in (0.1, 10.0)),
+        reads_distance(0.1),
+        reads_distance(10.0),
+    ],
+    plot="velocity_steps",
+    references=[
+        "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",
+        "Ruina (1983), J. Geophys. Res. 88, 10359-10370",
+    ],
+)

@@ -1,0 +1,147 @@
+"""Both engines, measured against one another: every hard case, named studies, and random scenes.
+
+    python tests/agreement.py                 # hard cases, 300 random scenes, 50 dilatant ones
+    python tests/agreement.py --scenes 1000
+    python tests/agreement.py --studies       # named studies too, as they are declared
+
+They integrate the same functions by the same method, so they must end alike, and their numbers must
+agree within the sum of their error estimates.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rsfstudy import Scene
+from rsfstudy.declare import catalogue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.coverage import QUESTIONS, random_scene
+from rsfstudy.motion.accuracy import Accuracy
+
+#: What random scenes are like.
+LIKE = [
+    Scene(law=law, **stress, **dynamics)
+    for law in ("slip", "slowness")
+    for stress in ({"normal_stress": "constant"}, {"normal_stress": "variable"})
+    for dynamics in ({}, {"inertia": True}, {"radiation_damping": 1e-9})
+]
+DILATANT = [like.with_(fluid="dilatant", dilatancy=0.001) for like in LIKE]
+#: Studies whose cells are neither timed nor compared with other integrators.
+STUDIES = (
+    "rate_step_boundary",
+    "rate_step_stiffness",
+    "displacement_boundary",
+    "bounded_slip",
+    "limit_cycles",
+    "stress_drop",
+    "instability_norm",
+    "rate_step_lattice",
+    "rigid_response",
+    "linear_stability",
+)
+
+
+class Compared(NamedTuple):
+    """Two outcomes of one scene.
+
+    Attributes
+    ----------
+    same_end : bool
+        Whether both have the same status.
+    worst : float
+        Largest difference of a number over the sum of both error estimates; NaN where there is
+        none.
+    more_work : float
+        Right-hand sides of the compiled engine over those of SciPy.
+    what : str
+    """
+
+    same_end: bool
+    worst: float
+    more_work: float
+    what: str
+
+
+def compared(measure: Measure, scene: Scene, accuracy: Accuracy) -> Compared:
+    """Measure one scene with both engines."""
+    plain, compiled = (
+        measure(scene, replace(accuracy, engine=engine)) for engine in ("scipy", "compiled")
+    )
+    what = f"{measure.name} {plain.status.label}/{compiled.status.label} {scene!r}"
+    more = compiled.rhs_evaluations / max(1, plain.rhs_evaluations)
+    return Compared(plain.status is compiled.status, _worst(plain, compiled), more, what)
+
+
+def _worst(plain: Outcome, compiled: Outcome) -> float:
+    ratios = [math.nan]
+    for name, value in plain.values.items():
+        if f"{name}_error" not in plain.values or name not in compiled.values:
+            continue
+        allowed = np.asarray(plain.values[f"{name}_error"]) + compiled.values[f"{name}_error"]
+        apart = np.abs(np.asarray(value) - compiled.values[name])
+        with np.errstate(invalid="ignore"):
+            ratios += np.where(apart == 0.0, 0.0, apart / allowed).ravel().tolist()
+    return float(np.fmax.reduce(ratios))
+
+
+def random_scenes(
+    count: int, likes: list[Scene] = LIKE
+) -> Iterator[tuple[Measure, Scene, Accuracy]]:
+    """So many random scenes, over all questions, kinds of scenes and three accuracies."""
+    kinds = [(question, like) for question in QUESTIONS for like in likes]
+    for number in range(count):
+        question, like = kinds[number % len(kinds)]
+        scene = random_scene(like, question, 10_000 + number)
+        yield QUESTIONS[question], scene, Accuracy((1e-4, 1e-7, 1e-9)[number // len(kinds) % 3])
+
+
+def cells_of(name: str) -> Iterator[tuple[Measure, Scene, Accuracy]]:
+    """The cells of a named study."""
+    study = catalogue.load(name)
+    for scene, changes in study.cells():
+        yield study.measure.with_(**changes), scene, study.accuracy
+
+
+def hard_cases() -> Iterator[tuple[Measure, Scene, Accuracy]]:
+    """The scenes of the study of hard cases, each with the measure it is hard for."""
+    study: Any = catalogue.load("hard_cases")
+    for problem in study.measure.problems:
+        yield problem.measure, problem.scene, study.accuracy
+
+
+def main() -> None:
+    """Compare, and print what came out."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--scenes", type=int, default=300)
+    parser.add_argument("--studies", action="store_true")
+    asked = parser.parse_args()
+    sources = {
+        "hard cases": hard_cases(),
+        "random scenes": random_scenes(asked.scenes),
+        "random dilatant scenes": random_scenes(asked.scenes // 6, DILATANT),
+    }
+    sources |= {name: cells_of(name) for name in (STUDIES if asked.studies else ())}
+    console = Console()
+    table = Table("", "scenes", "end alike", "worst difference over errors", "work")
+    for name, source in sources.items():
+        every = [compared(*one) for one in source]
+        for one in every:
+            if not one.same_end or one.worst > 1.0:
+                console.print(f"{one.worst:.3g} {one.what}")
+        worst = float(np.fmax.reduce([one.worst for one in every]))
+        work = f"{min(o.more_work for o in every):.2f} to {max(o.more_work for o in every):.2f}"
+        alike = sum(one.same_end for one in every)
+        table.add_row(name, str(len(every)), str(alike), f"{worst:.2f}", work)
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()

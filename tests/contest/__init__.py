@@ -1,0 +1,1 @@
+"""Who takes part in the benchmark ``tests/peers.py``, and in what."""

@@ -1,0 +1,237 @@
+"""One cycle of stick-slip as anybody may integrate it: the equations, the marks, and the truth.
+
+The equations are those of the package, written down once more for whatever has `exp`, `log`, and
+`expm1`. Everybody is given them in the form that suits explicit methods, without stiffness: along
+the slow manifold up to a mark, through the rupture to another one, and along the slow manifold
+again. The marks are known beforehand, so that no peer has to find events; the engines of rsfstudy
+and whoever uses them have to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from rsfstudy import Scene
+from rsfstudy.boundaries.cycles import _asked, cycles
+from rsfstudy.measures.limit_cycle import Approach
+from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.equations import IN_RUPTURE
+from rsfstudy.slider.forms import Point
+
+BUDGET = 10**9
+#: Places of the numbers of a scene.
+A, B, MU, STIFFNESS, LOAD, LOG_LOAD, MASS, LOG_MASS, COT, ALPHA = range(10)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One cycle, from a maximum of spring stress on the limit cycle to the next.
+
+    Attributes
+    ----------
+    scene : Scene
+    begin : Point
+    p : tuple of float
+        Numbers of the scene.
+    rises : float
+        Derivative of ln V there, along slip and load point displacement together.
+    span : float
+        That displacement over all the cycle.
+    interval, drop : float
+        The truth.
+    leave, rupture : float
+        The marks: that displacement until the rupture begins, and its duration in inertial time.
+    fall, creep : float
+        Time of the minimum of spring stress, and what slip takes from the spring between it and the
+        mark that ends the rupture.
+    """
+
+    scene: Scene
+    begin: Point
+    p: tuple[float, ...]
+    rises: float
+    span: float
+    interval: float
+    drop: float
+    leave: float = math.nan
+    rupture: float = math.nan
+    fall: float = math.nan
+    creep: float = math.nan
+
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """What `through` has to know."""
+        return self.rises, self.leave, self.rupture, self.span, self.fall, self.creep
+
+    def error(self, found: tuple[float, float]) -> float:
+        """Largest relative error of the recurrence interval and of the static stress drop."""
+        truth = self.interval, self.drop
+        errors = [abs(x / y - 1.0) for x, y in zip(found, truth, strict=True)]
+        return math.inf if any(map(math.isnan, errors)) else max(errors)
+
+
+def problem(scene: Scene) -> Problem:
+    """The cycle of a scene, without marks."""
+    tight = Accuracy(TIGHTEST_RTOL, budget=BUDGET, engine="compiled")
+    approach = Approach(scene, tight)
+    if not approach.follow(meter("compiled"), 300):
+        raise ValueError(f"no limit cycle: {scene}")
+    begin = approach.seen[-1].end
+    truth = next(cycles(scene, tight, meter("compiled"), begin))
+    coupling = scene.parts.normal_stress.coupling
+    assert truth is not None
+    assert coupling is not None
+    mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_rate
+    common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
+    return Problem(
+        scene=scene,
+        begin=begin,
+        p=(*common, mass, math.log(mass), *coupling),
+        rises=begin.growth,
+        span=2.0 * scene.load_velocity * truth.interval,
+        interval=truth.interval,
+        drop=truth.highest - truth.lowest,
+    )
+
+
+def marked(it: Problem, rtol: float) -> Problem:
+    """A problem with marks where the package sets them for an accuracy."""
+    scene, passed = it.scene, dict[str, float]()
+    allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
+    moving = follow(scene, allowed, meter("compiled"), _asked(scene), start=it.begin, clock=True)
+    for event in moving:
+        if event.kind is Kind.REGIME:
+            entering = event.regime == IN_RUPTURE
+            passed["leave" if entering else "land"] = event.time
+            passed["landed"] = event.point.spring
+            if entering:
+                passed["displacement"] = scene.load_velocity * event.time + event.slip
+        elif event.kind is Kind.FALL and event.time > 0.0:
+            passed["fall"], passed["lowest"] = event.time, event.point.spring
+        elif event.kind is Kind.RISE and "fall" in passed:
+            break
+    loaded = scene.stiffness * scene.load_velocity * (passed["land"] - passed["fall"])
+    return replace(
+        it,
+        leave=passed["displacement"],
+        rupture=(passed["land"] - passed["leave"]) / scene.inertial_time,
+        fall=passed["fall"],
+        creep=passed["landed"] - passed["lowest"] - loaded,
+    )
+
+
+def meter(engine: str) -> Meter:
+    """A meter without a limit."""
+    return Meter(BUDGET, engine=engine)
+
+
+def _identity(function: Any) -> Any:
+    return function
+
+
+def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _identity) -> Any:
+    """The equations of a law and a normal stress, in the functions of `m`, each made `ready`.
+
+    ``slow(f, psi, p)`` gives the rates of both, and of time, over slip and load point displacement
+    together; ``fast(f, x, g, p)`` the rates of all three in inertial time.
+    """
+    exp, log, expm1, clamped = (ready(of) for of in (m.exp, m.log, m.expm1, m.clamped))
+    is_slip = law == "slip"
+
+    @ready
+    def strength(g: Any, p: Any) -> Any:
+        if variable:
+            ratio = 1.0 + clamped(p[COT] * g, 1e-12 - 1.0, 1e12)
+            support = 1.0 - p[MU] * p[COT]
+            shift = p[ALPHA] * log(ratio)
+            slope = (support / ratio + p[ALPHA] * p[COT]) / ratio
+            return g * support / ratio + shift, slope, shift
+        return g, 1.0, 0.0
+
+    @ready
+    def evolution(x: Any, theta: Any, p: Any) -> Any:
+        if is_slip:
+            return -(theta + p[B] * x)
+        return p[B] * expm1(-(theta / p[B] + x))
+
+    @ready
+    def balance(f: Any, psi: Any, p: Any) -> Any:
+        value, slope, shift = strength(f, p)
+        x = (value - psi) / p[A]
+        slower = exp(p[LOG_LOAD] - x)
+        share = 1.0 / (1.0 + slower)
+        loading = p[STIFFNESS] * (slower - 1.0) * share
+        change = (slope * loading - evolution(x, psi - shift, p) * share) / p[A]
+        norm = exp(x + p[LOG_MASS])
+        resistance = p[STIFFNESS] * norm * (norm + p[LOAD] * p[MASS]) * change
+        g = f - clamped(resistance, -p[A], p[A])
+        value, slope, shift = strength(g, p)
+        return (value - psi) / p[A], g, shift
+
+    @ready
+    def slow(f: Any, psi: Any, p: Any) -> Any:
+        x, _g, shift = balance(f, psi, p)
+        slower = exp(p[LOG_LOAD] - x)
+        share = 1.0 / (1.0 + slower)
+        loading = p[STIFFNESS] * (slower - 1.0) * share
+        return loading, evolution(x, psi - shift, p) * share, slower * share / p[LOAD]
+
+    @ready
+    def fast(f: Any, x: Any, g: Any, p: Any) -> Any:
+        norm = exp(x + p[LOG_MASS])
+        value, slope, shift = strength(g, p)
+        faster = clamped((f - g) / (p[STIFFNESS] * norm), -1e30, 1e30)
+        changes = evolution(x, value - p[A] * x - shift, p) * norm
+        loading = p[STIFFNESS] * (p[LOAD] * p[MASS] - norm)
+        return loading, faster, (p[A] * faster + changes) / slope
+
+    return SimpleNamespace(strength=strength, balance=balance, slow=slow, fast=fast)
+
+
+def through(
+    balance: Any, strength: Any, slow: Any, fast: Any, ready: Callable[[Any], Any] = _identity
+) -> Any:
+    """A function that goes through a cycle, as whoever integrates in floats or in arrays needs it.
+
+    ``slow(f, psi, t, span, p, tolerance)`` and ``fast(f, x, g, span, p, tolerance)`` integrate.
+    """
+
+    @ready
+    def cycle(f0: Any, psi: Any, p: Any, marks: Any, tolerance: Any) -> Any:
+        rises, leave, rupture, span = marks[0], marks[1], marks[2], marks[3]
+        fall, creep = marks[4], marks[5]
+        f, psi, t = slow(f0, psi, 0.0 * f0, leave, p, tolerance)
+        x, g, _shift = balance(f, psi, p)
+        f, x, g = fast(f, x, g, rupture, p, tolerance)
+        t = t + rupture * p[MASS]
+        psi = strength(g, p)[0] - p[A] * x
+        # from the minimum to the mark, the load point and creep have changed the spring
+        drop = f0 - f + p[STIFFNESS] * p[LOAD] * (t - fall) + creep
+        done = 2.0 * p[LOAD] * t - (f - f0) / p[STIFFNESS]
+        f, psi, t = slow(f, psi, t, span - done, p, tolerance)
+        x, g, _shift = balance(f, psi, p)
+        return t + (p[LOG_LOAD] - x) / rises / (2.0 * p[LOAD]), drop
+
+    return cycle
+
+
+def arrays(problems: list[Problem]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Spring stress and state at the beginning, numbers and marks: problems in the last place."""
+    starts = np.array([(it.begin.spring, it.begin.psis[0]) for it in problems]).T
+    marks = [it.marks for it in problems]
+    p = np.ascontiguousarray(np.array([it.p for it in problems]).T)
+    return starts[0].copy(), starts[1].copy(), p, np.ascontiguousarray(np.array(marks).T)
+
+
+def scales(a: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Changes of the unknowns that weigh as much as 1 in ln V, between ruptures and in them."""
+    return (a, a, 1.0), (a, 1.0, a)

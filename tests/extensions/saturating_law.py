@@ -1,0 +1,50 @@
+"""A law with a number of its own: away from steady sliding its evolution saturates, the closer to
+it the larger that number; at 0 it is the slip law.
+"""
+
+import math
+from dataclasses import dataclass
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.slider.laws import Law
+from rsfstudy.slider.parts import number
+
+OWN = 0
+
+
+def evolution(log_rate, state, p):
+    b, sharpness = p[OWN], p[OWN + 1]
+    ahead = state / b + log_rate
+    if sharpness == 0.0:
+        return -b * ahead
+    return -b * math.tanh(sharpness * ahead) / sharpness
+
+
+@dataclass(frozen=True, kw_only=True)
+class SaturatingLaw(Law):
+    sharpness: float = number(0.5, "$n$", "1", "sharpness of the law", rule="must be 0 or greater")
+
+    name = "saturating"
+    evolution = staticmethod(evolution)
+
+    def numbers(self, scene):
+        return (*super().numbers(scene), self.sharpness)
+
+    def check(self, scene):
+        super().check(scene)
+        if self.sharpness > 1.0:
+            raise InvalidValue("sharpness", self.sharpness, "must not exceed 1")
+
+
+study = Study(
+    name="saturating_laws",
+    title="Critical displacement step where evolution saturates",
+    base=Scene(law=SaturatingLaw, normal_stress="constant", instability_norm=1e6),
+    axes=[
+        Axis("sharpness", [0.0, 0.5, 1.0]),
+        Axis("stiffness_ratio", [0.8, 1.5]),
+    ],
+    measure=CriticalStep(of="displacement_step"),
+)

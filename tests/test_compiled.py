@@ -1,0 +1,516 @@
+"""The compiled engine: the same physics, told by the same events, whatever the parts of a scene."""
+
+import ctypes
+import importlib
+import importlib.util
+import itertools
+import math
+import sys
+import types
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import agreement
+import numpy as np
+import pytest
+from numba.core.bytecode import FunctionIdentity
+from running import SMALL, run
+
+from rsfstudy import Scene, critical_step, limit_cycle, simulate
+from rsfstudy.compute import cells
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.cell import Cell
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.coverage import QUESTIONS, random_scene
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.motion import engines
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.compiled import building, engine, machine
+from rsfstudy.motion.course import along, follow
+from rsfstudy.motion.engines import COMPILED, ENGINES, compiling
+from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider.equations import between_ruptures, rigid
+from rsfstudy.slider.fields import SLOTS
+from rsfstudy.slider.laws import Law
+from rsfstudy.slider.laws.slip import SlipLaw
+from rsfstudy.slider.parts import Part, is_flag
+from rsfstudy.status import Status
+
+CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+#: Accuracy of the motions that are compared, and what they may differ by. Both engines take the
+#: same steps but for rounding, which an unstable motion amplifies, a rupture most of all.
+ALIKE, APART, APART_BY_RUPTURES = 1e-8, 1e-6, 1e-4
+
+
+def parts_of_examples() -> list[type[Part]]:
+    """The parts of a user's own in the examples outside of the package."""
+    found = []
+    for file in sorted((Path(__file__).parent / "extensions").glob("*.py")):
+        spec = importlib.util.spec_from_file_location(f"example_{file.stem}", file)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module
+        spec.loader.exec_module(module)
+        own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]
+        found += [p for p in own if p.__module__ == spec.name]
+    forget_examples()
+    return found
+
+
+def forget_examples() -> None:
+    """Other tests in this process know the examples as parts of study files."""
+    for slot in SLOTS:
+        for name, part in list(slot.own.items()):
+            if part.__module__.startswith("example_"):
+                del slot.own[name]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def examples_are_forgotten():
+    yield
+    forget_examples()
+
+
+def fields_of(part: type[Part], slot: str) -> dict:
+    """What calls a part into a scene."""
+    if slot == "dynamics" and part.__module__.startswith("rsfstudy."):
+        called_by = part.called_by
+        return {called_by: True if is_flag(part, called_by) else 1e-3} if called_by else {}
+    return {slot: part.name if part.__module__.startswith("rsfstudy.") else part}
+
+
+BASES = {
+    "law": laws.Law,
+    "normal_stress": normal_stress.NormalStress,
+    "fluid": fluid.Fluid,
+    "dynamics": dynamics.Dynamics,
+    "loading": loading.Loading,
+}
+STRESSES, FLUIDS = list(normal_stress.PARTS.values()), list(fluid.PARTS.values())
+#: Each law in each dynamics; every two of the other parts meet in some of them.
+OURS = [
+    {
+        **fields_of(law, "law"),
+        **fields_of(STRESSES[number % 2], "normal_stress"),
+        **fields_of(FLUIDS[number // 2 % 2], "fluid"),
+        **fields_of(acting, "dynamics"),
+    }
+    for number, (law, acting) in enumerate(
+        itertools.product(laws.PARTS.values(), dynamics.PARTS.values())
+    )
+]
+#: Stress that acts on the state, alone, beside what normal stress does, and in ruptures.
+OURS += [
+    {"law": "slip", "normal_stress": "constant", "stress_dependence": 0.5},
+    {"law": "composite", "normal_stress": "variable", "stress_dependence": 2.0},
+    {"law": "perrin_rice_zheng", "normal_stress": "variable", "inertia": True,
+     "stress_dependence": 1.0},
+]  # fmt: skip
+THEIRS = [
+    fields_of(part, slot)
+    for part in parts_of_examples()
+    for slot, base in BASES.items()
+    if issubclass(part, base)
+]
+
+
+def named(fields: dict) -> str:
+    return " ".join(str(getattr(value, "name", value)) for value in fields.values())
+
+
+def told(scene: Scene, by: str, **options) -> tuple[list, Meter]:
+    """Events of a motion by an engine, and the work."""
+    load = scene.log_load_rate if scene.load_velocity else -1.0
+    watches = (
+        maximum("log_rate"),
+        minimum("log_rate", waits=True),
+        rise("log_rate", load),
+        fall("log_rate", load, waits=True),
+        maximum("spring"),
+        fall("state", -0.01),
+        settling(1e-3, ends=True),
+    )
+    meter, events = Meter(60_000, engine=by), []
+    try:
+        for event in follow(scene, Accuracy(ALIKE), meter, watches, clock=True, **options):
+            events.append(event)
+            if len(events) == 24:
+                break
+    except Halt as halt:
+        events.append(halt.status)
+    return events, meter
+
+
+def agree(one: list, other: list, within: float = APART) -> None:
+    """Row by row the same, but for rounding and what the motion makes of it."""
+    assert [kind_of(event) for event in other] == [kind_of(event) for event in one]
+    for a, b in zip(one, other, strict=True):
+        # settled is told at the end of a step, and steps end elsewhere where a last bit differs
+        if isinstance(a, Status) or a.kind is Kind.SETTLED:
+            continue
+        assert b.time == pytest.approx(a.time, rel=within, abs=1e-9, nan_ok=True)
+        assert b.slip == pytest.approx(a.slip, rel=within, abs=1e-7, nan_ok=True)
+        for name in ("log_rate", "spring", "friction", "psi", "state", "coefficient", "psis"):
+            theirs, ours = getattr(b.point, name), getattr(a.point, name)
+            assert theirs == pytest.approx(ours, rel=within, abs=0.1 * within), name
+        assert b.point.normal_stress == pytest.approx(a.point.normal_stress, rel=within)
+
+
+def kind_of(event) -> object:
+    return event if isinstance(event, Status) else (event.kind, event.watch, event.regime)
+
+
+# ---- the same events -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fields", [*OURS, *THEIRS], ids=named)
+def test_every_part_tells_the_same_events(fields):
+    """Ours in all combinations, and each of the examples of a user's own."""
+    more = {} if "loading" in fields else {"load_velocity_ratio": 2.0}
+    scene = Scene(stiffness_ratio=0.8 if "inertia" in fields else 1.3, **fields, **more)
+    (one, plain), (other, compiled) = (told(scene, by, until=300.0) for by in ENGINES)
+    assert len(one) > 3
+    agree(one, other, APART_BY_RUPTURES if scene.has_mass else APART)
+    assert compiled.spent == pytest.approx(plain.spent, rel=0.02, abs=30)
+    assert compiled.steps == pytest.approx(plain.steps, rel=0.02, abs=3)
+    assert set(compiled.by_regime) == set(plain.by_regime)
+
+
+def test_steps_are_the_same_one_by_one():
+    """The same tableau and the same controller: where rounding is not amplified, every count."""
+    scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=3.0)
+    (one, plain), (other, compiled) = (told(scene, by, until=8.0) for by in ENGINES)
+    agree(one, other)
+    # the last step may reach the end or not, and roots take an evaluation more or less
+    assert abs(compiled.steps - plain.steps) <= 1
+    assert abs(compiled.spent - plain.spent) <= 12 + 4 * len(one)
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_paths_forward_and_backward(backward):
+    scene = Scene(stiffness_ratio=1.2, load_velocity_ratio=3.0)
+    equations, start = between_ruptures(scene, clock=False), (0.01, 0.004)
+    rows = []
+    for by in ENGINES:
+        meter = Meter(5_000, engine=by)
+        watches = (
+            maximum("log_rate"),
+            minimum("log_rate"),
+            fall("log_rate", 0.1),
+            rise("psi", 0.02),
+            fall("psi", 0.0),
+        )
+        path = along(equations, start, 1e-8, meter, watches, backward=backward)
+        rows.append(list(itertools.islice(path, 2)))
+    agree(*rows)
+    assert all(math.isnan(event.slip) for event in rows[1])
+
+
+def test_a_rigid_slider_and_its_samples():
+    scene = Scene(load_velocity_ratio=10.0)
+    rows = []
+    for by in ENGINES:
+        samples = [0.0, 0.5, 1.0, 3.0]
+        watches = [fall("friction", 0.03)]
+        path = along(
+            rigid(scene, scene.log_load_rate),
+            (0.05,),
+            1e-8,
+            Meter(5_000, engine=by),
+            watches,
+            samples=samples,
+        )
+        rows.append(list(itertools.islice(path, 6)))
+    agree(*rows)
+    assert [e.slip for e in rows[1] if e.kind is Kind.SAMPLE] == [0.0, 0.5, 1.0, 3.0]
+
+
+def test_trajectories_are_the_same():
+    one, other = (simulate(Scene(**CYCLE), duration=40.0, engine=by) for by in ENGINES)
+    assert other.attrs["engine"] == COMPILED
+    assert other.sizes["sample"] == pytest.approx(one.sizes["sample"], rel=0.02)
+    assert set(np.unique(other["regime"])) == set(np.unique(one["regime"])) == {1, 2}
+    for name in ("log10_slip_rate", "shear_stress", "state_variable"):
+        for extreme in ("min", "max"):
+            theirs, ours = (float(getattr(motion[name], extreme)()) for motion in (other, one))
+            assert theirs == pytest.approx(ours, rel=1e-4)
+    assert float(other["time"][-1]) == pytest.approx(40.0, rel=1e-12)
+
+
+def test_trajectories_of_a_fluid_are_the_same():
+    scene = Scene(fluid="dilatant", stiffness_ratio=1.3, load_velocity_ratio=1.2)
+    one, other = (simulate(scene, duration=20.0, engine=by) for by in ENGINES)
+    for name in ("porosity", "pore_pressure", "normal_stress_ratio"):
+        for extreme in ("min", "max"):
+            theirs, ours = (float(getattr(motion[name], extreme)()) for motion in (other, one))
+            assert theirs == pytest.approx(ours, rel=1e-6, abs=1e-12)
+    assert (one["pore_pressure"] != 0.0).any()
+
+
+@pytest.mark.parametrize("rows", [8, 9, 10, 11, 12, 13])
+def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypatch):
+    """Regimes change in the middle of a table, and at its last rows."""
+    scene, accuracy = Scene(**CYCLE), Accuracy(rtol=1e-3, engine=COMPILED)
+    whole = LimitCycle(phases=50)(scene, accuracy)
+    monkeypatch.setattr(engine, "_RECORDED", rows)
+    pieces = LimitCycle(phases=50)(scene, accuracy)
+    assert np.array_equal(whole.values["shear_stress"], pieces.values["shear_stress"])
+    assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
+
+
+def test_a_budget_ends_both_alike():
+    ends = [
+        LimitCycle(phases=2)(Scene(**CYCLE), Accuracy(1e-6, 2_000, engine=by)) for by in ENGINES
+    ]
+    assert [end.status for end in ends] == [Status.WORK_BUDGET_SPENT] * 2
+    assert ends[1].rhs_evaluations == pytest.approx(ends[0].rhs_evaluations, abs=13)
+
+
+# ---- the same answers ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sample", range(24))
+def test_random_scenes_end_alike_within_their_errors(sample):
+    measure, scene, accuracy = next(
+        one for number, one in enumerate(agreement.random_scenes(24)) if number == sample
+    )
+    one = agreement.compared(measure, scene, replace(accuracy, rtol=max(accuracy.rtol, 1e-7)))
+    assert one.same_end, one.what
+    assert not one.worst > 1.0, one.what
+
+
+@pytest.mark.parametrize("question", sorted(QUESTIONS))
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_dilatant_faults_end_alike_within_their_errors(question, law):
+    like = Scene(law=law, fluid="dilatant", dilatancy=0.001, inertia=law == "slip")
+    scene = random_scene(like, question, 0)
+    one = agreement.compared(QUESTIONS[question], scene, Accuracy(1e-4))
+    assert one.same_end, one.what
+    assert not one.worst > 1.0, one.what
+
+
+def test_hard_cases_come_out():
+    """All that break ordinary codes, held against their answers."""
+    study = catalogue.load("hard_cases")
+    ended = run(study, engine=COMPILED)
+    assert (ended["status"] == int(Status.OK)).all()
+
+
+def test_one_scene_calls_take_an_engine():
+    values = [float(critical_step(Scene(), engine=by)["critical_velocity_ratio"]) for by in ENGINES]
+    assert values[1] == pytest.approx(values[0], rel=1e-6)
+    ours = limit_cycle(Scene(**CYCLE), rtol=1e-6, engine=COMPILED)
+    assert ours.attrs["status"] == "ok"
+    assert ours.attrs["engine"] == COMPILED
+
+
+# ---- what cannot be ------------------------------------------------------------------------------
+
+OWN = 0
+TABLE = {"part": 0.5}
+
+
+def tabulated(log_rate, state, p):
+    return -(state + p[OWN] * log_rate) * TABLE["part"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tabulated(Law):
+    name = "tabulated"
+    evolution = staticmethod(tabulated)
+
+
+def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
+    line = tabulated.__code__.co_firstlineno + 1
+    with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
+        engine.prepare(Scene(law=Tabulated))
+    assert simulate(Scene(law=Tabulated, stiffness=0.01), duration=1.0).attrs["status"] == "ok"
+
+
+def guarded(log_rate, state, p):
+    if log_rate > 1.0:
+        raise ValueError("too fast for these experiments")
+    return -(state + p[OWN] * log_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guarded(Law):
+    name = "guarded"
+    evolution = staticmethod(guarded)
+
+
+def test_a_part_that_raises_is_refused():
+    """Compiled functions cannot raise; a motion that goes on regardless would be wrong."""
+    scene = Scene(law=Guarded, stiffness_ratio=1.5, load_velocity_ratio=20.0)
+    with pytest.raises(ValueError, match="too fast"):
+        simulate(scene, duration=10.0)
+    with pytest.raises(InvalidValue, match="guarded, .*it raises an error"):
+        simulate(scene, duration=10.0, engine=COMPILED)
+
+
+def ending(log_rate, state, p):
+    return math.nan if log_rate > 1.0 else -(state + p[OWN] * log_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ending(Law):
+    name = "ending"
+    evolution = staticmethod(ending)
+
+
+@pytest.mark.parametrize("by", ENGINES)
+def test_a_rate_that_is_no_number_ends_the_motion(by):
+    scene = Scene(law=Ending, stiffness_ratio=1.5, load_velocity_ratio=20.0)
+    ended = simulate(scene, duration=10.0, budget=5_000, engine=by)
+    assert ended.attrs["status"] in ("integration_failed", "work_budget_spent")
+    assert float(ended["log10_slip_rate"].max()) <= 1.0 / math.log(10.0)
+
+
+def test_without_numba_the_remedy_is_told(monkeypatch):
+    for name in list(sys.modules):
+        if name.startswith("rsfstudy.motion.compiled"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.setattr(engines, "compiled_engine", engines.compiled_engine.__wrapped__)
+    with pytest.raises(InvalidValue, match=r"needs Numba.*pip install 'rsfstudy\[fast\]'"):
+        run(SMALL, engine=COMPILED)
+
+
+def test_an_unknown_engine_and_integrators_of_another_are_refused():
+    with pytest.raises(InvalidValue, match="scipy, compiled"):
+        run(SMALL, engine="julia")
+    with pytest.raises(InvalidValue, match="SciPy's"):
+        Accuracy(methods=(("inertial", "Radau"),), engine=COMPILED)
+
+
+# ---- files and time ------------------------------------------------------------------------------
+
+
+def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
+    small = replace(SMALL, axes=SMALL.axes[:1])
+    ran = run(small, engine=COMPILED, output=tmp_path, workers=1)
+    assert '"engine": "compiled"' in ran.attrs["provenance"]
+    assert '"numba"' in ran.attrs["provenance"]
+    with pytest.raises(DataError, match="engine"):
+        run(small, output=tmp_path)
+
+
+@dataclass(frozen=True)
+class Compiles(Measure):
+    """Takes no time, of which it spends a thousand seconds compiling."""
+
+    name = "compiles"
+    headline = "answer"
+    variables = {"answer": ()}  # noqa: RUF012
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        compiling.seconds += 1_000.0
+        return Outcome(Status.OK, {"answer": 42.0})
+
+
+def test_compiling_is_not_in_the_time_of_a_cell(monkeypatch):
+    monkeypatch.setattr(compiling, "seconds", compiling.seconds)
+    task = cells.Task(Compiles(), Accuracy())
+    assert cells.computed(task, Cell(Scene(), {}))[1] < -900.0
+
+
+# ---- the cache -----------------------------------------------------------------------------------
+
+known = types.ModuleType("known")
+known.NUMBER = 1.0
+
+
+def doubled(y, rates, p, result):
+    result[0] = 2.0 * y[0]
+
+
+def tripled(y, rates, p, result):
+    result[0] = 3.0 * y[0]
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return building.cache_folder()
+
+
+def compiled_programs(function=doubled) -> int:
+    """How many programs it takes to have a function called by its address."""
+    before = compiling.programs
+    (address,) = building.called_by_address([function], {})
+    assert address
+    return compiling.programs - before
+
+
+def test_what_is_compiled_is_found_again(empty_cache):
+    assert [compiled_programs() for _ in range(3)] == [1, 0, 0]
+    assert compiled_programs(tripled) == 1
+    assert len(list(empty_cache.iterdir())) == 2
+
+
+@pytest.mark.parametrize("place", ["first", "middle", "last"])
+def test_a_damaged_cache_costs_time_only(place, empty_cache):
+    compiled_programs()
+    machine_code = max(empty_cache.rglob("*.nbc"), key=lambda file: file.stat().st_size)
+    content = bytearray(machine_code.read_bytes())
+    at = {"first": 0, "middle": len(content) // 2, "last": len(content) - 1}[place]
+    content[at] ^= 0xFF
+    machine_code.write_bytes(content)
+    assert [compiled_programs() for _ in range(2)] == [1, 0]
+
+
+def test_a_cache_that_cannot_be_written_costs_time_only(empty_cache):
+    empty_cache.parent.write_text("no folder")
+    assert [compiled_programs() for _ in range(2)] == [1, 1]
+
+
+def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeypatch):
+    """Their functions are alike in name, and each process numbers those it compiles from one on: as
+    here, where both begin at the same number. Then both are loaded.
+    """
+    function = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4)
+    for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
+        monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
+        building._jitted.cache_clear()
+        machine.addresses.cache_clear()
+        scene = Scene(law=law, normal_stress="constant", fluid="dilatant", inertia=True)
+        equations = between_ruptures(scene, clock=False)
+        state = (0.01, 0.02, 0.001, 0.002)
+        y, p = (ctypes.c_double * 4)(*state), (ctypes.c_double * len(equations.p))(*equations.p)
+        result = (ctypes.c_double * 4)()
+        function(engine._addresses(equations)[0])(y, y, p, result)
+        assert list(result) == pytest.approx(list(equations.rates(state)), rel=1e-12)
+
+
+def test_a_cache_of_other_code_is_never_used(monkeypatch):
+    """Any change of a function, or of a number it reads, makes another digest."""
+    scene = Scene(law=SlipLaw)
+    rate = between_ruptures(scene, clock=False).rate
+    before = building.digest_of(rate)
+    assert building.digest_of(rate) == before
+    strength = rate.__globals__["balance"].__globals__["strength"]
+    monkeypatch.setitem(strength.__globals__["state_effect"].__globals__, "OWN", 3)
+    assert building.digest_of(rate) != before
+    assert building.digest_of(doubled) != building.digest_of(tripled)
+
+
+def by_module(y, rates, p, result):
+    result[0] = known.NUMBER * y[0]
+
+
+def test_a_number_of_another_module_counts_too(monkeypatch):
+    monkeypatch.setattr(known, "NUMBER", 2.0)
+    before = building.digest_of(by_module)
+    monkeypatch.setattr(known, "NUMBER", 3.0)
+    assert building.digest_of(by_module) != before
+
+
+def test_equations_are_shared_by_scenes_of_the_same_parts():
+    before = machine.addresses.cache_info().currsize
+    for ratio in (1.1, 1.2, 1.3):
+        CriticalStep()(Scene(stiffness_ratio=ratio), Accuracy(1e-4, engine=COMPILED))
+    assert machine.addresses.cache_info().currsize <= before + 1

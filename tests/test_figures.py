@@ -1,0 +1,450 @@
+"""Figures that a journal would print: of every named study, of any lattice, in any style."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from matplotlib.container import ErrorbarContainer
+from matplotlib.image import imread
+from matplotlib.lines import Line2D
+from matplotlib.mathtext import MathTextParser
+from matplotlib.text import Text
+from running import call, named_results, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy.declare import catalogue
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import store
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.plots import _text
+from rsfstudy.plots._axes import is_log_spaced
+from rsfstudy.quantity import Quantity
+
+MM = 25.4
+#: Inches by which neighbours may seem to touch: extents are those of the highest letters.
+SLACK = 0.01
+
+
+@pytest.fixture(scope="module", params=catalogue.names())
+def figure(request, tmp_path_factory, cluster):
+    """The figure of enough of each study."""
+    dataset, _path = named_results(request.param, tmp_path_factory, client=cluster)
+    return plots.figure(dataset)
+
+
+def boxes(figure, artists):
+    """Extents in inches, of what has any."""
+    found = [(artist, artist.get_window_extent()) for artist in artists]
+    dpi = figure.dpi
+    return [(a, np.array(box.extents) / dpi) for a, box in found if box.width and box.height]
+
+
+def overlap(first, second, slack=SLACK):
+    """Whether two extents have more than a hair in common."""
+    low, high = np.maximum(first[:2], second[:2]), np.minimum(first[2:], second[2:])
+    return bool((high - low > slack).all())
+
+
+def texts(figure):
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def written(figure):
+    """Titles, letters, labels of axes, and legends: all that stands around data."""
+    around = [figure.legends]
+    for axes in figure.axes:
+        # the letters and titles, left, centred and right, and no tick
+        titles = [child for child in axes.get_children() if isinstance(child, Text)]
+        around.append([t for t in titles if t not in axes.texts and t.get_text()])
+        around.append([axes.xaxis.label, axes.yaxis.label])
+        around.append(filter(None, [axes.get_legend()]))
+    return list(itertools.chain(*around))
+
+
+def assert_printable(figure):
+    """Nothing sticks out, covers anything else, or names what is not there."""
+    width, height = figure.get_size_inches()
+    left, low, right, high = figure.get_tightbbox().extents
+    assert left > -SLACK, "sticks out on the left"
+    assert low > -SLACK, "sticks out below"
+    assert right < width + SLACK, "sticks out on the right"
+    assert high < height + SLACK, "sticks out above"
+    for axes in figure.axes:
+        inside = np.array(axes.get_window_extent().extents) / figure.dpi
+        for text, box in boxes(figure, axes.texts):
+            assert (box[:2] > inside[:2] - SLACK).all(), f"{text} leaves its axes"
+            assert (box[2:] < inside[2:] + SLACK).all(), f"{text} leaves its axes"
+    for (one, first), (other, second) in itertools.combinations(boxes(figure, written(figure)), 2):
+        assert not overlap(first, second), f"{one} touches {other}"
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    for (_legend, box), axes in itertools.product(
+        boxes(figure, filter(None, legends)), figure.axes
+    ):
+        data = np.array(axes.get_window_extent().extents) / figure.dpi
+        assert not overlap(box, data), f"a legend covers {axes.get_title()}"
+
+
+def is_seen(artist):
+    """Whether there is anything of it to be seen."""
+    line = artist.lines[0] if isinstance(artist, ErrorbarContainer) else artist
+    if isinstance(line, Line2D):
+        return bool(np.isfinite(np.asarray(line.get_xydata(), dtype=float)).all(axis=1).any())
+    return not hasattr(line, "get_paths") or len(line.get_paths()) > 0
+
+
+def test_nothing_sticks_out_or_covers_anything_else(figure):
+    assert_printable(figure)
+
+
+def test_it_fits_a_journal(figure):
+    """One column wide, or two, and no higher than a page."""
+    width, height = figure.get_size_inches() * MM
+    assert min(abs(width - 84.0), abs(width - 174.0)) < 0.1
+    assert height < 235.0
+
+
+def test_legends_name_what_is_drawn(figure):
+    drawn = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            drawn[label.replace("\n", " ")] = drawn.get(label, False) or is_seen(handle)
+    for legend in filter(None, [*figure.legends, *(axes.get_legend() for axes in figure.axes)]):
+        named = [text.get_text().replace("\n", " ") for text in legend.get_texts()]
+        assert len(set(named)) == len(named)
+        for name in named:
+            assert drawn.get(name), f"nothing is drawn of {name!r}"
+
+
+def test_symbols_are_written_as_symbols(figure):
+    """No raw underscore, no name of a Greek letter; and formulas that can be set."""
+    parser = MathTextParser("path")
+    for text in texts(figure):
+        if "$" in text:
+            parser.parse(text)
+        words = re.sub(r"\$[^$]*\$", "", text)
+        assert "_" not in words, text
+        assert not re.search(r"\b(alpha|phi|sigma|mu|tau|zeta|theta)\b", words), text
+
+
+def test_panels_have_letters(figure):
+    letters = [axes.get_title(loc="left").strip() for axes in figure.axes]
+    letters = [letter for letter in letters if letter]
+    panels = [axes for axes in figure.axes if axes.get_subplotspec() and axes.get_xlabel()]
+    expected = [f"({chr(ord('a') + number)})" for number in range(len(panels))]
+    assert letters == (expected if len(panels) > 1 else [])
+
+
+def test_numbers_along_axes_do_not_touch(figure):
+    for axes, which in itertools.product(figure.axes, ("x", "y")):
+        axis = getattr(axes, f"{which}axis")
+        low, high = sorted(axis.get_view_interval())
+        ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+        shown = [t.label1 for t in ticks if low <= t.get_loc() <= high and t.label1.get_visible()]
+        found = boxes(figure, [label for label in shown if label.get_text()])
+        for (one, first), (other, second) in itertools.combinations(found, 2):
+            assert not overlap(first, second), f"{one} touches {other}"
+
+
+# ---- study by study -----------------------------------------------------------------------------
+
+
+def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
+    """And draws none: the drops of the slowness law at 50 degrees are curved."""
+    dataset, _path = named_results("stress_drop", tmp_path_factory)
+    axes = plots.figure(dataset).axes[1]
+    labels = axes.get_legend_handles_labels()[1]
+    curved = [label for label in labels if "no line fits" in label]
+    assert [label.split(",")[0] for label in curved] == [r"$\phi$ = 50", r"$\phi$ = 50"]
+    fitted = [line for line in axes.lines if line.get_label().startswith("_child")]
+    assert len(fitted) == len(labels) - len(curved)
+
+
+def test_stress_below_zero_is_marked(tmp_path_factory):
+    dataset, _path = named_results("limit_cycles", tmp_path_factory)
+    drawn = plots.figure(dataset)
+    marked = [
+        "below 0: stress reversed" in axes.get_legend_handles_labels()[1] for axes in drawn.axes
+    ]
+    lowest = [float(dataset.frictional_stress.sel(law=law).min()) for law in dataset.law.values]
+    assert marked == 2 * [low < 0.0 for low in lowest]
+
+
+def test_all_decades_of_bounded_slip_are_seen(tmp_path_factory):
+    """The quasi-static peak at 10^87 V_*, and the motions in more than half of their panel."""
+    dataset, _path = named_results("bounded_slip", tmp_path_factory)
+    panels = plots.figure(dataset).axes
+    assert panels[2].get_ylim()[1] > float(dataset.max_log10_slip_rate.max()) > 80.0
+    for axes in panels[:2]:
+        low, high = axes.get_ylim()
+        stresses = np.concatenate([line.get_ydata() for line in axes.lines[:2]])
+        assert np.ptp(stresses) > 0.5 * (high - low)
+
+
+def test_the_curves_of_figure_6_fill_their_panel(tmp_path_factory):
+    dataset, _path = named_results("rate_step_stiffness", tmp_path_factory)
+    axes = plots.figure(dataset).axes[0]
+    low, high = axes.get_ylim()
+    assert axes.get_yscale() == "linear"
+    assert np.ptp(dataset.critical_velocity_ratio.sel(law="slip").values) > 0.6 * (high - low)
+
+
+def test_each_case_of_the_lattice_has_its_own_cells(tmp_path_factory):
+    dataset, _path = named_results("rate_step_lattice", tmp_path_factory)
+    drawn = plots.figure(dataset)
+    assert len(drawn.axes) == dataset.sizes["case"]
+    for axes, case in zip(drawn.axes, dataset.case.values, strict=True):
+        unstable = axes.collections[1].get_offsets()
+        assert len(unstable) == int((dataset.unstable.sel(case=case) == 1.0).sum())
+
+
+def test_no_error_and_no_work_are_said_in_words(tmp_path_factory):
+    dataset, _path = named_results("hard_cases", tmp_path_factory)
+    errors, work = plots.figure(dataset).axes
+    said = [text.get_text() for text in errors.texts]
+    known = dataset.answer.notnull()
+    assert said.count("exact") == int(((dataset.measured_error == 0.0) & known).sum())
+    assert len(said) == said.count("exact") + int((~known).sum())
+    assert [text.get_text() for text in work.texts] == ["none"] * int(
+        (dataset.rhs_evaluations == 0).sum()
+    )
+    assert len(work.patches) == int((dataset.rhs_evaluations > 0).sum())
+
+
+# ---- any lattice --------------------------------------------------------------------------------
+
+
+def lattice(*axes, **fields):
+    """Critical stiffness over some axes."""
+    return run(
+        Study(
+            name="mine",
+            title="Critical stiffness k_cr of my own, with $k_{cr} D_c/\\sigma_*$ in a long title",
+            base=Scene(alpha=0.56),
+            axes=list(axes),
+            measure=LinearStability(),
+            **fields,
+        )
+    )
+
+
+RATES = Axis("load_velocity_ratio", np.geomspace(1e-4, 1e4, 9))
+ANGLES = Axis("phi", [38.0, 45.0, 60.0, 75.0])
+AWKWARD = {
+    "alpha = 0.25, my_own": {"alpha": 0.25},
+    "k_cr at V_*": {"alpha": 0.56},
+    "costs $5": {"alpha": 0.4},
+}
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        [RATES],
+        [Axis("phi", [60.0])],
+        [Axis("phi", [50.0, 60.12345678901234]), RATES],
+        [Axis("case", AWKWARD), Axis("law", ["slip", "slowness"])],
+        [Axis("case", AWKWARD), RATES],
+        [ANGLES, RATES],
+        [Axis("law", ["slip", "slowness"]), ANGLES, RATES],
+        [Axis("alpha", np.linspace(0.0, 0.5, 9)), Axis("phi", [50.0, 60.0])],
+        [Axis("alpha", np.linspace(0.0, 0.5, 40)), Axis("law", ["slip", "slowness"])],
+    ],
+    ids=lambda axes: ", ".join(axis.dimension for axis in axes),
+)
+def test_any_lattice_is_printable(axes):
+    drawn = plots.figure(lattice(*axes))
+    assert_printable(drawn)
+    for test in (test_it_fits_a_journal, test_legends_name_what_is_drawn):
+        test(drawn)
+    test_symbols_are_written_as_symbols(drawn)
+
+
+def test_lines_say_little_and_join_no_names():
+    named = plots.figure(lattice(Axis("case", AWKWARD), Axis("law", ["slip", "slowness"])))
+    assert {line.get_linestyle() for line in named.axes[0].lines} == {"None"}
+    labels = plots.figure(lattice(Axis("phi", [50.0, 60.12345678901234]), RATES)).axes[0]
+    assert labels.get_legend_handles_labels()[1] == [r"$\phi$ = 50°", r"$\phi$ = 60.12°"]
+    assert labels.get_xscale() == "log"
+
+
+def test_lines_draw_all_that_was_measured_and_varies():
+    drawn = plots.figure(lattice(RATES)).axes
+    assert [axes.get_ylabel().split("\n")[0] for axes in drawn][:1] == [
+        "Critical stiffness of steady"
+    ]
+    assert len(drawn) == 4
+
+
+def test_curves_that_lie_on_each_other_are_one():
+    """An angle means nothing at constant normal stress: one curve, named once."""
+    stress = Axis("normal_stress", ["constant", "variable"])
+    axes = plots.figure(lattice(stress, Axis("phi", [50.0, 60.0]), RATES)).axes[0]
+    assert axes.get_legend_handles_labels()[1] == [
+        "constant",
+        r"variable, $\phi$ = 50°",
+        r"variable, $\phi$ = 60°",
+    ]
+
+
+def test_two_axes_of_numbers_are_a_map_with_statuses_that_are_no_number():
+    dataset = lattice(ANGLES, RATES)
+    drawn = plots.figure(dataset)
+    assert drawn.axes[0].get_xscale() == "log"
+    assert texts(drawn).count("no steady state") == 1
+    (unknown,) = (c for c in drawn.axes[0].collections if c.get_label() == "no steady state")
+    assert unknown.get_hatch()
+    widths = [np.ptp(np.log10(path.vertices[:, 0])) for path in unknown.get_paths()]
+    assert sum(widths) == pytest.approx(int(dataset.critical_stiffness.isnull().sum()))
+
+
+def test_any_variable_on_request():
+    dataset = lattice(ANGLES, RATES)
+    drawn = rsfstudy.plot(dataset, "steady_friction")
+    assert any("friction coefficient" in text.replace("\n", " ") for text in texts(drawn))
+    with pytest.raises(InvalidValue, match="variable = 'friction': is no number"):
+        rsfstudy.plot(dataset, "friction")
+    with pytest.raises(InvalidValue, match="variable = 'message'"):
+        rsfstudy.plot(dataset, "message")
+
+
+# ---- style and files ----------------------------------------------------------------------------
+
+
+def test_a_style_of_the_users_own(tmp_path):
+    dataset = lattice(RATES)
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("figure.figsize: 3.5, 2.6\naxes.prop_cycle: cycler('color', ['123456'])\n")
+    ours, theirs = plots.figure(dataset), rsfstudy.plot(dataset, style=sheet)
+    assert theirs.get_size_inches()[0] == pytest.approx(7.0 + 6.0 / MM)
+    assert theirs.axes[0].lines[0].get_color() in ("#123456", "123456")
+    assert ours.axes[0].lines[0].get_color() != theirs.axes[0].lines[0].get_color()
+    larger = rsfstudy.plot(dataset, style=[sheet, {"font.size": 11.0, "xtick.labelsize": 11.0}])
+    assert larger.axes[0].xaxis.get_ticklabels()[0].get_size() == 11.0
+    with pytest.raises(InvalidValue, match="style = 'nothing': is neither a style sheet"):
+        rsfstudy.plot(dataset, style="nothing")
+
+
+def test_ours_is_left_alone():
+    """Nothing is drawn in another style later."""
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    plots.figure(lattice(RATES))
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_a_notebook_shows_a_figure():
+    assert rsfstudy.plot(lattice(RATES))._repr_png_().startswith(b"\x89PNG")
+
+
+BEGINS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    path = tmp_path_factory.mktemp("results") / "mine.nc"
+    store.write(lattice(ANGLES, RATES), path)
+    return path
+
+
+@pytest.mark.parametrize("form", plots.FORMATS)
+def test_plot_writes_the_file_it_is_told_to(form, results, tmp_path):
+    target = tmp_path / "deep" / f"fig.{form}"
+    ran = call("plot", results, "--output", target)
+    assert ran.returncode == 0, ran.stderr
+    assert target.read_bytes().startswith(BEGINS[form])
+    assert [file.name for file in results.parent.iterdir()] == ["mine.nc"]
+    again = tmp_path / f"again.{form}"
+    assert call("plot", results, "--output", again).returncode == 0
+    assert again.read_bytes() == target.read_bytes()
+
+
+def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_path):
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("savefig.dpi: 50\n")
+    options = ["--output", tmp_path, "--variable", "steady_friction", "--style", sheet]
+    assert call("plot", results, *options).returncode == 0
+    assert imread(tmp_path / "mine.steady_friction.png").shape[1] == int(84.0 / MM * 50)
+    assert call("plot", results, "--figure", "svg", "--output", tmp_path).returncode == 0
+    assert (tmp_path / "mine.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["--output", "fig.pdf", "--figure", "svg"], 2, "nor another --figure"),
+        (["--figure", "jpg"], 2, "'jpg' is not one of"),
+        (["--style", "nothing"], 2, "is neither a style sheet"),
+        (["--variable", "nothing"], 1, "variable = 'nothing': is no number"),
+    ],
+)
+def test_what_is_wrong_is_told(words, status, message, results):
+    ran = call("plot", results, *words)
+    assert ran.returncode == status
+    assert message in " ".join(ran.stderr.split())
+
+
+def test_run_takes_a_format_and_a_style(tmp_path, monkeypatch):
+    words = ["rate_step_boundary", "--serial", "--set", "b_over_a=2,3", "--output", tmp_path]
+    ran = call("run", *words, "--figure", "pdf", "--style", "grayscale")
+    assert ran.returncode == 0, ran.stderr
+    assert (tmp_path / "rate_step_boundary.pdf").read_bytes().startswith(b"%PDF")
+    assert not (tmp_path / "rate_step_boundary.png").exists()
+
+
+# ---- words and numbers --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("alpha = 0.56", r"$\alpha$ = 0.56"),
+        ("slowness at 1.5 k_cr", r"slowness at 1.5 $k_{cr}$"),
+        ("load point moving at V_*", "load point moving at $V_*$"),
+        ("phi = atan(mu_*) + 0.01", r"$\phi$ = atan($\mu_*$) + 0.01"),
+        ("peak at 10^87 V_*", "peak at $10^{87}$ $V_*$"),
+        ("T = 1e-6 s", "T = $10^{-6}$ s"),
+        ("my_own case", "my own case"),
+        (r"$k_{cr}$ stays", r"$k_{cr}$ stays"),
+        ("costs $5", r"costs \$5"),
+    ],
+)
+def test_words(text, written):
+    assert _text.pretty(text) == written
+
+
+@pytest.mark.parametrize(
+    ("quantity", "written"),
+    [
+        (Quantity("x", "", "s-1", "rate of step-2"), "Rate of step-2 (s$^{-1}$)"),
+        (Quantity("x", "", "1", "stress", "sigma_*"), r"Stress ($\sigma_*$)"),
+        (Quantity("x", "$V$", "m s-1", "rate", "V_*"), "Rate, $V$ (m s$^{-1}$)"),
+    ],
+)
+def test_units(quantity, written):
+    assert _text.label(quantity) == written
+
+
+def test_formulas_are_never_broken():
+    text = r"critical $a\,b c d e f$ of $g h$, at last"
+    lines = _text.wrapped(text, 10).split("\n")
+    assert " ".join(lines) == text
+    assert all(line.count("$") % 2 == 0 for line in lines)
+    assert _text.wrapped(r"it costs \$5 or \$6", 10) == "it costs\n\\$5 or \\$6"
+
+
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [(16383.0, "16,400"), (1.64e7, r"$1.64\times10^{7}$"), (0.5, "0.5"), (1e-6, "$10^{-6}$")],
+)
+def test_numbers(value, written):
+    assert _text.number(value) == written
+
+
+def test_spacing():
+    assert is_log_spaced(np.array([2.0, 5.0, 10.0, 20.0, 50.0, 100.0]))
+    assert not is_log_spaced(np.linspace(1.0, 100.0, 9))
+    assert not is_log_spaced(np.array([0.0, 1.0, 10.0, 100.0]))
+    assert not is_log_spaced(np.array([1.0, 2.0, 4.0]))

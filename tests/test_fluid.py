@@ -1,0 +1,542 @@
+"""Pore pressure: dilatancy with drainage against the closed forms of Segall and Rice (1995), and
+one friction relation for steady sliding, its stability and motions.
+"""
+
+import itertools
+import json
+import math
+import pickle
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from conftest import cot_phi
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from running import SMALL, run
+from test_states import TwoSlipStates
+from test_steady import PLAIN, eigenvalues
+
+from rsfstudy import Scene, simulate
+from rsfstudy.declare.axis import Axis
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files.restore import study_of
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import along, follow
+from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.regimes import check_start
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider import steady
+from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
+from rsfstudy.slider.fluid import Fluid
+from rsfstudy.slider.fluid.dilatant import Dilatant
+from rsfstudy.slider.parts import number
+from rsfstudy.status import Status
+
+LAWS = PLAIN
+CONSTANT = {"normal_stress": "constant"}
+STRESS = [CONSTANT, {"alpha": 0.0}, {"alpha": 0.56}]
+
+
+def dilatant(dilatancy: float = 0.005, drainage: float = 1.0, **fields) -> Scene:
+    return Scene(fluid="dilatant", dilatancy=dilatancy, drainage=drainage, **fields)
+
+
+# ---- critical stiffness --------------------------------------------------------------------------
+
+
+def closed_form(a: float, b: float, weakening: float, drainage: float) -> float:
+    """The larger K at which [K + a (1 + c) - b + E] [K (1 + c) - c (b - a)] = a c K."""
+    c = drainage
+    offset = a * (1.0 + c) - b + weakening
+    linear = (1.0 + c) * offset - c * (b - a) - a * c
+    constant = -c * (b - a) * offset
+    root = math.sqrt(linear**2 - 4.0 * (1.0 + c) * constant)
+    return 0.5 * (root - linear) / (1.0 + c)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("drainage", "expected"), [(0.1, 0.00306725), (1.0, 0.00444076), (10.0, 0.00499026)]
+)
+def test_critical_stiffness_has_known_values(law, drainage, expected):
+    scene = dilatant(0.002 / 0.76, drainage, law=law, a=0.01, b_over_a=1.5, **CONSTANT)
+    assert scene.critical_stiffness == pytest.approx(expected, abs=5.1e-9)  # digits given
+
+
+@given(
+    st.floats(0.003, 0.02),
+    st.floats(1.1, 4.0),
+    st.floats(0.0, 0.9),
+    st.floats(-4.0, 4.0),
+    st.floats(-5.0, 5.0),
+    st.sampled_from(LAWS),
+)
+def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, log_rate, law):
+    """With E up to nine tenths of b - a at V_*, at any slip rate: c falls with it."""
+    b, drainage = a * b_over_a, 10.0**log_drainage
+    scene = dilatant(
+        part * (b - a) / 0.76, drainage, law=law, a=a, b_over_a=b_over_a, stiffness=0.1, **CONSTANT
+    )
+    weakening = (0.76 + (a - b) * log_rate) * scene.dilatancy
+    assume(weakening < 0.95 * (b - a))
+    exact = closed_form(a, b, weakening, drainage * math.exp(-log_rate))
+    ours = steady.critical_stiffness(scene, log_rate)
+    # slopes of the law are differences of order eight, and roots of polynomials lose digits where
+    # drainage is many times faster or slower than slip: up to c = 1.5e6 here
+    assert ours == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("stress", STRESS)
+def test_limits_of_drainage(law, stress):
+    """Fast drainage is no fluid, to 1/c of it; and undrained, at constant normal stress, a rise of
+    ln V strengthens by E more: b - a - E, to a c of it.
+    """
+    drained = Scene(law=law, **stress).critical_stiffness
+    fast = dilatant(drainage=1e5, law=law, **stress).critical_stiffness
+    assert fast == pytest.approx(drained, rel=3e-5)
+    if stress == CONSTANT:
+        slow = dilatant(drainage=1e-7, law=law, **stress).critical_stiffness
+        assert slow == pytest.approx(0.0145 - 0.76 * 0.005, rel=1e-5)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("stress", STRESS)
+@pytest.mark.parametrize(
+    ("dynamics", "log_rate"),
+    [({}, -3.0), ({}, 0.0), ({}, 4.0), ({"radiation_damping": 0.003}, 1.0)],
+)
+@pytest.mark.parametrize("drainage", [0.1, 3.0])
+def test_growth_rates_are_those_of_the_assembled_equations(
+    law, stress, dynamics, log_rate, drainage
+):
+    """Their clock is slip and load point displacement: twice as fast as slip. There is one more
+    rate for porosity, and one for pore pressure.
+    """
+    load = math.exp(log_rate)
+    scene = dilatant(0.004, drainage, law=law, load_velocity_ratio=load, **stress, **dynamics)
+    scene = scene.with_(stiffness=0.9 * steady.critical_stiffness(scene, log_rate))
+    found = steady.steady_sliding(scene, log_rate)
+    equations = between_ruptures(scene, clock=False)
+    at = (found.spring, *found.psis)
+    assert np.abs(equations.rates(at)).max() < 1e-13
+    theirs, ours = eigenvalues(equations, at), 0.5 * steady.growth_rates(scene, log_rate)
+    assert len(ours) == len(theirs) == 4
+    assert ours[0].real > 0.0
+    # pore pressure may drain twenty times as fast as states evolve: differences have its digits
+    within = 1e-7 * np.abs(ours).max()
+    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=0, atol=within)
+
+
+@pytest.mark.parametrize("stress", STRESS)
+def test_growth_rates_with_mass_are_those_of_the_full_equations(stress):
+    """In inertial time: w times as much. At T = 1e8 s double precision sees mass in all."""
+    scene = dilatant(inertia=True, period=1e8, stiffness_ratio=0.9, **stress)
+    found = steady.steady_sliding(scene, 0.0)
+    theirs = eigenvalues(in_rupture(scene), (found.spring, 0.0, found.friction, *found.psis[1:]))
+    ours = scene.inertial_time * steady.growth_rates(scene, 0.0)
+    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("stress", STRESS)
+@pytest.mark.parametrize("dynamics", [{}, {"inertia": True}, {"radiation_damping": 1e-4}])
+def test_small_oscillations_grow_as_linear_theory_says(law, stress, dynamics):
+    """From one maximum of ln V to the next by exp(2 pi Re p/Im p)."""
+    scene = dilatant(law=law, stiffness_ratio=0.95, load_velocity_ratio=1.0 + 1e-7, **stress)
+    scene, meter = scene.with_(**dynamics), Meter(100_000)
+    rates = steady.growth_rates(scene, scene.log_load_rate)
+    turning = next(rate for rate in rates if rate.imag)
+    expected = math.exp(2.0 * math.pi * turning.real / abs(turning.imag))
+    heights = [
+        event.point.log_rate - scene.log_load_rate
+        for event in itertools.islice(
+            follow(scene, Accuracy(1e-11), meter, [maximum("log_rate")]), 8
+        )
+        if event.kind is Kind.MAXIMUM
+    ]
+    assert expected > 1.05
+    # heights of 1e-7 and more are resolved to 1e-12, and grow by their own size faster
+    assert heights[5] / heights[4] == pytest.approx(expected, rel=2e-5)
+
+
+# ---- the relation and the equations --------------------------------------------------------------
+
+
+@given(st.floats(-0.2, 0.2), st.floats(-0.3, 0.5), st.floats(55.0, 85.0), st.floats(0.1, 0.9))
+def test_friction_knows_effective_normal_stress_alone(g, pressure, phi, alpha):
+    """tau/(sigma - p) - mu_* + alpha ln(sigma - p), and its derivatives by g and by p."""
+    scene = dilatant(phi=phi, alpha=alpha)
+    relation, p = scene.functions["strength"], scene.numbers
+
+    def exact(at: float, under: float) -> float:
+        ratio = 1.0 + cot_phi(scene) * at - under
+        return (0.76 + at) / ratio - 0.76 + alpha * math.log(ratio)
+
+    value, slope, shift, shift_slope = relation(g, (0.0, 0.0, pressure), p)
+    gained, shifted = scene.functions["strength_of_pressure"](g, (0.0, 0.0, pressure), p)
+    ratio = 1.0 + cot_phi(scene) * g - pressure
+    assert value == pytest.approx(exact(g, pressure), abs=1e-14)
+    assert shift == pytest.approx(alpha * math.log(ratio), abs=1e-15)
+    assert shift_slope == pytest.approx(alpha * cot_phi(scene) / ratio, rel=1e-13)
+    assert shifted == pytest.approx(-alpha / ratio, rel=1e-13)
+    step = 1e-5  # a central difference has step**2 of the third derivative, below 200
+    by_stress = (exact(g + step, pressure) - exact(g - step, pressure)) / (2.0 * step)
+    by_pressure = (exact(g, pressure + step) - exact(g, pressure - step)) / (2.0 * step)
+    assert (slope, gained) == pytest.approx((by_stress, by_pressure), rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("rate", [0.1, 20.0])
+@pytest.mark.parametrize("drainage", [1e-9, 0.5, 30.0])
+def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
+    """phi = E ln V (1 - exp(-s)); P = -E ln V [exp(-s) - exp(-c s)]/(c - 1) with c drainage over
+    slip rate; stress is friction on 1 - P, with the slip law in closed form.
+    """
+    scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
+    x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
+    samples = [0.1, 0.7, 2.0, 5.0]
+    path = along(rigid(scene, x), (start, 0.0, 0.0), 1e-11, Meter(100_000), (), samples=samples)
+    for slip, event in zip(samples, itertools.islice(path, 1, 5), strict=True):
+        _psi, porosity, pressure = event.point.psis
+        assert porosity == pytest.approx(0.01 * x * -math.expm1(-slip), abs=1e-11)
+        exact = -0.01 * x * (math.exp(-slip) - math.exp(-c * slip)) / (c - 1.0)
+        assert pressure == pytest.approx(exact, abs=1e-10)
+        coefficient = 0.76 + scene.a * x + scene.b * x * math.expm1(-slip)
+        stress = (1.0 - exact) * coefficient - 0.76
+        # tolerance of a step 1e-11 of the scale a, over hundreds of steps
+        assert event.point.friction == pytest.approx(stress, abs=1e-10)
+        assert event.point.normal_stress == pytest.approx(1.0 - exact, abs=1e-10)
+        assert event.point.coefficient == pytest.approx(coefficient, abs=1e-10)
+
+
+@pytest.mark.parametrize("stress", STRESS)
+@pytest.mark.parametrize("dynamics", [{}, {"radiation_damping": 0.01}])
+def test_slip_rate_grows_as_the_unknowns_change(stress, dynamics):
+    """The growth of ln V that is told is that along the equations, to differences of 1e-4."""
+    scene = dilatant(0.02, load_velocity_ratio=3.0, law="slowness", **stress, **dynamics)
+    equations = between_ruptures(scene, clock=False)
+    state = np.array((0.01, 0.02, -0.01, 0.03))
+    rates, step = np.array(equations.rates(tuple(state))), 1e-5
+    ahead, behind = (equations.at(tuple(state + s * rates)).log_rate for s in (step, -step))
+    told = equations.at(tuple(state)).growth
+    assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-7)
+
+
+@pytest.mark.parametrize("stress", STRESS)
+def test_the_state_of_the_law_evolves_by_the_law_where_mass_acts(stress):
+    """It is no unknown there: what friction leaves of strength is its evolution."""
+    scene = dilatant(0.02, law="slowness", inertia=True, period=1e7, **stress)
+    equations, scene_functions = in_rupture(scene), scene.functions
+    state = np.array((0.015, 1.0, 0.01, -0.01, 0.03))
+    rates, step = np.array(equations.rates(tuple(state))), 1e-6
+    ahead, behind = (equations.at(tuple(state + s * rates)) for s in (step, -step))
+    here = equations.at(tuple(state))
+    shift = here.psi - here.state
+    share = scene.inertial_time * math.exp(1.0)
+    by_law = scene_functions["evolutions"](1.0, here.psis, shift, share, scene.numbers)
+    differences = (np.array(ahead.psis) - np.array(behind.psis)) / (2.0 * step)
+    assert differences == pytest.approx(np.array(by_law), rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"stiffness_ratio": 3.0},
+        {"stiffness_ratio": 0.3, "inertia": True},
+        {"stiffness_ratio": 0.3, "radiation_damping": 1e-4},
+    ],
+)
+def test_without_drainage_pressure_is_lost_to_porosity(fields):
+    """P = -(phi - phi_0)/beta: no fluid comes or goes, in any regime."""
+    scene, far = dilatant(0.01, 1e-30, load_velocity_ratio=10.0, **fields), 0.0
+    for event in follow(scene, Accuracy(1e-9), Meter(20_000), [maximum("log_rate")], until=40.0):
+        porosity, pressure = event.point.psis[1:]
+        far = max(far, porosity)
+        # the two are integrated separately, to 7e-11 of a or of themselves a step
+        assert pressure + porosity == pytest.approx(0.0, abs=1e-9)
+    assert far > 0.02
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("stress", STRESS)
+def test_without_dilatancy_the_fluid_does_nothing(law, stress):
+    """Two unknowns more make other steps: the motions agree to their accuracy."""
+    fields = {"law": law, "stiffness_ratio": 3.0, "load_velocity_ratio": 3.0, **stress}
+    drained, idle = Scene(**fields), dilatant(0.0, 2.0, **fields)
+    assert idle.critical_stiffness == pytest.approx(drained.critical_stiffness, rel=1e-9)
+    accuracy = Accuracy(1e-8)
+    one, other = (StepResponse(peaks=2, phases=5)(scene, accuracy) for scene in (drained, idle))
+    peaks = [found.values["max_log10_slip_rate"] for found in (one, other)]
+    errors = [found.values["max_log10_slip_rate_error"] for found in (one, other)]
+    assert peaks[1] == pytest.approx(peaks[0], abs=sum(errors))
+
+
+@pytest.mark.parametrize("fields", [{}, CONSTANT, {"inertia": True}, {"radiation_damping": 0.1}])
+def test_number_of_unknowns(fields):
+    """Two more than drained, which has none of its own: no unknown, no number, no function."""
+    scene, drained = dilatant(**fields), Scene(**fields)
+    assert (scene.states, drained.states) == (3, 1)
+    forms = [between_ruptures] if "inertia" not in fields else [between_ruptures, in_rupture]
+    for form in forms:
+        more, fewer = (
+            form(s) if form is in_rupture else form(s, clock=False) for s in (scene, drained)
+        )
+        assert more.unknowns[-2:] == ("porosity", "pore_pressure")
+        assert more.unknowns[:-2] == fewer.unknowns
+        assert (
+            len(more.rates((0.01,) * len(more.unknowns))) == len(more.scales) == len(more.unknowns)
+        )
+    assert len(scene.numbers) == len(drained.numbers) + 2
+    assert not {"seepage", "strength_of_pressure"} & set(drained.functions)
+
+
+def test_trial_states_outside_of_the_physics_give_finite_rates():
+    for scene in (dilatant(), dilatant(law="slowness"), dilatant(displacement_step=1.0)):
+        massive = scene.with_(inertia=True)
+        for wild in (-1e6, -2.0, 3.0, 1e6):
+            for pressure in (-50.0, 1.0, 50.0):
+                for system in (between_ruptures(s, clock=True) for s in (scene, massive)):
+                    rates = system.rates([wild, 0.0, wild, pressure, 0.0])
+                    assert all(map(math.isfinite, rates))
+                for x in (-1e4, 0.0, 1e4):
+                    rates = in_rupture(massive).rates([wild, x, wild, wild, pressure])
+                    assert all(map(math.isfinite, rates))
+
+
+# ---- measures ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stress", STRESS)
+@pytest.mark.parametrize(
+    "dynamics", [{}, {"inertia": True, "period": 1e7}, {"radiation_damping": 1e-3}]
+)
+def test_linear_stability_and_the_assembled_equations_vouch_for_each_other(stress, dynamics):
+    outcome = LinearStability()(dilatant(load_velocity_ratio=1.5, **stress, **dynamics), Accuracy())
+    assert outcome.status is Status.OK
+    values = outcome.values
+    # that of growth comes from differences of the equations, to 1e-8 of their slopes
+    assert values["critical_stiffness_error"] < 1e-7 * values["critical_stiffness"]
+    assert math.isnan(values["critical_stiffness_explicit"])
+
+
+SLOW = {"a": 0.01, "b_over_a": 1.5, "mu_star": 0.6, "stiffness": 0.0025, **CONSTANT}
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("dynamics", [{"inertia": True}, {"radiation_damping": 1e-9}])
+def test_dilatancy_makes_cycles_slow(law, dynamics):
+    """Ruptures have no time to drain. Well above the undrained critical stiffness b - a - E, and
+    below that of steady sliding, cycles never come to rupture: they slip at up to 100 V_*.
+    """
+    peaks = {}
+    for weakening in (0.001, 0.004):
+        scene = dilatant(weakening / 0.6, 1.0, law=law, **SLOW, **dynamics)
+        assert 0.9 * scene.critical_stiffness > 0.0025
+        outcome = LimitCycle(phases=20)(scene, Accuracy(1e-5))
+        assert outcome.status is Status.OK, outcome.message
+        peaks[weakening] = outcome.values["max_log10_slip_rate"]
+    assert peaks[0.001] > 7.0
+    assert 1.0 < peaks[0.004] < 2.5
+
+
+@pytest.mark.parametrize("of", ["load_velocity_ratio", "displacement_step"])
+def test_critical_steps_of_a_dilatant_fault(of):
+    """No path in a plane leads to them, and motions forward do; both sides are confirmed."""
+    scene = dilatant(0.002, 1.0, stiffness_ratio=1.3, **CONSTANT)
+    outcome = CriticalStep(of=of)(scene, Accuracy(1e-4, 2_000_000))
+    assert outcome.status is Status.OK, outcome.message
+    assert outcome.values[f"{CriticalStep(of=of).headline}_error"] > 0.0
+
+
+def test_critical_steps_of_a_fault_that_drains_fast():
+    """Drainage holds steps of the integrator to its stability there, and what it leaves of a small
+    swing never dies down: that its peaks stay the same is an answer. A tighter run agrees.
+    """
+    scene = dilatant(0.002, 10.0, law="slip", **SLOW).with_(stiffness=0.006)
+    found = [CriticalStep()(scene, Accuracy(rtol)) for rtol in (1e-4, 1e-6)]
+    assert [outcome.status for outcome in found] == [Status.OK] * 2
+    (value, error), (tighter, rest) = (
+        (o.values["critical_velocity_ratio"], o.values["critical_velocity_ratio_error"])
+        for o in found
+    )
+    assert value == pytest.approx(tighter, abs=error + rest)
+    drained = CriticalStep()(scene.with_(fluid="drained"), Accuracy(1e-4))
+    assert tighter > 1.2 * drained.values["critical_velocity_ratio"]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_hold_drains(law):
+    """Slip goes on ever slower while the load point is held: pore pressure that compaction has
+    raised drains, which takes time and hardly any slip.
+    """
+    scene = dilatant(0.005, 0.1, law=law, load_velocity_ratio=0.0, stiffness_ratio=2.0, **CONSTANT)
+    motion = simulate(scene, duration=1e3)
+    assert motion.attrs["status"] == "ok"
+    pressure, porosity = motion["pore_pressure"].values, motion["porosity"].values
+    assert pressure.max() > 1e-3
+    assert 0.0 < pressure[-1] < 0.01 * pressure.max()
+    # fluid that has left is porosity lost: c times the time integral of P, by the trapezoid rule
+    left = 0.1 * np.trapezoid(pressure, motion["time"].values)
+    assert left == pytest.approx(-porosity[-1] - pressure[-1], rel=1e-3)
+
+
+def test_a_rigid_slider_has_its_response():
+    scene = dilatant(0.005, 1.0, load_velocity_ratio=10.0)
+    outcome = RigidResponse(points=5)(scene, Accuracy())
+    assert outcome.status is Status.OK
+    assert math.isnan(outcome.values["closed_form_misfit"])
+    assert outcome.values["direct_stress_change"] == pytest.approx(
+        RigidResponse(points=5)(Scene(load_velocity_ratio=10.0), Accuracy()).values[
+            "direct_stress_change"
+        ],
+        rel=1e-12,
+    )
+
+
+def test_a_trajectory_tells_pore_pressure_and_porosity():
+    fields = {"stiffness_ratio": 3.0, "load_velocity_ratio": 3.0, **CONSTANT}
+    motion = simulate(dilatant(**fields), duration=20.0)
+    assert motion.attrs["status"] == "ok"
+    assert motion["pore_pressure"].attrs["units"] == "1"
+    assert motion["pore_pressure"].attrs["scale"] == "sigma_*"
+    # normal stress is 1 - P, recorded from the same points
+    np.testing.assert_allclose(motion["normal_stress_ratio"], 1.0 - motion["pore_pressure"])
+    assert float(motion["porosity"][-1]) == pytest.approx(0.005 * math.log(3.0), abs=0.002)
+    assert "pore_pressure" not in simulate(Scene(load_velocity_ratio=3.0), duration=1.0)
+
+
+def test_effective_normal_stress_decides_whether_it_is_lost():
+    """A motion ends by the normal stress of its points, and none begins without."""
+    scene = dilatant(**CONSTANT)
+    there = between_ruptures(scene, clock=False).at((0.0, 0.0, 0.0, 0.4))
+    assert there.normal_stress == pytest.approx(0.6, rel=1e-14)
+    check_start(scene, there)
+    with pytest.raises(Halt) as halted:
+        check_start(scene, there._replace(psis=(0.0, 0.0, 1.0)))
+    assert halted.value.status is Status.NORMAL_STRESS_LOST
+
+
+def test_several_states_and_a_fluid():
+    """Two equal states are one, beside the states of a fluid too."""
+    fields = {"stiffness": 0.03, "load_velocity_ratio": 2.0}
+    one, two = dilatant(**fields), dilatant(law=TwoSlipStates, **fields)
+    assert (one.states, two.states) == (3, 4)
+    assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-9)
+    rates = steady.growth_rates(two, 0.7)
+    for rate in steady.growth_rates(one, 0.7):
+        assert np.abs(rates - rate).min() < 1e-6 * abs(rate)
+    ends = [float(simulate(scene, duration=10.0)["shear_stress"][-1]) for scene in (one, two)]
+    assert ends[1] == pytest.approx(ends[0], abs=1e-7)
+
+
+# ---- scenes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"dilatancy": 0.1}, "dilatancy = 0.1: has no meaning while the fault is drained.*Leave"),
+        ({"drainage": 0.1}, "drainage = 0.1: has no meaning while the fault is drained.*fluid="),
+        ({"fluid": "dilatant", "dilatancy": -0.1}, "dilatancy = -0.1: must be 0 or greater"),
+        (
+            {"fluid": "dilatant", "drainage": 0.0},
+            "drainage = 0.0: must be greater than 0.*undrained",
+        ),
+        ({"fluid": "dilatant", "drainage": math.inf}, "drainage = inf: must be finite"),
+        ({"fluid": "wet"}, "fluid = 'wet': is unknown.*dilatant"),
+        (
+            {"fluid": "dilatant", "dilatancy": 0.1, "drainage": 1e-14, **CONSTANT},
+            "leave no critical stiffness.*Give stiffness",
+        ),
+    ],
+)
+def test_what_makes_no_fluid_is_refused(fields, text):
+    with pytest.raises(InvalidValue, match=text):
+        Scene(**fields)
+
+
+def test_a_scene_with_a_fluid_is_a_scene():
+    scene = dilatant(0.003, 0.7, inertia=True)
+    assert pickle.loads(pickle.dumps(scene)) == scene
+    assert Scene(**scene.as_dict()) == scene
+    assert scene.with_(drainage=2.0).drainage == 2.0
+    assert scene.with_(fluid="drained") == Scene(inertia=True)
+    assert scene.effects == ("inclined_driving", "linker_dieterich", "dilatancy", "inertia")
+
+
+OWN = 0
+
+
+def tight(log_rate, states, share, p):
+    opening = share * (p[OWN] * log_rate - states[0])
+    return opening, -opening
+
+
+def filled(log_rate, p):
+    return p[OWN] * log_rate, -p[OWN] * log_rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tight(Fluid):
+    """Pores that no fluid leaves or enters."""
+
+    opening: float = number(0.005, "", "1", "dilatancy")
+
+    name = "tight"
+    unknowns = Dilatant.unknowns
+    seepage = staticmethod(tight)
+    seeped = staticmethod(filled)
+
+    def numbers(self, scene):
+        return (self.opening,)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_fluid_of_your_own(law):
+    """Undrained exactly, the critical stiffness at V_* is b - a - E. Pressure is that of porosity,
+    and of two unknowns one is too many: a small change of it neither grows nor decays.
+    """
+    scene = Scene(law=law, fluid=Tight, opening=0.004, **CONSTANT)
+    assert scene.critical_stiffness == pytest.approx(0.0145 - 0.76 * 0.004, rel=1e-11)
+    assert np.abs(steady.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
+    slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
+    np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
+
+
+def without(value, names):
+    """A declaration, as a version that did not know some fields would have written it."""
+    if isinstance(value, dict):
+        return {k: without(v, names) for k, v in value.items() if k not in names}
+    return [without(v, names) for v in value] if isinstance(value, list) else value
+
+
+def test_files_from_before_there_was_a_fluid_are_restored():
+    dataset = run(SMALL)
+    declared = without(json.loads(dataset.attrs["declaration"]), {"fluid", "dilatancy", "drainage"})
+    assert "fluid" not in declared["base"]
+    older = dataset.drop_vars("fluid").assign_attrs(declaration=json.dumps(declared))
+    assert study_of(older).base == SMALL.base
+
+
+def test_a_study_of_fluids_is_restored():
+    """An axis may choose the fluid, and others belong to one choice."""
+    study = replace(
+        SMALL,
+        axes=(Axis("fluid", ["drained", "dilatant"]), Axis("dilatancy", [0.001, 0.002])),
+        base=SMALL.base.with_(fluid="dilatant", normal_stress="constant"),
+        measure=LinearStability(),
+        reductions=(),
+        claims=(),
+    )
+    dataset = run(study)
+    assert (dataset.status == int(Status.OK)).all()
+    again = study_of(dataset)
+    assert again.describe() == study.describe()
+    values = dataset.critical_stiffness
+    assert float(values[0, 0]) == float(values[0, 1]) > float(values[1, 0]) > float(values[1, 1])

@@ -1,0 +1,356 @@
+"""The units of a rig: every conversion by its dimension, and what is no quantity."""
+
+import math
+import sys
+
+import numpy as np
+import pint
+import pytest
+import xarray as xr
+from running import call, run
+
+import rsfstudy
+from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.plots._motion import picture
+from rsfstudy.rig.units import in_si
+from rsfstudy.slider.fields import QUANTITIES
+from rsfstudy.slider.loading import Segment
+
+SIGMA, D_C, V = 5e6, 1e-5, 1e-6
+RIG = Laboratory(
+    normal_stress="5 MPa",
+    slip_distance="10 um",
+    reference_velocity="1 um/s",
+    stiffness="0.05 MPa/um",
+)
+LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "value"),
+    [
+        ("5 MPa", "Pa", 5e6),
+        ("0.3GPa", "Pa", 3e8),
+        ("12 bar", "Pa", 1.2e6),
+        ("10 um", "m", 1e-5),
+        ("10 \u00b5m", "m", 1e-5),
+        ("1e-3 um/s", "m/s", 1e-9),
+        ("1 um s-1", "m/s", 1e-6),
+        ("35 mm/year", "m/s", 35e-3 / (365.25 * 86400.0)),
+        ("0.05 MPa/um", "Pa/m", 5e10),
+        ("2 min", "s", 120.0),
+        ("0.1 1/s", "1/s", 0.1),
+        ("2e3 kg/m^2", "kg/m^2", 2e3),
+        ("2700 kg*m**-3", "kg/m^3", 2700.0),
+        ("3", "1", 3.0),
+        (7.5, "Pa", 7.5),
+        (np.float64(2.0), "m", 2.0),
+    ],
+)
+def test_usual_units(text, units, value):
+    assert in_si("x", text, units) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "units", "complaint"),
+    [
+        ("5 MPa", "m", "x = '5 MPa': has units of another kind than m. Give it in m"),
+        ("5", "Pa", "has units of another kind than Pa"),
+        ("MPa", "Pa", "x = 'MPa': is no quantity. Write a number and its units"),
+        ("nan MPa", "Pa", "must be finite"),
+        (math.inf, "Pa", "must be finite"),
+        (True, "Pa", "True: is no quantity"),
+        (None, "Pa", "None: is no quantity"),
+    ],
+)
+def test_what_is_no_quantity(value, units, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        in_si("x", value, units)
+
+
+def test_other_units_need_pint(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pint", None)
+    with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
+        in_si("normal_stress", "725 psi", "Pa")
+
+
+def test_quantities_of_pint():
+    registry = pint.get_application_registry()
+    assert in_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
+    assert in_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
+    assert in_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
+    with pytest.raises(InvalidValue, match="another kind than m"):
+        in_si("x", registry.Quantity(3.0, "MPa"), "m")
+    with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
+        in_si("x", "3 bananas", "m")
+
+
+#: What 1 of each scale is, in SI units.
+SCALES = {
+    "sigma_*": SIGMA, "D_c": D_C, "V_*": V, "D_c/V_*": D_C / V, "V_*/D_c": V / D_C,
+    "sigma_*/D_c": SIGMA / D_C,
+}  # fmt: skip
+
+
+def test_scales_by_dimension():
+    """Exponents of kilogram, metre and second of each scale are those of its SI unit."""
+    exponents = {"Pa": (1, -1, -2), "m": (0, 1, 0), "s": (0, 0, 1)}
+    of = {
+        "sigma_*": (1, -1, -2), "D_c": (0, 1, 0), "V_*": (0, 1, -1), "D_c/V_*": (0, 0, 1),
+        "V_*/D_c": (0, 0, -1), "sigma_*/D_c": (1, -2, -2),
+    }  # fmt: skip
+    for name, scale in RIG.scales.items():
+        assert scale.factor == pytest.approx(SCALES[name], rel=1e-15)
+        total = np.zeros(3)
+        for text in scale.units.split():
+            unit, power = (text[:-2], -1) if text.endswith("-1") else (text, 1)
+            total += power * np.array(exponents[unit])
+        assert tuple(total) == of[name], name
+
+
+#: A quantity for each scale that a field of a scene has, and what it is without dimension.
+VALUES = {
+    "D_c": ("25 um", 2.5), "V_*": ("10 um/s", 10.0), "D_c/V_*": ("1 min", 6.0),
+    "sigma_*/D_c": ("0.1 MPa/um", 0.2), "sigma_*": ("50 kPa", 0.01),
+    "V_*/D_c": ("0.05 1/s", 0.5),
+}  # fmt: skip
+CALLS: dict[str, dict] = {
+    "displacement_between_steps": {"velocity_steps": 2},
+    "load_velocity_ratio": {},
+    **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage")},
+}
+
+
+@pytest.mark.parametrize("about", [q for q in QUANTITIES if q.scale], ids=lambda q: q.name)
+def test_every_field_with_a_scale_takes_units(about):
+    text, value = VALUES[about.scale]
+    rig = Laboratory(normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V)
+    scene = rig.scene(**CALLS.get(about.name, {}), **{about.name: text})
+    assert getattr(scene, about.name) == pytest.approx(value, rel=1e-12)
+    assert scene.reference_rate == V / D_C
+    with pytest.raises(InvalidValue, match=rf"{about.name} = '1 kg': has units of another kind"):
+        rig.scene(**{about.name: "1 kg"})
+
+
+def test_plain_numbers_are_si_and_ratios_stay_ratios():
+    scene = RIG.scene(**LAW, hold_time=100.0, load_velocity_ratio=2.0)
+    assert scene.hold_time == pytest.approx(10.0)
+    assert scene.load_velocity_ratio == 2.0
+    assert scene.stiffness == pytest.approx(5e10 * D_C / SIGMA, rel=1e-14)
+    assert RIG.scene(displacement_step=5e-6).displacement_step == pytest.approx(0.5)
+    assert RIG.dimensionless("10 min") == pytest.approx(60.0)
+
+
+def test_mass_and_radiation():
+    heavy = Laboratory(
+        normal_stress=SIGMA,
+        slip_distance=D_C,
+        reference_velocity=V,
+        stiffness=5e10,
+        mass="2e4 kg/m^2",
+    )
+    period = 2.0 * math.pi * math.sqrt(2e4 / 5e10)
+    assert heavy.scene(inertia=True).period == pytest.approx(period)
+    radiating = Laboratory(
+        normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V,
+        shear_modulus="30 GPa", density="2700 kg/m^3",
+    )  # fmt: skip
+    # G/(2 c_s), c_s = sqrt(G/rho)
+    impedance = 30e9 / (2.0 * math.sqrt(30e9 / 2700.0))
+    assert radiating.scene().radiation_damping == pytest.approx(impedance * V / SIGMA, rel=1e-12)
+
+
+THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
+
+
+@pytest.mark.parametrize(
+    ("stated", "complaint"),
+    [
+        ({"normal_stress": "-5 MPa"}, "normal_stress = '-5 MPa': must be positive. Give it in Pa"),
+        ({"slip_distance": "10 um/s"}, "slip_distance = .*another kind than m"),
+        ({"mass": 1e4}, "mass = 10000.0: needs a stiffness to oscillate"),
+        ({"mass": 1e4, "stiffness": 5e10, "period": 1e-2}, "both state inertia"),
+        ({"density": 2700.0}, "density = 2700.0: goes with shear_modulus"),
+    ],
+)
+def test_what_makes_no_rig(stated, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Laboratory(**{**THREE, **stated})
+
+
+def test_a_scale_that_is_unusual_is_told():
+    with pytest.warns(UserWarning, match="slip_distance is 1 m: unusual for a rig. Is the unit"):
+        Laboratory(**{**THREE, "slip_distance": 1.0})
+
+
+def test_a_spring_is_stated_once():
+    with pytest.raises(InvalidValue, match="stiffness_ratio = 2 both set the spring"):
+        RIG.scene(stiffness_ratio=2.0)
+
+
+def test_results_say_their_units():
+    """In units of the rig, and the same in SI as `to_si` gives it."""
+    scene = RIG.scene(**LAW, velocity_steps=1)
+    motion = simulate(scene, duration=2.0, rtol=1e-4)
+    shown = RIG.in_units(motion, stress="MPa", length="um", time="min")
+    plain = rsfstudy.to_si(motion, normal_stress=SIGMA, slip_distance=D_C)
+    for name, factor, units in (
+        ("time", 60.0, "min"), ("slip", 1e-6, "um"), ("shear_stress", 1e6, "MPa"),
+        ("load_point_displacement", 1e-6, "um"),
+    ):  # fmt: skip
+        assert shown[name].attrs["units"] == units
+        assert "scale" not in shown[name].attrs
+        np.testing.assert_allclose(shown[name] * factor, plain[name], rtol=1e-14)
+    assert shown.slip_rate.attrs["units"] == "um min-1"
+    assert float(shown.slip_rate[0]) == pytest.approx(60.0)
+    assert shown.friction_coefficient.attrs["units"] == "1"
+    assert '"normal_stress": 5000000.0' in shown.attrs["laboratory"]
+    # displacement of the load point is 10 V_* t
+    np.testing.assert_allclose(motion.load_point_displacement, 10.0 * motion.time, atol=1e-9)
+
+
+def test_axes_of_results_are_in_units_of_the_rig_too():
+    study = Study(
+        name="held", title="Holds", base=RIG.scene(**LAW), measure=Healing(phases=2),
+        axes=[Axis("hold_time", [10.0, 100.0])],
+    )  # fmt: skip
+    shown = RIG.in_units(run(study, rtol=1e-4), length="um", time="min")
+    assert shown.hold_time.attrs["units"] == "min"
+    assert shown.hold_time.values == pytest.approx([10.0 / 6.0, 100.0 / 6.0])
+    assert shown.peak_displacement_error.attrs["units"] == "um"
+    assert float(shown.stiffness) == pytest.approx(5e10 * 1e-6)
+    assert shown.healing.attrs["units"] == "1"
+
+
+def test_one_test_in_two_units_is_one_test():
+    """Read off in V_* and D_c, or stated in the units of the rig: the same to rounding."""
+    stated = RIG.scene(
+        **LAW, velocity_steps=1, velocity_ratio=10, displacement_between_steps="0.2 mm"
+    )
+    bare = Scene(**LAW, stiffness=0.1, reference_rate=0.1, velocity_steps=1)
+    one, other = (VelocityStep(phases=2)(scene, Accuracy(1e-5)).values for scene in (stated, bare))
+    assert one["apparent_a"] == pytest.approx(other["apparent_a"], rel=1e-8)
+
+
+# ---- protocols from files ------------------------------------------------------------------------
+
+RECORD = "velocity (um/s), distance (um), duration (min)\n10, 300,\n1, 300,\n\n0,, 10\n1, 200,\n"
+
+
+def test_a_protocol_from_a_file(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("\ufeff" + RECORD)
+    read = read_protocol(path, RIG, "steps_and_hold")
+    assert read.name == "steps_and_hold"
+    expected = [(10.0, 0.0, 3.0), (1.0, 0.0, 30.0), (0.0, 0.0, 60.0), (1.0, 0.0, math.inf)]
+    assert np.array(read.history) == pytest.approx(np.array(expected), rel=1e-12)
+    assert read.lasts == pytest.approx(113.0)
+    motion = simulate(RIG.scene(**LAW, loading=read), rtol=1e-4)
+    assert float(motion.time[-1]) == pytest.approx(113.0)
+    assert float(motion.load_point_displacement[-1]) == pytest.approx(80.0, rel=1e-6)
+    path.write_text("velocity [V_*], duration [D_c/V_*]\n2, 3\n1,\n")
+    assert read_protocol(path).history == (Segment(2.0, 0.0, 3.0), Segment(1.0))
+    assert RIG.protocol([{"velocity": "2 um/s", "step": "5 um"}]).history == (Segment(2.0, 0.5),)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "has no header. Its first line reads, for instance, velocity"),
+        ("10, 300\n", "header = '10': names no column with its units. Write the header as in"),
+        ("velocity, duration\n1, 2\n", "header = 'velocity': names no column with its units"),
+        ("speed (um/s)\n1\n", "column = 'speed': is unknown"),
+        ("velocity (um/s)\n", "protocol = .*: has no segments"),
+        ("velocity (um/s)\nfast\n", "line 2, column 1: velocity = 'fast': is no number"),
+        ("velocity (um/s)\n1, 2\n", "line 2: line = .*has 2 fields, and the header 1"),
+        ("velocity (um)\n1\n", "segment 1: velocity = '1 um': has units of another kind than m/s"),
+        ("velocity (um/s)\n-1\n", "segment 1: velocity = -1.0.*forward slip"),
+        ("velocity (um/s)\nnan\n", "segment 1: velocity = 'nan um/s': must be finite"),
+        ("velocity (um/s), duration (s)\n1, 0\n", "segment 1: duration = 0.0: must be positive"),
+        ("velocity (um/s)\n1\n2\n", "segment 1: duration = inf: never ends"),
+    ],
+)
+def test_files_that_are_no_protocol(tmp_path, text, complaint):
+    path = tmp_path / "test.csv"
+    path.write_text(text)
+    with pytest.raises(InvalidValue, match=complaint):
+        read_protocol(path, RIG)
+
+
+def test_units_of_a_rig_need_one(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text(RECORD)
+    with pytest.raises(InvalidValue, match=r"need the scales of a rig. Give a laboratory"):
+        read_protocol(path)
+    with pytest.raises(DataError, match="absent.csv: cannot be read as CSV"):
+        read_protocol(tmp_path / "absent.csv")
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataError, match="cannot be read as CSV"):
+        read_protocol(path)
+
+
+# ---- pictures ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("laboratory", [None, RIG])
+@pytest.mark.parametrize("against", ["load_point_displacement", "time"])
+def test_the_picture_of_a_motion(laboratory, against):
+    """Whatever its parts: the line of steady sliding does not depend on the loading."""
+    scene = RIG.scene(**LAW, loading=protocol([{"velocity": 3, "duration": 2}], "three"))
+    drawn = picture(simulate(scene, rtol=1e-4), laboratory, against=against)
+    upper, lower, plane = drawn.axes
+    units = {"time": ("D_c/V_*", "(s)"), "load_point_displacement": ("D_c", r"$\mu$m")}
+    assert units[against][laboratory is not None] in lower.get_xlabel()
+    assert all(axes.get_ylabel() for axes in (upper, lower, plane))
+    path, _start, steady = plane.get_lines()
+    rates, friction = steady.get_data()
+    # V_* is 1 um/s
+    expected = scene.mu_star + (scene.a - scene.b) * np.log(np.asarray(rates))
+    np.testing.assert_allclose(friction, expected, rtol=1e-12)
+    assert np.asarray(path.get_xdata()).max() > 2.5
+
+
+def test_what_is_no_motion_has_no_picture():
+    with pytest.raises(DataError, match="it is no motion as simulate gives it"):
+        picture(xr.Dataset())
+    motion = simulate(Scene(), duration=1.0, rtol=1e-2)
+    with pytest.raises(InvalidValue, match="against = 'place': is unknown"):
+        picture(motion, against="place")
+
+
+def test_the_command_simulates_a_rig(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text(RECORD)
+    words = ["simulate", "--protocol", path, "--output", tmp_path / "out" / "test.png"]
+    words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um", "--rtol", "1e-4"]
+    words += ["--reference-velocity", "1e-6", "--stiffness", "0.05 MPa/um"]
+    words += [word for name, value in LAW.items() for word in ("--set", f"{name}={value}")]
+    ran = call(*words)
+    assert ran.returncode == 0, ran.stderr
+    assert (tmp_path / "out" / "test.png").stat().st_size > 10_000
+    with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
+        assert written.load_point_displacement.attrs["units"] == "m"
+        assert float(written.time[-1]) == pytest.approx(1130.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--normal-stress", "5 MPa"], "--slip-distance = None: must be stated"),
+        (["--duration", "10 s"], "--duration = '10 s': has units, and no rig is stated"),
+        (["--duration", "0"], "duration = 0.0: must be positive"),
+        (["--set", "law"], "must read FIELD=VALUE"),
+        (["--set", "law=slip", "--set", "law=slip"], "sets law twice"),
+        (["--set", "hold_time=ten"], "hold_time = 'ten': must be a number"),
+        (["--output", "motion.txt"], "must end in .png, .pdf or .svg"),
+    ],
+)
+def test_wrong_usage_of_the_command(words, complaint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = call("simulate", *words)
+    assert ran.returncode == 2
+    assert complaint in " ".join(ran.stderr.split())

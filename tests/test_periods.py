@@ -1,0 +1,224 @@
+"""Motions that repeat themselves after several events, or never; and Floquet multipliers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.boundaries.cycles import Cycle
+from rsfstudy.boundaries.periods import ReturnMap, course, product, recurrence
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.bifurcation import Bifurcation
+from rsfstudy.measures.limit_cycle import Approach, LimitCycle
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.steady import growth_rates
+from rsfstudy.status import Status
+
+#: Slow oscillations of two slip states, started close to where they end (Gu et al. 1984).
+SLOW = {
+    "law": "two_slip_states",
+    "normal_stress": "constant",
+    "a": 0.01,
+    "load_velocity_ratio": 1.0,
+    "displacement_step": 2.0,
+}
+
+
+def slow(ratio: float, **fields) -> Scene:
+    return Scene(**{**SLOW, "stiffness_ratio": ratio, **fields})
+
+
+def came_to(scene: Scene, events: int = 64):
+    return course(scene, Accuracy(1e-7), Meter(2_000_000), events)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
+    """Which limit cycles have known all along, from two cycles in a row."""
+    scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
+    accuracy, meter = Accuracy(1e-8), Meter(2_000_000)
+    approach = Approach(scene, accuracy)
+    approach.follow(meter, 300)
+    orbit = course(scene, accuracy, meter, 64).orbit
+    assert orbit.period == 1
+    (multiplier,) = orbit.multipliers
+    assert multiplier.imag == 0.0
+    assert approach._return == pytest.approx(multiplier.real, abs=1e-3)
+
+
+def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
+    """Where small oscillations have grown to their limit, departures die down twice as fast as the
+    small ones grew (Hopf), once around in 2 pi/omega.
+    """
+    for off in (2e-3, 5e-4):
+        scene = slow(1.0 - off, displacement_step=0.02 + 14.0 * math.sqrt(off))
+        fastest = growth_rates(scene, 0.0)[0]
+        expected = math.exp(-2.0 * fastest.real * 2.0 * math.pi / abs(fastest.imag))
+        found = Bifurcation(transient=60, events=4)(scene, Accuracy(1e-8)).values
+        assert 1.0 - found["floquet_multiplier"] == pytest.approx(1.0 - expected, rel=40.0 * off)
+
+
+def test_departures_of_a_motion_shrink_as_the_multipliers_say():
+    """Independent of differences: event after event, on the way to the cycle of one event."""
+    scene = slow(0.88)
+    seen = followed(scene, 24)
+    orbit = came_to(scene).orbit
+    end = np.array(orbit.events[0].begin.psis)
+    away = [np.linalg.norm(np.array(cycle.end.psis) - end) for cycle in seen[8:13]]
+    ratios = np.array(away[1:]) / np.array(away[:-1])
+    assert ratios == pytest.approx([abs(orbit.multipliers[0])] * 4, rel=0.05)
+
+
+def followed(scene: Scene, count: int) -> list[Cycle]:
+    return course(scene, Accuracy(1e-9), Meter(2_000_000), count, to_its_end=True).seen
+
+
+@pytest.mark.parametrize(
+    ("ratio", "period"), [(0.95, 1), (0.9, 1), (0.868, 1), (0.865, 2), (0.86, 2), (0.856, 4)]
+)
+def test_periods(ratio, period):
+    """And what comes after a period is what was there before, to the accuracy."""
+    scene = slow(ratio)
+    found = LimitCycle(phases=50)(scene, Accuracy(1e-7, 1_000_000))
+    assert found.status is Status.OK
+    assert found.values["period_events"] == period
+    orbit = came_to(scene).orbit.from_largest
+    assert orbit.period == period
+    assert orbit.attracts
+    begin, end = (np.array(p.psis) for p in (orbit.events[0].begin, orbit.events[-1].end))
+    assert np.abs(end - begin).max() < 1e-6 * scene.a
+    # the orbit is that of the whole period, and the numbers are those of its largest event
+    assert found.values["time"][-1] == pytest.approx(
+        sum(cycle.interval for cycle in orbit.events), rel=1e-6
+    )
+    largest = orbit.events[0]
+    assert found.values["max_log10_slip_rate"] == pytest.approx(
+        largest.fastest / math.log(10.0), abs=1e-6
+    )
+    assert found.values["recurrence_interval"] == pytest.approx(largest.interval, rel=1e-6)
+    assert np.ptp(found.values["shear_stress"]) >= 0.99 * found.values["static_stress_drop"]
+    # slip over the period is that of the load point; over an event, less what the spring keeps
+    slips = [
+        cycle.interval - (cycle.end.spring - cycle.begin.spring) / scene.stiffness
+        for cycle in orbit.events
+    ]
+    assert found.values["slip_per_event"] == pytest.approx(slips[0], rel=1e-6)
+    assert found.values["slip"][-1] == pytest.approx(sum(slips), rel=1e-6)
+
+
+def test_multipliers_of_a_period_are_those_of_all_its_events():
+    orbit = came_to(slow(0.856)).orbit
+    whole = product(orbit.slopes)
+    assert np.linalg.det(whole) == pytest.approx(
+        math.prod(float(np.linalg.det(each)) for each in orbit.slopes), rel=1e-9, abs=1e-12
+    )
+    turned = orbit.from_largest.multipliers
+    assert turned[0] == pytest.approx(orbit.multipliers[0], rel=1e-5)
+
+
+def test_tight_and_loose_agree_within_their_errors():
+    for ratio in (0.9, 0.86):
+        one, tight = (LimitCycle(phases=2)(slow(ratio), Accuracy(r)).values for r in (1e-5, 1e-9))
+        for name in (n for n in one if f"{n}_error" in one):
+            allowed = one[f"{name}_error"] + tight[f"{name}_error"]
+            assert abs(one[name] - tight[name]) <= allowed, name
+            assert one[f"{name}_error"] < 1e-3 * abs(one[name])
+
+
+def test_a_multiplier_passes_minus_one_where_the_period_doubles():
+    before, after = (
+        Bifurcation(transient=64, events=16)(slow(ratio), Accuracy(1e-7)).values
+        for ratio in (0.8664, 0.8661)
+    )
+    assert (before["period_events"], after["period_events"]) == (1.0, 2.0)
+    assert after["floquet_multiplier"] < -1.0 < before["floquet_multiplier"] < -0.99
+    assert after["floquet_multiplier_error"] < 1e-4
+    assert before["lyapunov_exponent"] == pytest.approx(
+        math.log(-before["floquet_multiplier"]), abs=1e-5
+    )
+    # the cycle of one event goes on, and the peaks lie around it
+    peaks = after["peak_log10_slip_rate"]
+    assert peaks.min() < after["one_event_log10_peak"] < peaks.max()
+    assert after["peak_spread"] == pytest.approx(np.ptp(peaks), abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_never_repeats_itself_says_so(engine):
+    accuracy = Accuracy(1e-6, engine=engine)
+    cycle = LimitCycle(phases=2)(slow(0.853), accuracy)
+    assert cycle.status is Status.NOT_PERIODIC
+    assert cycle.status.is_answer
+    assert "peak at 10^0.5" in cycle.message
+    assert "recurrence_interval" not in cycle.values
+    found = Bifurcation(transient=32, events=32)(slow(0.853), accuracy)
+    assert found.status is Status.NOT_PERIODIC
+    assert "period_events" not in found.values
+    assert found.values["lyapunov_exponent"] > 0.2
+    assert found.values["peak_spread"] > 0.5
+    assert found.values["floquet_multiplier"] == pytest.approx(-1.6183, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("scene", "status"),
+    [
+        (slow(1.4), Status.NO_LIMIT_CYCLE),
+        (slow(0.8), Status.SLIP_RATE_UNBOUNDED),
+        (slow(0.9, load_velocity_ratio=0.0), Status.NO_LIMIT_CYCLE),
+    ],
+)
+@pytest.mark.parametrize("measure", [LimitCycle(phases=2), Bifurcation(transient=8, events=8)])
+def test_other_ends(scene, status, measure):
+    assert measure(scene, Accuracy(1e-5)).status is status
+
+
+def test_motions_that_still_grow_are_not_said_to_have_no_period():
+    """A thousandth below critical stiffness they take hundreds of events."""
+    found = Bifurcation(transient=16, events=16)(slow(0.999, displacement_step=0.1), Accuracy(1e-6))
+    assert found.status is Status.WORK_BUDGET_SPENT
+    assert "no cycle repeats yet" in found.message
+
+
+@pytest.mark.parametrize("events", [1, 3, 6])
+def test_few_events_say_nothing_of_periods(events):
+    found = LimitCycle(phases=2, events=events)(slow(0.853), Accuracy(1e-4))
+    assert found.status is Status.WORK_BUDGET_SPENT
+
+
+def test_periods_with_mass_and_variable_normal_stress():
+    scene = Scene(law="two_slip_states", inertia=True, stiffness_ratio=0.9, displacement_step=1.0,
+                  load_velocity_ratio=1.0)  # fmt: skip
+    found = LimitCycle(phases=2)(scene, Accuracy(1e-6, 1_000_000))
+    assert found.status is Status.OK
+    tight = LimitCycle(phases=2)(scene, Accuracy(1e-8, 1_000_000))
+    assert found.values["recurrence_interval"] == pytest.approx(
+        tight.values["recurrence_interval"], abs=found.values["recurrence_interval_error"]
+    )
+
+
+def test_one_state_has_a_period_of_one():
+    found = LimitCycle(phases=2)(
+        Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True), Accuracy(1e-4)
+    )
+    assert found.values["period_events"] == 1.0
+
+
+def test_a_start_that_no_stress_holds_leads_nowhere():
+    """States so strong that shear stress would lock the fault."""
+    scene = Scene(law="two_slip_states", load_velocity_ratio=1.0)
+    assert ReturnMap(scene, Accuracy(), Meter(1000)).point((50.0, 50.0)) is None
+
+
+def test_recurrence_counts_events():
+    scene = slow(0.86)
+    period, off = recurrence(scene, followed(scene, 32))
+    assert period == 2
+    assert off < 1e-3
+
+
+@pytest.mark.parametrize("given", [{"transient": -1}, {"events": 3}])
+def test_events_that_mean_nothing_are_refused(given):
+    with pytest.raises(InvalidValue, match="must be"):
+        Bifurcation(**given)

@@ -1,0 +1,263 @@
+"""Protocols of the laboratory are segments of loading: identities, then what they cost."""
+
+import copy
+import cProfile
+import json
+import math
+import pickle
+import pstats
+
+import cloudpickle
+import numpy as np
+import pytest
+from running import run
+
+from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.bifurcation import Bifurcation
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.protocol import Protocol
+from rsfstudy.status import Status
+
+STIFF = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}
+
+
+def same_motion(one: Scene, other: Scene, duration: float) -> None:
+    first, second = simulate(one, duration=duration), simulate(other, duration=duration)
+    for name in ("time", "slip", "shear_stress", "log10_slip_rate", "state_variable"):
+        np.testing.assert_array_equal(first[name].values, second[name].values)
+
+
+def test_a_protocol_of_one_segment_is_a_step_to_the_bit():
+    stepped = Scene(**STIFF, load_velocity_ratio=10.0, displacement_step=0.1)
+    same_motion(stepped, Scene(**STIFF, loading=protocol([Segment(10.0, 0.1)])), 3.0)
+    one = Scene(**STIFF, velocity_steps=1, velocity_ratio=10.0)
+    same_motion(one, stepped.with_(displacement_step=0.0), 3.0)
+
+
+def test_protocols_are_what_their_fields_say():
+    held = Scene(**STIFF, hold_time=50.0, load_velocity_ratio=2.0)
+    assert held.parts.loading.segments == (Segment(0.0, 0.0, 50.0), Segment(2.0))
+    rows = [{"velocity": 0.0, "duration": 50.0}, {"velocity": 2.0}]
+    same_motion(held, Scene(**STIFF, loading=protocol(rows)), 55.0)
+    stepped = Scene(**STIFF, velocity_steps=3, velocity_ratio=4.0, displacement_between_steps=8.0)
+    rows = [{"velocity": v, "distance": 8.0} for v in (4.0, 1.0, 4.0)]
+    same_motion(stepped, Scene(**STIFF, loading=protocol(rows)), 12.0)
+    assert protocol(rows).lasts == 2.0 + 8.0 + 2.0
+
+
+def test_no_hold_and_no_step_are_none():
+    for idle in ({"hold_time": 0.0}, {"velocity_steps": 0.0}):
+        assert Scene(**STIFF, **idle) == Scene(**STIFF)
+    calm = Scene(**STIFF, hold_time=10.0).with_(hold_time=0.0, displacement_step=0.5)
+    assert calm == Scene(**STIFF, displacement_step=0.5)
+
+
+def test_a_field_of_a_protocol_is_an_axis():
+    """Where it calls for no protocol, what is left is the step of other scenes."""
+    study = Study(
+        name="held",
+        title="Holds",
+        base=Scene(**STIFF),
+        axes=[Axis("hold_time", [0.0, 10.0, 100.0])],
+        measure=Healing(phases=2),
+    )
+    found = run(study, rtol=1e-5)
+    assert [bool(x) for x in found.healing.notnull()] == [False, True, True]
+    assert float(found.healing[2]) > float(found.healing[1]) > 0.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_very_long_hold_ends_when_it_should(engine):
+    """Its clock is slip, which tells time to 1e-7 by then; its end is told by the history."""
+    scene = Scene(**STIFF, hold_time=1e10)
+    asked = follow(
+        scene,
+        Accuracy(engine=engine),
+        Meter(10**5, engine=engine),
+        [maximum("spring")],
+        until=1e10 + 40.0,
+    )
+    events = list(asked)
+    (reload,) = (event for event in events if event.kind is Kind.SEGMENT)
+    assert reload.time == 1e10
+    assert events[-1].time == 1e10 + 40.0
+    motion = simulate(scene, duration=1e10 + 40.0, engine=engine)
+    assert (np.diff(motion.time) >= 0.0).all()
+
+
+def test_work_grows_with_the_number_of_segments():
+    """Ten times the segments take ten times the right-hand sides, and calls of any function."""
+    work, calls = [], []
+    for segments in (1, 100, 1000):  # the first brings in what is imported late
+        scene = Scene(
+            **STIFF, velocity_steps=segments, velocity_ratio=2.0, displacement_between_steps=1.0
+        )
+        with cProfile.Profile() as profile:
+            motion = simulate(scene, duration=0.75 * segments, rtol=1e-4)
+        calls.append(pstats.Stats(profile).total_calls)
+        work.append(motion.attrs["rhs_evaluations"])
+    assert work[2] == pytest.approx(10.0 * work[1], rel=0.05)
+    assert calls[2] == pytest.approx(10.0 * calls[1], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"hold_time": -1.0}, r"hold_time = -1.0: must be 0 or greater. 0 is no hold"),
+        ({"hold_time": math.inf}, "hold_time = inf: must be finite"),
+        ({"hold_time": math.nan}, "hold_time = nan: must be finite"),
+        ({"velocity_steps": 1.5}, "velocity_steps = 1.5: must be a whole number"),
+        ({"velocity_steps": -1}, "velocity_steps = -1.0: must be 0 or greater. 0 is no step"),
+        ({"velocity_steps": 1, "velocity_ratio": 0.0}, "velocity_ratio = 0.0.*hold_time holds"),
+        ({"velocity_steps": 1, "velocity_ratio": -2.0}, "velocity_ratio = -2.0: must be greater"),
+        ({"velocity_ratio": 2.0}, "no meaning for step.*state velocity_steps too"),
+        ({"hold_time": 1.0, "displacement_step": 1.0}, "no meaning for slide_hold_slide"),
+        ({"hold_time": 1.0, "velocity_steps": 1}, "velocity_steps = 1: has no meaning"),
+        ({"loading": "slide_hold_slide"}, "called for by hold_time, velocity_steps"),
+    ],
+)
+def test_fields_that_make_no_protocol(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**fields)
+
+
+@pytest.mark.parametrize(
+    ("rows", "complaint"),
+    [
+        ([], "protocol = .*has no segments. State one at least"),
+        ("steps.csv", "must be a list of segments. Read a file by rsfstudy.read_protocol"),
+        ([3.0], 'segment 1: segment = 3.0: is no segment. Write {"velocity"'),
+        ([{"duration": 1.0}], "segment 1: velocity = None: must be stated"),
+        ([{"velocity": 1.0, "durations": 1.0}], "'durations': is unknown. Did you mean 'duration'"),
+        ([{"velocity": -1.0}], "velocity = -1.0: must be 0 or greater.*forward slip; 0 holds"),
+        ([{"velocity": math.nan}], "velocity = nan: must be 0 or greater, and finite"),
+        ([{"velocity": "fast"}], "velocity = 'fast': must be"),
+        ([{"velocity": 1.0, "duration": 0.0}], "duration = 0.0: must be positive. Leave out"),
+        ([{"velocity": 1.0, "duration": math.nan}], "duration = nan: must be positive"),
+        ([{"velocity": 1.0, "duration": 1.0, "distance": 1.0}], "both say how long it lasts"),
+        ([{"velocity": 0.0, "distance": 1.0}], "must be positive where a distance is stated"),
+        ([{"velocity": 1.0}, {"velocity": 2.0}], "segment 1: duration = inf: never ends. State"),
+        ([{"velocity": 1.0, "step": math.inf}], "step = inf: must be a finite number"),
+    ],
+)
+def test_segments_that_make_no_protocol(rows, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        protocol(rows)
+
+
+def test_protocols_differ_by_their_segments(tmp_path):
+    """Two of one name are told apart by what they do, wherever cells are kept."""
+
+    def study(velocity: float) -> Study:
+        loading = protocol([{"velocity": velocity, "duration": 1.0}, {"velocity": 1.0}], "own")
+        return Study(
+            name="told_apart",
+            title="Two protocols",
+            base=Scene(**STIFF, loading=loading),
+            axes=[Axis("b_over_a", [2.0])],
+            measure=StepResponse(peaks=2, phases=2),
+        )
+
+    peaks = [
+        float(run(study(v), output=tmp_path / str(v), rtol=1e-4).max_log10_slip_rate.item())
+        for v in (2.0, 4.0)
+    ]
+    assert peaks[1] > peaks[0]
+    with pytest.raises(Exception, match="own code|computed differently"):
+        run(study(3.0), output=tmp_path / "2.0", rtol=1e-4)
+
+
+HOLDS = [{"velocity": 0.0, "duration": 5.0}, {"velocity": 1.0, "step": 0.5}]
+
+
+def test_scenes_differ_by_the_segments_of_their_protocols():
+    short = Scene(**STIFF, loading=protocol(HOLDS, "held"))
+    long = Scene(**STIFF, loading=protocol([{**HOLDS[0], "duration": 50.0}, HOLDS[1]], "held"))
+    same = Scene(**STIFF, loading=protocol(HOLDS, "held"))
+    assert short != long
+    assert len({short, long, same}) == 2
+    assert short == same
+    assert short == short.with_(a=0.02).with_(a=short.a)
+
+
+def test_a_trajectory_tells_the_segments_of_its_protocol():
+    """As `protocol` takes them; its steady sliding can be drawn whatever loads it."""
+    scene = Scene(**STIFF, loading=protocol(HOLDS, "held"))
+    motion = simulate(scene, duration=6.0, rtol=1e-4)
+    told = json.loads(motion.attrs["scene"])
+    assert told["segments"] == HOLDS
+    assert protocol(told["segments"], "held").history == scene.parts.loading.segments
+    assert "segments" not in json.loads(simulate(Scene(), duration=0.1).attrs["scene"])
+
+
+@pytest.mark.parametrize("last", [{"velocity": 2.0}, {"velocity": 2.0, "duration": 3.0}])
+def test_protocols_are_pickled_by_their_segments(last):
+    scene = Scene(**STIFF, loading=protocol([*HOLDS[:1], last], "held"))
+    for protocol_number in range(2, pickle.HIGHEST_PROTOCOL + 1):
+        again = pickle.loads(pickle.dumps(scene, protocol_number))
+        assert again == scene
+        assert again.parts.loading.lasts == scene.parts.loading.lasts
+    assert cloudpickle.loads(cloudpickle.dumps(scene)) == scene
+    assert copy.deepcopy(scene) == scene
+    assert pickle.loads(pickle.dumps(Protocol)) is Protocol
+
+
+def test_protocols_are_points_of_an_axis():
+    rows = [{"velocity": 3.0, "distance": 20.0}, {"velocity": 1.0}]
+    up, higher = protocol(rows, "up"), protocol([{"velocity": 9.0}], "higher")
+    study = Study(
+        name="two_protocols",
+        title="Two protocols, two steps",
+        base=Scene(**STIFF),
+        axes=[Axis("loading", [up, higher]), Axis("step_number", [1, 2])],
+        measure=VelocityStep(phases=2),
+    )
+    found = run(study, rtol=1e-4)
+    assert found.loading.values.tolist() == ["up", "higher"]
+    assert found.apparent_a.notnull().values.tolist() == [[True, True], [True, False]]
+
+
+def test_what_has_nothing_to_read():
+    outcome = Healing()(Scene(**STIFF), Accuracy())
+    assert (outcome.status.label, outcome.message[:14]) == ("no_step", "the load point")
+    for number, label in ((1, "not_applicable"), (2, "not_applicable"), (3, "not_applicable")):
+        held = Scene(**STIFF, hold_time=10.0)
+        assert VelocityStep(step_number=number)(held, Accuracy()).status.label == label
+    assert VelocityStep()(Scene(**STIFF), Accuracy()).status.label == "no_step"
+
+
+@pytest.mark.parametrize(
+    "idle",
+    [
+        {"loading": protocol([{"velocity": 1.0}])},
+        {"loading": protocol([{"velocity": 1.0, "duration": 5.0}, {"velocity": 1.0}])},
+        {"velocity_steps": 1, "velocity_ratio": 1.0},
+    ],
+)
+def test_a_history_without_a_step_is_that_of_the_plain_scene(idle):
+    plain = Scene(law="slip", normal_stress="constant", stiffness_ratio=0.8, inertia=True)
+    idle, accuracy = plain.with_(**idle), Accuracy(1e-4, 10**5)
+    assert StepResponse()(idle, accuracy).status is Status.NO_STEP
+    for measure in (LimitCycle(phases=2), Bifurcation(transient=4, events=4)):
+        found, expected = measure(idle, accuracy), measure(plain, accuracy)
+        assert found.status is expected.status is Status.OK
+        assert found.values[measure.headline] == expected.values[measure.headline]
+    if len(idle.segments) == 1:
+        assert Triggered()(idle, accuracy).values["unstable"] == 0.0
+
+
+def test_what_is_asked_of_one_step_is_not_asked_of_a_hold():
+    for measure in (CriticalStep(), Triggered()):
+        with pytest.raises(InvalidValue, match="slide_hold_slide': is no single step"):
+            measure(Scene(**STIFF, hold_time=10.0), Accuracy())

@@ -1,0 +1,320 @@
+"""What an experimenter reads off a velocity step and a hold: identities, then closed forms and how
+they are approached, then a second formulation.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq, minimize_scalar
+
+from rsfstudy import Scene, protocol, simulate
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.stepping import Meter, steps
+from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
+from rsfstudy.status import Status
+
+LAWS = ("slip", "slowness")
+PLAIN = {"normal_stress": "constant", "stiffness_ratio": 3.0}
+
+
+def read(measure, scene: Scene, rtol: float = 1e-7, **options) -> dict:
+    outcome = measure(scene, Accuracy(rtol, **options))
+    assert outcome.status is Status.OK, outcome
+    return outcome.values
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_step_back_is_the_step_down_from_there(law):
+    """Friction has no velocity of its own: from 5 V_* to V_* is from V_* to V_*/5, once settled."""
+    stepped = Scene(
+        law=law, **PLAIN, velocity_steps=2, velocity_ratio=5.0, displacement_between_steps=25.0
+    )
+    back = read(VelocityStep(step_number=2, phases=2), stepped)
+    down = read(
+        VelocityStep(phases=2), Scene(law=law, **PLAIN, velocity_steps=1, velocity_ratio=0.2)
+    )
+    for name in ("apparent_a", "apparent_b", "apparent_a_minus_b", "corrected_slip_distance"):
+        # exp(-25) of the first evolution is left
+        assert back[name] == pytest.approx(down[name], rel=2e-7), name
+    assert back["friction_before"] - stepped.mu_star == pytest.approx(
+        (stepped.a - stepped.b) * math.log(5.0), rel=1e-7
+    )
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
+def test_what_is_read_adds_up_and_a_minus_b_is_true(law, normal_stress):
+    """mu_ss = mu_* + (a - b) ln V, however normal stress follows shear stress."""
+    scene = Scene(law=law, normal_stress=normal_stress, stiffness_ratio=4.0, load_velocity_ratio=2)
+    found = read(VelocityStep(record=25.0, phases=50), scene)
+    assert found["apparent_a_minus_b"] == pytest.approx(scene.a - scene.b, rel=1e-6)
+    assert found["apparent_a"] - found["apparent_b"] == pytest.approx(
+        found["apparent_a_minus_b"], rel=1e-12
+    )
+    assert found["settled"] == 1.0
+    assert 0.3 * scene.a < found["apparent_a"] < scene.a
+    assert found["friction_coefficient"][-1] == pytest.approx(found["friction_after"], rel=1e-12)
+    assert found["load_point_displacement"][-1] == pytest.approx(25.0, rel=1e-9)
+
+
+def late(law: str, rate: float) -> float:
+    """As in the study velocity_steps: first order in a/K, in units of b a/K."""
+    if law == "slowness":
+        return rate * math.exp(-rate) - math.expm1(-rate)
+    return quad(lambda y: y / math.expm1(y) if y else 1.0, 0.0, rate)[0] + rate
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("ratio", [0.2, 5.0])
+def test_a_stiff_slider_comes_close_to_a_rigid_one(law, ratio):
+    """Friction departs from the closed form by what first order says, and what that leaves out
+    falls in proportion to 1/K.
+    """
+    left = []
+    for stiffness in (100.0, 1000.0):
+        scene = Scene(
+            law=law, normal_stress="constant", stiffness_ratio=stiffness,
+            velocity_steps=1, velocity_ratio=ratio,
+        )  # fmt: skip
+        found = read(VelocityStep(record=1.0, phases=2), scene, 1e-6)
+        first = scene.b * scene.a / scene.stiffness * abs(late(law, math.log(ratio)))
+        left.append(found["closed_form_departure"] / first - 1.0)
+    assert abs(left[1]) < 0.1
+    assert abs(left[1]) < 0.25 * abs(left[0])
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"law": "perrin_rice_zheng"},
+        {"law": "family", "law_exponent": 0.3},
+        {"law": "cut_off", "cutoff_velocity_ratio": 3.0},
+        {"law": "slip", "radiation_damping": 1e-3},
+    ],
+)
+def test_every_closed_form_is_come_close_to(law):
+    """Its departure falls in proportion to 1/K."""
+    departures = [
+        read(
+            VelocityStep(record=3.0, phases=2),
+            Scene(**law, normal_stress="constant", stiffness=stiffness, load_velocity_ratio=5.0),
+        )["closed_form_departure"]
+        for stiffness in (10.0, 100.0)
+    ]
+    assert departures[0] < 0.02 * 0.01
+    assert departures[1] == pytest.approx(0.1 * departures[0], rel=0.15)
+
+
+SOFT = {"normal_stress": "constant", "stiffness": 5.0, "velocity_steps": 2, "velocity_ratio": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("number", "fields", "known"),
+    [
+        (2, {"law": "slip"}, True),
+        (2, {"law": "slip", "displacement_between_steps": 0.5}, False),
+        (1, {"law": "cut_off"}, True),
+        (2, {"law": "cut_off"}, False),
+        (1, {"law": "slip", "stress_dependence": 1.0}, False),
+        (1, {"law": "slip", "fluid": "dilatant"}, False),
+        (1, {"law": "slip", "normal_stress": "variable"}, False),
+        (1, {"law": "composite"}, False),
+    ],
+)
+def test_where_there_is_no_closed_form_there_is_no_departure(number, fields, known):
+    found = read(VelocityStep(step_number=number, phases=2), Scene(**{**SOFT, **fields}), 1e-5)
+    assert math.isfinite(found["closed_form_departure"]) is known
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_hold_by_a_second_formulation(law):
+    """Radau in time, with v = exp((f - Theta)/a) written out."""
+    hold, scene = 40.0, Scene(law=law, normal_stress="constant", stiffness_ratio=2.0)
+    a, b, stiffness = scene.a, scene.b, scene.stiffness
+
+    def rates(load):
+        def at(_time, state):
+            f, theta = state
+            v = math.exp((f - theta) / a)
+            if law == "slip":
+                evolution = -v * (theta + b * math.log(v))
+            else:
+                evolution = b * (math.exp(-theta / b) - v)
+            return stiffness * (load - v), evolution
+
+        return at
+
+    options = {"method": "Radau", "rtol": 1e-10, "atol": 1e-13, "dense_output": True}
+    held = solve_ivp(rates(0.0), (0.0, hold), (0.0, 0.0), **options)
+    again = solve_ivp(rates(1.0), (0.0, 8.0), held.y[:, -1], **options)
+    guess = again.t[again.y[0].argmax()]
+    top = minimize_scalar(
+        lambda t: -again.sol(t)[0], bounds=(guess - 0.3, guess + 0.3), method="bounded"
+    )
+    found = read(Healing(phases=2), scene.with_(hold_time=hold))
+    assert found["relaxation"] == pytest.approx(held.y[0, -1], rel=2e-7)
+    assert found["healing"] == pytest.approx(-top.fun, rel=2e-7)
+    assert found["peak_displacement"] == pytest.approx(top.x, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"law": "slip", "hold_time": 300.0},
+        {"law": "slowness", "hold_time": 1e5, "alpha": 0.56},
+        {"law": "slowness", "hold_time": 50.0, "inertia": True},
+        {"law": "slip", "velocity_steps": 1, "velocity_ratio": 3.0, "alpha": 0.3},
+        {"law": "slowness", "velocity_steps": 2, "velocity_ratio": 0.1},
+        {"law": "slip", "hold_time": 100.0, "fluid": "dilatant", "dilatancy": 0.02},
+        {"law": "slip", "velocity_steps": 1, "radiation_damping": 1e-3},
+        {"law": "slowness", "velocity_steps": 1, "normal_stress": "constant", "fluid": "dilatant"},
+    ],
+)
+def test_errors_cover_and_engines_agree(fields):
+    scene = Scene(stiffness_ratio=3.0, **fields)
+    measure = (Healing if "hold_time" in fields else VelocityStep)(phases=2)
+    exact, rough = read(measure, scene, 1e-9), read(measure, scene, 1e-4)
+    compiled = read(measure, scene, 1e-7, engine=COMPILED)
+    names = [name for name in rough if f"{name}_error" in rough]
+    assert len(names) in (3, 8)
+    for name in names:
+        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
+        apart = abs(compiled[name] - exact[name])
+        assert apart <= compiled[f"{name}_error"] + exact[f"{name}_error"], name
+
+
+DILATANT = {"normal_stress": "constant", "fluid": "dilatant", "dilatancy": 0.02, "drainage": 1.0}
+#: Where the extremum of spring stress is not that of the friction coefficient that is read.
+APART = [
+    {**DILATANT, "stiffness": 0.5},
+    {**DILATANT, "stiffness": 0.05, "drainage": 10.0},
+    {**DILATANT, "stiffness": 0.5, "normal_stress": "variable", "radiation_damping": 1e-4},
+    {"stiffness": 5.0, "radiation_damping": 1e-3},
+    {"stiffness": 5.0, "radiation_damping": 1e-2},
+]
+
+
+def recorded(scene: Scene, begins: float, lasts: float) -> tuple:
+    """Extremes of friction after an instant, from what `simulate` keeps: a spline, its highest and
+    its lowest point.
+    """
+    motion = simulate(scene, duration=begins + lasts, rtol=1e-11, engine=COMPILED)
+    since, kept = np.unique(motion.time.values - begins, return_index=True)
+    spline = CubicSpline(since, motion.friction_coefficient.values[kept])
+    turns = [t for t in spline.derivative().roots(extrapolate=False) if 0.0 < t < lasts]
+    turns = np.array([*turns, lasts])
+    return spline, turns[spline(turns).argmax()], turns[spline(turns).argmin()]
+
+
+@pytest.mark.parametrize("ratio", [0.2, 10.0])
+@pytest.mark.parametrize("fields", APART)
+def test_a_step_is_read_off_friction_not_off_the_spring(fields, ratio):
+    """Its extremum, and where 1/e of the evolution is left, are those of what is recorded."""
+    scene = Scene(law="slowness", b_over_a=1.5, load_velocity_ratio=ratio, **fields)
+    friction, highest, lowest = recorded(scene, 0.0, 20.0 / ratio)
+    peak, end = (highest if ratio > 1.0 else lowest), 20.0 / ratio
+    level = friction(end) + (friction(peak) - friction(end)) / math.e
+    left = brentq(lambda t: friction(t) - level, peak, end)
+    for engine in ENGINES:
+        found = read(VelocityStep(phases=2), scene, 1e-9, engine=engine)
+        assert found["peak_friction"] == pytest.approx(friction(peak), abs=1e-7)
+        assert found["apparent_slip_distance"] == pytest.approx(ratio * (left - peak), rel=2e-4)
+
+
+@pytest.mark.parametrize("fields", APART)
+def test_healing_is_read_off_friction_not_off_the_spring(fields):
+    scene = Scene(law="slip", b_over_a=1.5, hold_time=100.0, **fields)
+    friction, highest, _lowest = recorded(scene, 100.0, 20.0)
+    for engine in ENGINES:
+        found = read(Healing(phases=2), scene, 1e-9, engine=engine)
+        assert found["healing"] == pytest.approx(friction(highest) - scene.mu_star, abs=1e-7)
+        assert found["peak_displacement"] == pytest.approx(highest, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "equations",
+    [
+        between_ruptures(Scene(**APART[0], load_velocity_ratio=3.0), clock=True),
+        between_ruptures(Scene(**APART[2], load_velocity_ratio=3.0), clock=False),
+        between_ruptures(Scene(**APART[4], law="two_slip_states", b1_over_a=1.5), clock=False),
+        in_rupture(Scene(inertia=True, stiffness_ratio=0.5)),
+        in_rupture(Scene(**DILATANT, inertia=True, stiffness_ratio=0.5)),
+        rigid(Scene(fluid="dilatant", law="two_slowness_states", b1_over_a=1.5), 1.0),
+    ],
+)
+def test_the_change_of_what_is_read_is_its_derivative(equations):
+    """By a difference of order four along a step."""
+    start = [0.01 * (1.0 + n) for n in range(len(equations.unknowns))]
+    for number, step in enumerate(steps(equations, start, 1e-10, Meter(10**4))):
+        middle, reach = 0.5 * (step.start + step.end), 0.1 * (step.end - step.start)
+
+        def reads(clock, step=step):
+            point = step.point_at(clock)
+            return (equations.p[2] + point.spring) / point.normal_stress
+
+        near, far = (reads(middle + n * reach) - reads(middle - n * reach) for n in (1, 2))
+        change = (8.0 * near - far) / (12.0 * reach)
+        size = abs(reads(step.end) - reads(step.start)) / abs(step.end - step.start)
+        assert step.point_at(middle).reading_growth == pytest.approx(
+            change, rel=1e-5, abs=1e-4 * size + 1e-9
+        )
+        if number == 20:
+            return
+
+
+def test_a_hold_of_a_longer_protocol_is_read_from_where_it_begins():
+    """After a step that has settled: the hold from 2 V_*, twice as long in its own time."""
+    rows = [
+        {"velocity": 2.0, "distance": 30.0},
+        {"velocity": 0.0, "duration": 50.0},
+        {"velocity": 2.0},
+    ]
+    common = {"law": "slowness", **PLAIN}
+    later = read(Healing(phases=20), Scene(**common, loading=protocol(rows)))
+    first = read(Healing(phases=20), Scene(**common, hold_time=100.0))
+    for name in ("healing", "relaxation", "peak_displacement"):
+        assert later[name] == pytest.approx(first[name], rel=1e-6), name
+    assert later["time"][0] == 0.0
+    assert (np.diff(later["time"]) >= 0.0).all()
+
+
+@pytest.mark.parametrize("displaced", [0, 1])
+def test_a_displacement_is_no_part_of_a_hold(displaced):
+    """Spring stress would jump where relaxation and healing are read."""
+    rows = [{"velocity": 0.0, "duration": 10.0}, {"velocity": 1.0}]
+    rows[displaced]["step"] = -0.5
+    scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
+    outcome = Healing(phases=2)(scene, Accuracy())
+    assert (outcome.status, outcome.values) == (Status.NOT_APPLICABLE, {})
+    assert "displaced" in outcome.message
+    earlier = [{"velocity": 1.0, "step": 0.1, "duration": 40.0}, *rows]
+    earlier[1 + displaced] = {**rows[displaced], "step": 0.0}
+    assert read(Healing(phases=2), scene.with_(loading=protocol(earlier)))["healing"] > 0.0
+
+
+def test_a_peak_after_the_next_step_is_none_of_the_hold():
+    """The load point moves on too briefly for friction to peak before it steps up."""
+    rows = [
+        {"velocity": 0.0, "duration": 100.0},
+        {"velocity": 1.0, "distance": 0.5},
+        {"velocity": 10.0},
+    ]
+    scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
+    outcome = Healing(phases=2)(scene, Accuracy())
+    assert (outcome.status, outcome.message[:7]) == (Status.NOT_APPLICABLE, "no peak")
+    alone = read(Healing(phases=2), Scene(law="slowness", **PLAIN, hold_time=100.0))
+    assert outcome.values["relaxation"] == pytest.approx(alone["relaxation"], rel=1e-12)
+
+
+def test_friction_that_still_changes_has_not_settled():
+    """However few steps the integrator took."""
+    scene = Scene(law="slip", **PLAIN, velocity_steps=1, velocity_ratio=1.5)
+    for record, settled in ((1.0, 0.0), (2.0, 0.0), (25.0, 1.0)):
+        found = read(VelocityStep(record=record, phases=2), scene, 1e-4)
+        assert found["settled"] == settled

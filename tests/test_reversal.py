@@ -1,0 +1,144 @@
+"""The regularised form of friction, in which slip reverses with shear stress: held to an
+independent integration in time, of slip rate with its sign.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rsfstudy import Scene, simulate
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider import steady
+from rsfstudy.slider.equations import relation_of
+from rsfstudy.status import Status
+
+CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}
+BACK = {"load_velocity_ratio": 1.0, "stiffness_ratio": 2.0}
+
+
+def slip_rate(scene: Scene, spring: float, psi: float) -> float:
+    """``V = 2 V_* exp[-(mu_* + Theta)/a] sinh[tau/(a sigma)]``, with its sign."""
+    cot_phi, alpha = scene.parts.normal_stress.coupling
+    ratio = 1.0 + cot_phi * spring
+    drive = (scene.mu_star + spring) / ratio / scene.a
+    held = (scene.mu_star + psi - alpha * math.log(ratio)) / scene.a
+    return math.copysign(math.exp(abs(drive) - held) * -math.expm1(-2.0 * abs(drive)), drive)
+
+
+def in_time(scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Spring stress and state freed of stress, by an implicit method in time."""
+    cot_phi, alpha = scene.parts.normal_stress.coupling
+
+    def rates(_time, unknowns):
+        spring, psi = unknowns
+        speed = slip_rate(scene, spring, psi)
+        state = psi - alpha * math.log(1.0 + cot_phi * spring)
+        if scene.law == "slowness":
+            change = scene.b * (math.exp(-state / scene.b) - abs(speed))
+        else:
+            change = -abs(speed) * (state + scene.b * math.log(abs(speed))) if speed else 0.0
+        return scene.stiffness * (scene.load_velocity - speed), change
+
+    start, span = (scene.spring_stress_step, 0.0), (0.0, times[-1])
+    ran = solve_ivp(rates, span, start, "Radau", times, rtol=1e-10, atol=1e-13)
+    assert ran.success
+    return ran.y
+
+
+@pytest.mark.parametrize("engine", ["scipy", "compiled"])
+@pytest.mark.parametrize(
+    ("law", "stress", "taken"),
+    [
+        ("slip", CONSTANT, 0.9),
+        ("slowness", CONSTANT, 1.3),
+        ("slowness", VARIABLE, 0.65),
+    ],
+)
+def test_slip_that_reverses_is_that_of_time(law, stress, taken, engine):
+    """From reversed stress through zero to slip forward, to ten tolerances: local errors add up."""
+    scene = Scene(law=law, regularised=True, mu_star=0.6, **stress, **BACK)
+    scene = scene.with_(displacement_step=-taken / scene.stiffness)
+    ran = simulate(scene, duration=100.0, engine=engine)
+    assert ran.shear_stress[0] < 0.0 < ran.shear_stress[-1]
+    spring, psi = in_time(scene, ran.time.values)
+    error = 10.0 * 1e-7
+    assert np.abs(ran.shear_stress - scene.mu_star - spring).max() < error
+    cot_phi, alpha = scene.parts.normal_stress.coupling
+    state = psi - alpha * np.log1p(cot_phi * spring)
+    assert np.abs(ran.state_variable - state).max() < error
+    # slip goes back first, at the rate of the arcsinh form
+    began = slip_rate(scene, scene.spring_stress_step, 0.0)
+    assert began < 0.0
+    assert ran.log10_slip_rate[0] == pytest.approx(math.log10(-began), rel=1e-12)
+
+
+@pytest.mark.parametrize("stress", [CONSTANT, VARIABLE])
+def test_slip_forward_is_what_it_is_without(stress):
+    """The forms differ by exp(-2 mu/a); what is left is rounding."""
+    plain = Scene(stiffness_ratio=1.5, **stress)
+    both_ways = plain.with_(regularised=True)
+    for friction in (-0.2, 0.0, 0.1):
+        there, here = relation_of(both_ways)(friction), relation_of(plain)(friction)
+        assert there == pytest.approx(here, rel=1e-13, abs=1e-15)
+    assert both_ways.critical_stiffness == pytest.approx(plain.critical_stiffness, rel=1e-9)
+    step, other = (CriticalStep()(scene, Accuracy(1e-6)) for scene in (plain, both_ways))
+    assert step.status is other.status is Status.OK
+    allowed = (
+        step.values["critical_velocity_ratio_error"] + other.values["critical_velocity_ratio_error"]
+    )
+    assert other.values["critical_velocity_ratio"] == pytest.approx(
+        step.values["critical_velocity_ratio"], abs=allowed
+    )
+
+
+def test_friction_is_odd_in_slip_rate():
+    """Where stress is mirrored about zero, so is friction: same magnitude of slip rate."""
+    scene = Scene(regularised=True, **CONSTANT)
+    for above in (1e-6, 0.01, 0.3):
+        there, slope, *_ = relation_of(scene)(above - scene.mu_star)
+        mirrored, other_slope, *_ = relation_of(scene)(-above - scene.mu_star)
+        assert mirrored == pytest.approx(there, rel=1e-12)
+        assert other_slope == pytest.approx(-slope, rel=1e-12)
+    # close to zero stress the fault is viscous: V = 2 V_* exp(-mu_*/a) tau/(a sigma)
+    value = relation_of(scene)(1e-9 - scene.mu_star)[0]
+    linear = math.log(2e-9 / scene.a) - scene.mu_star / scene.a
+    assert value / scene.a == pytest.approx(linear, rel=1e-9)
+
+
+def test_what_reversal_is_refused_for():
+    step = {"displacement_step": -200.0, **CONSTANT}
+    with pytest.raises(InvalidValue, match="regularised = True.*inertia.*Leave one"):
+        Scene(regularised=True, inertia=True, **CONSTANT)
+    with pytest.raises(InvalidValue, match="regularised = True.*radiation_damping"):
+        Scene(regularised=True, radiation_damping=1e-9, **CONSTANT)
+    with pytest.raises(InvalidValue, match="regularised = True.*dilatant"):
+        Scene(regularised=True, fluid="dilatant", **CONSTANT)
+    with pytest.raises(InvalidValue, match="stress_dependence = 1.*not for dilatant"):
+        Scene(stress_dependence=1.0, fluid="dilatant", **CONSTANT)
+    for scene in (Scene(**step, **BACK), Scene(regularised=True, **step)):
+        ran = simulate(scene)
+        assert ran.attrs["status"] == "shear_stress_reversed"
+        assert "the step takes shear stress to" in ran.attrs["message"]
+
+
+@pytest.mark.parametrize("load", [1.0, 10.0, 100.0, 1e4])
+@pytest.mark.parametrize("stress", [CONSTANT, {**VARIABLE, "alpha": 0.0}])
+def test_steady_friction_stays_positive(stress, load):
+    """``a arcsinh{exp[(mu_* + Theta_ss)/a] V/(2 V_*)}``, where mu_* + (a - b) ln V < 0 too."""
+    scene = Scene(
+        law="slip", b_over_a=2.0, mu_star=0.05, regularised=True, stiffness=0.01,
+        load_velocity_ratio=load, **stress,
+    )  # fmt: skip
+    held = (scene.mu_star - scene.b * math.log(load)) / scene.a
+    exact = scene.a * math.asinh(0.5 * load * math.exp(held))
+    values = LinearStability()(scene, Accuracy()).values
+    assert values["steady_friction"] == pytest.approx(exact, rel=1e-11)
+    if stress == CONSTANT:
+        # weakening of the arcsinh form: a factor tanh(mu_ss/a)
+        weakens = (scene.b - scene.a) * math.tanh(exact / scene.a)
+        assert steady.critical_stiffness(scene, math.log(load)) == pytest.approx(weakens, rel=1e-9)

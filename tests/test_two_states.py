@@ -1,0 +1,321 @@
+"""The laws of two states: closed forms, the one state they are where lengths are equal, and motions
+that grow as eigenvalues say.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.boundaries import swing
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider import laws, steady
+from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
+from rsfstudy.slider.parts import number
+from rsfstudy.status import Status
+
+LAWS = {"slip": "two_slip_states", "slowness": "two_slowness_states"}
+CONSTANT = {"normal_stress": "constant"}
+CASES = [(law, stress) for law in LAWS for stress in (CONSTANT, {})]
+STRENGTHENING = {"a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
+
+
+def closed_form(first: float, second: float, over: float) -> float:
+    """Critical k L_1/(a sigma) at constant normal stress, where L_1/L_2 = `over`: the cubic of
+    Routh and Hurwitz (Gu et al. 1984).
+    """
+    half = first - 1.0 + over * (2.0 * first + (second - 1.0) * (2.0 + over))
+    product = over * (1.0 + over) * (first + second - 1.0) * (1.0 + over - first - second * over)
+    return (half + math.sqrt(half**2 + 4.0 * product)) / (2.0 + 2.0 * over)
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize(
+    ("first", "second", "over"),
+    [(1.0, 0.84, 0.048), (1.4, -0.6, 0.02), (0.5, 3.0, 7.0), (-2.0, 4.0, 1.5), (0.002, 1.4, 0.3)],
+)
+def test_critical_stiffness_is_the_closed_form(law, first, second, over):
+    scene = Scene(law=law, b1_over_a=first, b2_over_a=second, length_ratio=1.0 / over, **CONSTANT)
+    assert scene.critical_stiffness / scene.a == pytest.approx(
+        closed_form(first, second, over), rel=1e-11
+    )
+    found = LinearStability()(scene, Accuracy())
+    assert found.status is Status.OK
+    # growth is from differences on the scale of a
+    assert found.values["critical_stiffness_error"] < 1e-5 * scene.critical_stiffness
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+def test_published_critical_stiffness(law):
+    assert Scene(law=law, a=0.01, **CONSTANT).critical_stiffness == pytest.approx(
+        0.000802755656, rel=1e-9
+    )
+    strengthening = Scene(law=law, **STRENGTHENING, **CONSTANT)
+    assert strengthening.b < strengthening.a
+    assert strengthening.critical_stiffness == pytest.approx(0.0038741, abs=5e-8)
+
+
+def both(law: str, **fields) -> tuple[Scene, Scene]:
+    """One state, and two of the same length."""
+    one = Scene(law=law, b_over_a=2.0, **fields)
+    return one, Scene(law=LAWS[law], b1_over_a=0.6, b2_over_a=1.4, length_ratio=1.0, **fields)
+
+
+def agree(measure, one: Scene, two: Scene, rtol: float = 1e-7) -> None:
+    """Headline numbers of both within the sum of their error estimates."""
+    found, again = (measure(scene, Accuracy(rtol, 2_000_000)) for scene in (one, two))
+    assert again.status is found.status is Status.OK
+    for name in (n for n in found.values if f"{n}_error" in found.values):
+        allowed = found.values[f"{name}_error"] + again.values[f"{name}_error"]
+        allowed += 1e-14 * abs(found.values[name])
+        assert again.values[name] == pytest.approx(found.values[name], abs=allowed), name
+
+
+@pytest.mark.parametrize(("law", "stress"), CASES)
+def test_two_of_one_length_are_one(law, stress):
+    soft = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, **stress}
+    stiff = {"stiffness_ratio": 1.5, "load_velocity_ratio": 2.0, **stress}
+    agree(LinearStability(), *both(law, **stiff))
+    agree(LimitCycle(phases=2), *both(law, inertia=True, **soft), rtol=1e-6)
+    agree(StepResponse(peaks=2, phases=2), *both(law, **stiff), rtol=1e-6)
+    agree(RigidResponse(points=5), *both(law, **stiff))
+    agree(CriticalStep(of="displacement_step"), *both(law, stiffness_ratio=1.3, **stress), 1e-4)
+    agree(Triggered(), *both(law, stiffness_ratio=1.3, load_velocity_ratio=30.0, **stress), 1e-4)
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize("fields", [CONSTANT, {}, {"radiation_damping": 1e-4}])
+@pytest.mark.parametrize("numbers", [{}, STRENGTHENING])
+def test_motions_decay_as_eigenvalues_say(law, fields, numbers):
+    """Peaks of a small oscillation: their intervals, and by how much they shrink."""
+    scene = Scene(law=law, stiffness_ratio=1.05, displacement_step=1e-6, **numbers, **fields)
+    (fastest, *_) = steady.growth_rates(scene.with_(load_velocity_ratio=1.0), 0.0)
+    times, heights = [], []
+    small = scene.with_(load_velocity_ratio=1.0)
+    for event in follow(small, Accuracy(1e-9), Meter(300_000), (maximum("log_rate"),), clock=True):
+        if event.kind is Kind.MAXIMUM:
+            times.append(event.time)
+            heights.append(event.point.log_rate)
+        if len(times) == 8:
+            break
+    period = times[-1] - times[-2]
+    growth = math.log(heights[-1] / heights[-2]) / period
+    expected = complex(fastest.real, abs(fastest.imag))
+    assert abs(complex(growth, 2.0 * math.pi / period) - expected) < 1e-4 * abs(expected)
+    assert cmath.isfinite(expected)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"b_over_a": 2.0}, r"b_over_a = 2.0: is b1_over_a \+ b2_over_a.*Give those"),
+        ({"length_ratio": 0.0}, "length_ratio = 0.0: must be greater than 0"),
+        ({"b1_over_a": 0.2, "b2_over_a": 0.1}, "no critical stiffness.*give stiffness itself"),
+        ({"b1_over_a": 0.0, "b2_over_a": 0.0}, "no state has an effect"),
+    ],
+)
+def test_what_means_nothing_is_refused(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(law="two_slip_states", **fields)
+    with pytest.raises(InvalidValue, match="b2_over_a = 0.0: must not be 0"):
+        Scene(law="two_slowness_states", b2_over_a=0.0)
+    with pytest.raises(InvalidValue, match="b1_over_a = 1.0: has no meaning for slip"):
+        Scene(b1_over_a=1.0)
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize("effect", [{}, {"stress_dependence": 2.0, **CONSTANT}])
+def test_what_stress_takes_is_shared_within_bounds(law, effect):
+    """Shares stay below 1 and pass smoothly where b_1 + b_2 goes through 0, with the threshold."""
+    critical = []
+    for second in (-1.5 + 1e-9, -1.5, -1.5 - 1e-9):
+        scene = Scene(
+            law=law, b1_over_a=1.5, b2_over_a=second, length_ratio=60.0, stiffness=0.01, **effect
+        )
+        shares = scene.parts.law.numbers(scene)[2:4]
+        assert shares == pytest.approx((0.5, 0.5), abs=1e-9)
+        critical.append(scene.critical_stiffness)
+    assert critical[0] == pytest.approx(critical[1], rel=1e-6)
+    assert critical[2] == pytest.approx(critical[1], rel=1e-6)
+
+
+def test_b_follows_from_its_parts():
+    scene = Scene(law="two_slip_states", b1_over_a=0.9, b2_over_a=0.4)
+    assert scene.b == pytest.approx(1.3 * scene.a, rel=1e-15)
+    assert scene.with_(b2_over_a=-0.4, stiffness=0.001).b == pytest.approx(0.5 * scene.a, rel=1e-15)
+    assert Scene(law="two_slip_states", stiffness=0.01, b2_over_a=0.0).b == scene.a
+    assert scene.with_(law="slip").b == 2.0 * scene.a
+
+
+DYNAMICS = [{}, {"inertia": True}, {"radiation_damping": 1e-3}]
+MEASURES = [
+    CriticalStep(of="displacement_step", direction="down"),
+    LimitCycle(phases=2),
+    StepResponse(peaks=2, phases=2),
+    LinearStability(),
+    RigidResponse(points=3),
+]
+
+
+@pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
+@pytest.mark.parametrize("law", LAWS.values())
+@pytest.mark.parametrize("numbers", [{}, STRENGTHENING], ids=["weakening", "strengthening"])
+def test_every_measure_answers(measure, law, numbers):
+    """A number, or a status that is an answer; motions without bound are one without mass."""
+    cycles = isinstance(measure, LimitCycle)
+    for stress in (CONSTANT, {}):
+        for acting in DYNAMICS:
+            scene = Scene(
+                law=law,
+                stiffness_ratio=0.95 if cycles else 1.3,
+                load_velocity_ratio=None if isinstance(measure, CriticalStep) else 1.5,
+                **numbers,
+                **stress,
+                **acting,
+            )
+            found = measure(scene, Accuracy(1e-4, 2_000_000))
+            assert found.status.is_answer, (scene, found.status, found.message)
+
+
+@pytest.mark.parametrize("numbers", [{}, STRENGTHENING], ids=["weakening", "strengthening"])
+def test_critical_rate_steps(numbers):
+    """From motions followed forward, with a motion on each side to confirm them."""
+    scene = Scene(law="two_slip_states", stiffness_ratio=1.3, **numbers, **CONSTANT)
+    found = CriticalStep()(scene, Accuracy(1e-4))
+    assert found.status is Status.OK
+    stable, unstable = (
+        found.values[f"critical_velocity_ratio_{s}"] for s in ("stable", "unstable")
+    )
+    assert stable < found.values["critical_velocity_ratio"] < unstable < 1.01 * stable
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unbounded(TwoSlipStates):
+    """Shares b_i/(b_1 + b_2) of what stress takes, which exceed 1 where signs differ."""
+
+    name = "unbounded"
+
+    def numbers(self, scene):
+        first, second, *_shares, over = super().numbers(scene)
+        return first, second, first / scene.b, second / scene.b, over
+
+
+@pytest.mark.parametrize("mass", [{}, {"inertia": True}])
+def test_what_grows_at_every_stiffness_is_not_called_stable(mass):
+    fields = {"b1_over_a": 2.7, "b2_over_a": -1.4, "length_ratio": 60.0, "stress_dependence": 2.0}
+    scene = Scene(law=Unbounded, stiffness=0.02, **fields, **mass)
+    for stiffness in (1e-3, 0.1, 10.0):
+        assert steady.growth_rates(scene.with_(stiffness=stiffness), 0.0)[0].real > 1e-3
+    assert scene.critical_stiffness == math.inf
+    assert scene.stiffness_ratio == 0.0
+    assert LinearStability()(scene, Accuracy()).status is Status.UNSTABLE_AT_ANY_STIFFNESS
+    with pytest.raises(InvalidValue, match="no critical stiffness.*give stiffness itself"):
+        Scene(law=Unbounded, **fields)
+
+
+#: Unstable between two stiffnesses only, the first of them 0.66 of the second.
+WINDOW = {"b1_over_a": 1.136, "b2_over_a": -0.5, "length_ratio": 10.0, **CONSTANT}
+
+
+@pytest.mark.parametrize("mass", [{}, {"inertia": True}, {"radiation_damping": 1e-9}])
+def test_growth_confirms_a_threshold_close_to_another(mass):
+    scene = Scene(law="two_slip_states", stiffness=0.01, **WINDOW, **mass)
+    first, second = steady.critical_stiffnesses(scene, 0.0)
+    assert 0.5 * second < first < second
+    assert second == pytest.approx(scene.critical_stiffness, rel=1e-4)
+    for stiffness, grows in ((0.9 * first, False), (1.1 * first, True), (1.1 * second, False)):
+        rates = steady.growth_rates(scene.with_(stiffness=stiffness), 0.0)
+        assert bool(rates[0].real > 0.0) is grows
+    found = LinearStability()(scene, Accuracy())
+    assert found.status is Status.OK
+    assert found.values["critical_stiffness_error"] < 1e-6 * second
+
+
+@pytest.mark.parametrize(
+    ("ratio", "margin"), [(0.2, 0.8), (0.6, 0.4), (0.8, -0.2), (0.99, -0.01), (1.2, 0.2)]
+)
+def test_below_a_window_of_instability_motions_settle(ratio, margin):
+    scene = Scene(law="two_slip_states", stiffness_ratio=ratio, load_velocity_ratio=1.2, **WINDOW)
+    assert swing.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
+    assert swing.settles(scene) is (margin > 0.0)
+    if ratio == 0.2:
+        assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
+        small = swing.swing(scene, Accuracy(1e-4), Meter(2_000_000))
+        assert not small.reached
+
+
+# ---- three states --------------------------------------------------------------------------------
+
+OWN = 0
+SHARES = (0.5, 0.2, 0.3)
+
+
+def evolutions(log_rate, psis, shift, share, p):
+    """Three states, each with its share of b; the second and third over lengths of their own."""
+    b = p[OWN]
+    return (
+        -share * (psis[0] - 0.5 * shift + 0.5 * b * log_rate),
+        -share * p[OWN + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_rate),
+        -share * p[OWN + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_rate),
+    )
+
+
+def resting(log_rate, shift, p):
+    at = shift - p[OWN] * log_rate
+    return 0.5 * at, 0.2 * at, 0.3 * at
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreeSlipStates(laws.Law):
+    """The slip law with three states, of which b is divided."""
+
+    second: float = number(1.0, "", "1", "first over second slip distance")
+    third: float = number(1.0, "", "1", "first over third slip distance")
+
+    name = "three_slip_states"
+    states = 3
+    evolutions = staticmethod(evolutions)
+    resting = staticmethod(resting)
+
+    def numbers(self, scene):
+        return (*super().numbers(scene), self.second, self.third)
+
+
+@pytest.mark.parametrize("stress", [CONSTANT, {}])
+def test_three_of_one_length_are_one(stress):
+    for fields in ({"stiffness_ratio": 0.8, "inertia": True}, {"stiffness_ratio": 1.5}):
+        one, three = (
+            Scene(law=law, load_velocity_ratio=2.0, **fields, **stress)
+            for law in ("slip", ThreeSlipStates)
+        )
+        agree(LinearStability(), one, three)
+        agree(LimitCycle(phases=2) if "inertia" in fields else RigidResponse(points=3), one, three)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_two_of_three_lengths_alike_are_two(engine):
+    """Three states of which two have one length are two."""
+    two = Scene(law="two_slip_states", b1_over_a=1.4, b2_over_a=0.6, length_ratio=4.0, **CONSTANT)
+    three = Scene(law=ThreeSlipStates, b_over_a=2.0, second=1.0, third=0.25, **CONSTANT)
+    assert three.critical_stiffness == pytest.approx(two.critical_stiffness, rel=1e-12)
+    accuracy = Accuracy(1e-6, engine=engine)
+    one, other = (
+        LimitCycle(phases=2)(s.with_(stiffness_ratio=0.8, inertia=True, load_velocity_ratio=2.0),
+                             accuracy).values["recurrence_interval"] for s in (two, three)
+    )  # fmt: skip
+    assert other == pytest.approx(one, rel=2e-6)
+    assert np.isfinite(one)
