@@ -246,8 +246,10 @@ def test_a_protocol_from_a_file(tmp_path):
     path.write_text("\ufeff" + RECORD)
     read = read_protocol(path, RIG, "steps_and_hold")
     assert read.name == "steps_and_hold"
-    expected = [(10.0, 0.0, 3.0), (1.0, 0.0, 30.0), (0.0, 0.0, 60.0), (1.0, 0.0, math.inf)]
-    assert np.array(read.history) == pytest.approx(np.array(expected), rel=1e-12)
+    steps = [(10.0, 0.0, 3.0), (1.0, 0.0, 30.0), (0.0, 0.0, 60.0), (1.0, 0.0, math.inf)]
+    assert np.array(read.history) == pytest.approx(
+        np.array([(*step, 0.0) for step in steps]), rel=1e-12
+    )
     assert read.lasts == pytest.approx(113.0)
     motion = simulate(RIG.scene(**LAW, loading=read), rtol=1e-4)
     assert float(motion.time[-1]) == pytest.approx(113.0)

@@ -116,12 +116,20 @@ def test_slopes_of_a_law_at_steady_sliding():
 
 
 def test_numbers_stand_where_their_parts_look_for_them():
-    scene = Scene(alpha=0.3, phi=70.0, inertia=True, stiffness=0.02, load_velocity_ratio=2.0)
+    scene = Scene(
+        alpha=0.3,
+        phi=70.0,
+        inertia=True,
+        stiffness=0.02,
+        load_velocity_ratio=2.0,
+        normal_stress_step=0.1,
+    )
     common, own = scene.numbers[:FIRST_OWN], scene.numbers[FIRST_OWN:]
-    assert common == (scene.a, scene.b, scene.mu_star, 0.02, 2.0, math.log(2.0), 0.0, scene.b)
+    of_law = scene.a, scene.b, scene.mu_star
+    assert common == (*of_law, 0.02, 2.0, math.log(2.0), 0.0, scene.b, 0.1)
     cot_phi = 1.0 / math.tan(math.radians(70.0))
     of_mass = scene.inertial_time, math.log(scene.inertial_time)
-    assert own == (scene.b, cot_phi, 0.3, *of_mass)
+    assert own == (scene.b, 0.3, cot_phi, *of_mass)
 
 
 def test_a_part_owns_its_fields():

@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue
 
 WRONG = [
     ({"law": "slipp"}, r"law = 'slipp'.*Did you mean 'slip'.*slowness"),
-    ({"normal_stress": "fixed"}, r"normal_stress = 'fixed'.*constant, variable"),
+    ({"normal_stress": "fixed"}, r"normal_stress = 'fixed'.*constant, imposed, variable"),
     ({"b_over_a": 0.0}, r"b_over_a = 0.0: must be greater than 0"),
     ({"b_over_a": -1.0}, r"b_over_a = -1.0"),
     ({"b_over_a": 1.0}, r"b_over_a = 1.0: must exceed 1.*rate weakening"),

@@ -25,6 +25,7 @@ from rsfstudy.motion.readings import (
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
+from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -126,8 +127,10 @@ class Healing(Measure):
             return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
         if history[holds[0] + 1].load_velocity == 0.0:
             return Outcome(Status.NOT_APPLICABLE, message="the hold is followed by another")
-        if any(segment.displacement for segment in history[holds[0] : holds[0] + 2]):
-            why = "the load point is displaced as the hold begins or ends"
+        before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
+        stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
+        if hold.displacement or reload.displacement or len(stresses) > 1:
+            why = "the load point is displaced, or normal stress stepped, at an end of the hold"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         first = _follow(scene, holds[0], accuracy, meter)
         if first.peak is None:

@@ -184,8 +184,10 @@ class VelocityStep(Measure):
         before = earlier[-1].load_velocity if earlier else 1.0
         if own.load_velocity == before:
             return Outcome(Status.NO_STEP, message="the load point goes on as before")
-        if not own.load_velocity or not before or own.displacement:
-            text = "a hold or a displacement is no step of velocity"
+        stressed = earlier[-1].normal_stress if earlier else 0.0
+        changed = own.displacement or own.normal_stress != stressed
+        if not own.load_velocity or not before or changed:
+            text = "a hold, a displacement or a change of normal stress is no step of velocity"
             return Outcome(Status.NOT_APPLICABLE, message=text)
         begins = math.fsum(segment.duration for segment in earlier)
         lasts = min(own.duration, self.record / own.load_velocity)

@@ -21,7 +21,7 @@ from rsfstudy.motion.events import (
     watchers,
 )
 from rsfstudy.motion.recording import SAMPLES, Recording, row
-from rsfstudy.motion.regimes import check_start, motion, starting
+from rsfstudy.motion.regimes import jumped, motion, starting
 from rsfstudy.motion.stepping import Meter, Step, steps
 from rsfstudy.motion.timeline import elapsed, moment_in, timed
 from rsfstudy.slider.equations import RIGID, Equations
@@ -76,8 +76,7 @@ def follow(
         if start is None:
             start = starting(acting)
         elif number:
-            start = start._replace(spring=start.spring + acting.spring_stress_step)
-            check_start(acting, start)
+            start = jumped(acting, start)
         asked = watches if number == len(segments) - 1 else _without_settling(watches)
         origin = origin._replace(spring=start.spring)
         end = min(origin.time + duration, until)

@@ -11,6 +11,7 @@ from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
@@ -127,8 +128,8 @@ def fast_state(point: Point) -> Numbers:
 
 
 def starting(scene: Scene) -> Point:
-    """Steady sliding at V_* the instant after the step of a scene, which moves the spring alone:
-    slip rate and friction follow within the inertial time.
+    """Steady sliding at V_* the instant after the step of a scene, which moves the spring and
+    imposed normal stress: with mass, slip rate follows within the inertial time.
 
     Raises
     ------
@@ -137,9 +138,30 @@ def starting(scene: Scene) -> Point:
     """
     check_start(scene)
     stepped = on_slow_manifold(scene, scene.spring_stress_step, resting_of(scene, 0.0, 0.0))
-    if not scene.has_mass:
-        return stepped
-    return stepped._replace(log_rate=0.0, friction=0.0)
+    return _at_rate(scene, stepped, 0.0) if scene.has_mass else stepped
+
+
+def jumped(scene: Scene, point: Point) -> Point:
+    """A point of a motion the instant after a step of the load point or of imposed normal stress:
+    states stay, and with mass slip rate does.
+
+    Raises
+    ------
+    Halt
+        As `starting` does.
+    """
+    after = point._replace(spring=point.spring + scene.spring_stress_step)
+    check_start(scene, after)
+    return _at_rate(scene, after, point.log_rate) if scene.has_mass else after
+
+
+def _at_rate(scene: Scene, point: Point, log_rate: float) -> Point:
+    """A point with another ln(V/V_*), and the frictional stress that goes with it."""
+    excess = scene.a * log_rate + point.psi
+    friction = steady.stress_after_jump(scene, excess, point.psis)
+    if friction is None:
+        raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
+    return point._replace(log_rate=log_rate, friction=friction)
 
 
 def on_slow_manifold(scene: Scene, spring: float, psis: Numbers) -> Point:

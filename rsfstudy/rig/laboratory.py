@@ -37,7 +37,10 @@ _UNITS = {
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
 _FIELDS = {about.name: about for about in QUANTITIES}
-_SEGMENT = {"velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c"}
+_SEGMENT = {
+    "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
+    "normal_stress": "sigma_*",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

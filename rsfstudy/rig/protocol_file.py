@@ -11,7 +11,10 @@ from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.protocol import KEYS, Protocol, protocol
 
 #: Units of the slider, which need no laboratory.
-_OF_SLIDER = {"velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c"}
+_OF_SLIDER = {
+    "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
+    "normal_stress": "sigma_*",
+}  # fmt: skip
 _HEADER = re.compile(r"\s*(\w+)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _EXAMPLE = "velocity (um/s), distance (um)"
 
@@ -23,8 +26,8 @@ def read_protocol(
 
     Its first line names the columns and their units, as in ``velocity (um/s), duration (s)``: a
     velocity, and the duration or the distance of each segment (a field may be empty), and perhaps a
-    sudden ``step`` at its beginning. Units of the slider (``V_*``, ``D_c``, ``D_c/V_*``) need no
-    laboratory.
+    sudden ``step`` at its beginning, or the ``normal_stress`` during it. Units of the slider
+    (``V_*``, ``D_c``, ``D_c/V_*``, ``sigma_*``) need no laboratory.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate
     law = scene.parts.law
     of_friction, of_load = (scene.a, scene.b, scene.mu_star), (load_velocity, log_load_rate)
     of_law = law.stress_dependence, scene.a * law.size_over_a
-    common = *of_friction, stiffness, *of_load, *of_law
+    common = *of_friction, stiffness, *of_load, *of_law, scene.imposed_normal_stress
     own = (value for part in _with_numbers(scene) for value in part.numbers(scene))
     return (*common, *own)
 

@@ -10,7 +10,6 @@ import copyreg
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -19,7 +18,7 @@ from rsfstudy.quantity import is_name
 from rsfstudy.slider.loading import Loading, Segment
 
 #: What a segment of a protocol may state.
-KEYS = ("velocity", "duration", "distance", "step")
+KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 class _Kind(type):
@@ -58,16 +57,18 @@ def protocol(
     segments : sequence of Segment or mapping
         What the load point does, one segment after the other. A mapping states its ``velocity`` in
         V_*, and how long it lasts by its ``duration`` in D_c/V_* or its ``distance`` in D_c; a
-        ``step`` is a sudden displacement of the load point in D_c at its beginning. After the last
-        one, which need not say how long it lasts, the load point goes on at that velocity.
+        ``step`` is a sudden displacement of the load point in D_c at its beginning, and
+        ``normal_stress`` what the rig imposes during it, over sigma_* (that of the segment before
+        unless stated; 1 before the first). After the last one, which need not say how long it
+        lasts, the load point goes on at that velocity.
     name : str
         What the protocol is called in results.
 
     Raises
     ------
     InvalidValue
-        For a protocol without segments, a segment that moves backwards, lasts no time, or says
-        twice or not at all how long it lasts.
+        For a protocol without segments, a segment that moves backwards, lasts no time, has no
+        normal stress, or says twice or not at all how long it lasts.
     """
     if not is_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
@@ -77,9 +78,12 @@ def protocol(
     if not segments:
         remedy = 'State one at least, as in [{"velocity": 10}].'
         raise InvalidValue("protocol", segments, "has no segments", remedy=remedy)
-    history = [_segment(stated, f"segment {n}") for n, stated in enumerate(segments, start=1)]
-    for number, (before, _after) in enumerate(pairwise(history), start=1):
-        if before.duration == math.inf:
+    history: list[Segment] = []
+    for number, stated in enumerate(segments, start=1):
+        before = history[-1].normal_stress if history else 0.0
+        history.append(_segment(stated, before, f"segment {number}"))
+    for number, segment in enumerate(history[:-1], start=1):
+        if segment.duration == math.inf:
             remedy = "State its duration or its distance; only the last goes on for ever."
             raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).at(
                 f"segment {number}"
@@ -109,7 +113,8 @@ copyreg.pickle(_Kind, _reduced)  # type: ignore[arg-type]
 _NOWHERE = "protocols_of_the_user"
 
 
-def _segment(stated: Any, place: str) -> Segment:
+def _segment(stated: Any, normal_stress: float, place: str) -> Segment:
+    """A segment that is stated, after one with so much imposed normal stress."""
     try:
         if isinstance(stated, Segment):
             return _checked(*stated)
@@ -119,7 +124,11 @@ def _segment(stated: Any, place: str) -> Segment:
         for key in stated:
             if key not in KEYS:
                 raise InvalidValue("segment", key, "is unknown", choices=KEYS)
-        return _checked(_velocity(stated), stated.get("step", 0.0), _duration(stated))
+        if "normal_stress" in stated:
+            normal_stress = _excess(stated["normal_stress"])
+        return _checked(
+            _velocity(stated), stated.get("step", 0.0), _duration(stated), normal_stress
+        )
     except InvalidValue as error:
         raise error.at(place) from error
 
@@ -142,14 +151,24 @@ def _duration(stated: Mapping[str, Any]) -> Any:
     return distance / velocity
 
 
-def _checked(velocity: Any, step: Any, duration: Any) -> Segment:
+def _excess(normal_stress: Any) -> float:
+    """Imposed normal stress less its reference value, over that."""
+    rule = "must be greater than 0, and finite"
+    _check("normal_stress", normal_stress, rule, positive=True)
+    return float(normal_stress) - 1.0
+
+
+def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
     _check("velocity", velocity, "must be 0 or greater, and finite", positive=False)
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
         remedy = "Leave out what lasts no time."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
-    return Segment(float(velocity), float(step), float(duration))
+    if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
+        rule = "must be greater than -1: it is what imposed normal stress exceeds sigma_* by"
+        raise InvalidValue("normal_stress", normal_stress, rule)
+    return Segment(float(velocity), float(step), float(duration), float(normal_stress))
 
 
 def _check(name: str, value: Any, rule: str, *, positive: bool) -> None:

@@ -55,9 +55,9 @@ class Scene:
         is left behind by the law with a cut-off; 100.
     stress_dependence : float
         c of Nagata et al. (2012): shear stress lowers the state variable by c dtau/sigma; 0.
-    normal_stress : {"constant", "variable"}, or type
-        Constant, or coupled to shear stress by a driving stress inclined at `phi`; or a class of
-        your own.
+    normal_stress : {"constant", "imposed", "variable"}, or type
+        Constant; what the loading imposes; or coupled to shear stress by a driving stress inclined
+        at `phi`; or a class of your own.
     fluid : {"drained", "dilatant"}, or type
         Pore pressure that never changes, or that falls where pores open with slip rate; or a class
         of your own. Stress is in units of the effective normal stress of steady sliding at V_*, so
@@ -65,7 +65,7 @@ class Scene:
     dynamics, loading : type, optional
         A class of your own in these slots, which other fields fill without it.
     alpha : float, optional
-        Strength of the normal stress effect on the state variable (variable normal stress only;
+        Strength of the normal stress effect on the state variable (not at constant normal stress;
         0.56). Zero leaves the effect out.
     phi : float, optional
         Angle in degrees between the driving stress and the fault normal (variable normal stress
@@ -89,9 +89,13 @@ class Scene:
     stiffness : float, optional
         Stiffness itself, k D_c/sigma_*, instead of its ratio.
     load_velocity_ratio : float, optional
-        Load point velocity over V_* after the step. Default: 1, or 0 after a displacement step.
+        Load point velocity over V_* after the step. Default: 1, or 0 after a step of displacement
+        or of normal stress.
     displacement_step : float
         Instantaneous displacement of the load point in D_c.
+    normal_stress_step : float
+        Sudden change of imposed normal stress over sigma_* (not at constant normal stress); that of
+        sigma_3 where a driving stress is inclined.
     hold_time : float
         Time in D_c/V_* for which the load point is held, before it moves on at
         `load_velocity_ratio`. Zero is no hold.
@@ -217,8 +221,16 @@ class Scene:
 
     @cached_property
     def critical_stiffness(self) -> float:
-        """k_cr(V_*) D_c/sigma_*, without mass or damping (see `steady.critical_stiffness`)."""
-        return steady.critical_stiffness(self, 0.0, quasi_static=True)
+        """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
+        (see `steady.critical_stiffness`).
+        """
+        before = self._with_parts(self.parts._replace(loading=Step())) if self._is_changed else self
+        return steady.critical_stiffness(before, 0.0, quasi_static=True)
+
+    @property
+    def _is_changed(self) -> bool:
+        """Whether friction is another than before the loading."""
+        return self.imposed_normal_stress != 0.0
 
     @cached_property
     def numbers(self) -> Numbers:
@@ -269,6 +281,11 @@ class Scene:
         """ln(V_0/V_*), and -inf for a load point at rest."""
         return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
 
+    @cached_property
+    def imposed_normal_stress(self) -> float:
+        """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
+        return self.parts.loading.segments[-1].normal_stress
+
     @property
     def spring_stress_step(self) -> float:
         """Change of spring stress over sigma_* by the first displacement step, K d."""
@@ -284,8 +301,11 @@ class Scene:
 
     def under(self, segment: loading.Segment) -> Scene:
         """The same slider, loaded by one segment."""
-        velocity, displacement, _lasts = segment
-        step = Step(load_velocity_ratio=velocity, displacement_step=displacement)
+        step = Step(
+            load_velocity_ratio=segment.load_velocity,
+            displacement_step=segment.displacement,
+            normal_stress_step=segment.normal_stress,
+        )
         scene = self._with_parts(self.parts._replace(loading=step))
         scene.__dict__.update({name: getattr(self, name) for name in _UNLOADED})
         return scene
@@ -397,4 +417,4 @@ class Scene:
 
 
 #: What follows from a scene whatever loads it, once it has been asked for.
-_UNLOADED = ("critical_stiffness", "numbers_of_friction", "functions")
+_UNLOADED = ("critical_stiffness", "functions")

@@ -11,10 +11,11 @@ from typing import Any, NoReturn
 from rsfstudy.slider.parts import Numbers
 
 #: Direct and evolution effect parameters a and b, mu_*, K = k D_c/sigma_*, V_0/V_*, its logarithm,
-#: the effect c of shear stress on the state, and how far ln V moves the states, which is b for one.
-A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, SIZE = range(8)
+#: the effect c of shear stress on the state, how far ln V moves the states, which is b for one, and
+#: by how much the loading has raised normal stress, over sigma_*.
+A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, SIZE, IMPOSED = range(9)
 #: Where the numbers of the first part begin.
-FIRST_OWN = 8
+FIRST_OWN = 9
 
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
 #: ln(V/V_*) = 276 (`slip_rate_unbounded`).

@@ -137,6 +137,8 @@ class LawOfStates(Part):
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
+        if not unknown and scene.parts.loading.imposes:
+            unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
             raise InvalidValue(
                 "stress_dependence",

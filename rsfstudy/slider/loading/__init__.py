@@ -24,11 +24,16 @@ class Segment(NamedTuple):
         Sudden displacement of the load point at its beginning, in D_c.
     duration : float
         In D_c/V_*.
+    normal_stress : float
+        By how much imposed normal stress exceeds sigma_* during the segment, over sigma_*. Where a
+        driving stress is inclined to the fault, that is a change of sigma_3, to which what shear
+        stress brings is added.
     """
 
     load_velocity: float
     displacement: float = 0.0
     duration: float = math.inf
+    normal_stress: float = 0.0
 
     def as_dict(self) -> dict[str, float]:
         """The segment as `protocol` takes it."""
@@ -37,6 +42,8 @@ class Segment(NamedTuple):
             stated["step"] = self.displacement
         if self.duration < math.inf:
             stated["duration"] = self.duration
+        if self.normal_stress:
+            stated["normal_stress"] = 1.0 + self.normal_stress
         return stated
 
 
@@ -52,7 +59,14 @@ class Loading(Part):
     @property
     def is_a_step(self) -> bool:
         """Whether it changes anything about steady sliding at V_*."""
-        return any(s.load_velocity != 1.0 or s.displacement for s in self.segments)
+        return any(
+            s.load_velocity != 1.0 or s.displacement or s.normal_stress for s in self.segments
+        )
+
+    @property
+    def imposes(self) -> bool:
+        """Whether it changes normal stress."""
+        return any(segment.normal_stress for segment in self.segments)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

@@ -1,4 +1,6 @@
-"""A step at the start: of load point velocity, of load point displacement, or of both."""
+"""A step at the start: of load point velocity, load point displacement, normal stress, or several
+of them.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,20 @@ from rsfstudy.slider.parts import number
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Loading):
-    """Load point velocity after the step, and displacement in the step."""
+    """Load point velocity after the step, and change of displacement and normal stress in it."""
 
     load_velocity_ratio: float | None = last_velocity()
     displacement_step: float = number(
         0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", scale="D_c"
+    )
+    normal_stress_step: float = number(
+        0.0,
+        r"$\Delta\sigma/\sigma_*$",
+        "1",
+        "sudden change of imposed normal stress",
+        rule="must be greater than -1",
+        remedy="Normal stress stays positive: a fall is by less than all of it.",
+        scale="sigma_*",
     )
 
     name = "step"
@@ -23,14 +34,15 @@ class Step(Loading):
     def load_velocity(self) -> float:
         """V_0/V_* after the step.
 
-        A scene that does not say otherwise holds its load point after a displacement step (V_0 = 0)
-        and otherwise goes on at the reference rate (V_0 = V_*).
+        A scene that does not say otherwise holds its load point after a step of displacement or of
+        normal stress (V_0 = 0) and otherwise goes on at the reference rate (V_0 = V_*).
         """
         if self.load_velocity_ratio is None:
-            return 1.0 if self.displacement_step == 0.0 else 0.0
+            return 0.0 if self.displacement_step or self.normal_stress_step else 1.0
         return self.load_velocity_ratio
 
     @property
     def segments(self) -> tuple[Segment, ...]:
         """The step, and what follows it."""
-        return (Segment(self.load_velocity, self.displacement_step),)
+        step = Segment(self.load_velocity, self.displacement_step)
+        return (step._replace(normal_stress=self.normal_stress_step),)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
+from rsfstudy.slider.parts import reads
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,6 +19,18 @@ class Constant(NormalStress):
 
     name = "constant"
     coupling = (0.0, 0.0)
+
+    @reads("normal_stress_step")
+    def check(self, scene: Scene) -> None:
+        """Nothing that changes it."""
+        if scene.parts.loading.imposes:
+            raise InvalidValue(
+                "normal_stress",
+                self.name,
+                "is changed by the loading",
+                remedy="Set normal_stress='imposed', or 'variable' where it follows shear stress"
+                " too.",
+            )
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

@@ -1,5 +1,5 @@
 """Variable normal stress: a driving stress inclined to the fault couples normal to shear stress,
-and a rise of normal stress lowers the state variable.
+and a rise of normal stress lowers the state variable. What the loading imposes adds to sigma_3.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import Function, Numbers, number, reads
-from rsfstudy.slider.slots import LARGEST_RATIO, SMALLEST_RATIO
+from rsfstudy.slider.normal_stress._state_effect import StateEffect
+from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.slots import IMPOSED, LARGEST_RATIO, SMALLEST_RATIO
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -23,58 +23,25 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """Normal stress over its reference value less 1, and its derivative with respect to shear
     stress.
 
-    ``sigma/sigma_* = 1 + cot(phi) (tau - tau_*)/sigma_*``, from sigma = sigma_3 + tau cot(phi)
-    with sigma_3 constant.
+    ``sigma/sigma_* = 1 + e + cot(phi) (tau - tau_*)/sigma_*``, from sigma = sigma_3 + tau cot(phi),
+    where the loading has changed sigma_3 by e sigma_*; shear stress knows nothing of that.
 
     Parameters
     ----------
     friction : float
         Deviation of shear stress, (tau - tau_*)/sigma_*.
     p : tuple of float
-        Cotangent of the angle between the driving stress and the fault normal, at OWN.
+        Cotangent of the angle between the driving stress and the fault normal, at OWN + 1.
     """
-    cot_phi = p[OWN]
-    return min(max(cot_phi * friction, SMALLEST_RATIO - 1.0), LARGEST_RATIO), cot_phi
-
-
-def linker_dieterich(
-    friction: float, ratio: float, change: float, p: Numbers
-) -> tuple[float, float]:
-    """State variable lost to the present normal stress, and its derivative with respect to shear
-    stress.
-
-    ``dTheta = -alpha dsigma/sigma`` integrates to ``Theta = Psi - alpha ln(sigma/sigma_*)``, where
-    Psi knows nothing of normal stress; the derivative of the shift is ``alpha cot(phi)/s`` with s
-    the normal stress ratio.
-
-    Parameters
-    ----------
-    friction : float
-        Deviation of shear stress, over sigma_*.
-    ratio, change : float
-        Normal stress ratio s, and its derivative with respect to shear stress.
-    p : tuple of float
-        Strength of the effect alpha, at OWN + 1.
-
-    References
-    ----------
-    Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940.
-    """
-    alpha = p[OWN + 1]
-    return alpha * math.log(ratio), alpha * change / ratio
+    cot_phi = p[OWN + 1]
+    excess = cot_phi * friction + p[IMPOSED]
+    return min(max(excess, SMALLEST_RATIO - 1.0), LARGEST_RATIO), cot_phi
 
 
 @dataclass(frozen=True, kw_only=True)
-class Variable(NormalStress):
+class Variable(StateEffect):
     """A driving stress inclined at `phi`, with an effect `alpha` of normal stress on the state."""
 
-    alpha: float = number(
-        0.56,
-        r"$\alpha$",
-        "1",
-        "normal stress effect on the state variable",
-        rule="must be 0 or greater",
-    )
     phi: float = number(
         60.0,
         r"$\phi$",
@@ -96,19 +63,15 @@ class Variable(NormalStress):
         return self.cot_phi, self.alpha
 
     @property
-    def state_effect(self) -> Function | None:
-        return linker_dieterich if self.alpha else None
-
-    @property
     def effects(self) -> tuple[str, ...]:
-        return ("inclined_driving", "linker_dieterich")[: 2 if self.alpha else 1]
+        return ("inclined_driving", *super().effects)
 
     def numbers(self, scene: Scene) -> Numbers:
-        """cot(phi) and alpha."""
-        return self.cot_phi, self.alpha
+        """alpha and cot(phi)."""
+        return self.alpha, self.cot_phi
 
     def weakest(self, scene: Scene) -> float:
-        return -1.0 / self.cot_phi
+        return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
     @reads("phi", "mu_star")
     def check(self, scene: Scene) -> None:

@@ -1,0 +1,48 @@
+"""Imposed normal stress: constant but where the loading changes it, as on a rig with a normal load
+of its own; a rise of it lowers the state variable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.normal_stress._state_effect import StateEffect
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.slots import IMPOSED
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+
+def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
+    """Normal stress over its reference value less 1: what the loading has made of it, whatever
+    shear stress does.
+    """
+    return p[IMPOSED], 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imposed(StateEffect):
+    """Normal stress that the loading imposes, with an effect `alpha` of it on the state."""
+
+    name = "imposed"
+    normal_stress = staticmethod(normal_stress)
+
+    @property
+    def coupling(self) -> tuple[float, float]:
+        return 0.0, self.alpha
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """alpha."""
+        return (self.alpha,)
+
+    @classmethod
+    def refuse(cls, name: str, value: Any) -> InvalidValue:
+        return InvalidValue(
+            name,
+            value,
+            "has no meaning while normal stress does not follow shear stress",
+            remedy=f"Leave {name} out, or set normal_stress='variable'.",
+        )

@@ -1,0 +1,151 @@
+"""Sudden changes of imposed normal stress: what they do at once, and what triggers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from rsfstudy import Laboratory, Scene, protocol, simulate
+from rsfstudy.boundaries.swing import swing
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.regimes import starting
+from rsfstudy.motion.stepping import Meter
+
+CASES = {
+    "imposed": {"normal_stress": "imposed", "alpha": 0.3},
+    "inclined": {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0},
+}
+
+
+@given(
+    step=st.floats(-0.5, 1.0).filter(lambda x: abs(x) > 1e-6),
+    alpha=st.floats(0.0, 0.6),
+    inertia=st.booleans(),
+)
+def test_at_the_instant_of_a_step(step, alpha, inertia):
+    """Spring stress stays; the state loses alpha ln s; slip rate jumps by what friction then lacks,
+    or stays with mass, where friction jumps: all to rounding over a.
+    """
+    scene = Scene(
+        normal_stress="imposed",
+        alpha=alpha,
+        inertia=inertia,
+        normal_stress_step=step,
+        load_velocity_ratio=1.0,
+    )
+    point, ratio = starting(scene), 1.0 + step
+    assert point.spring == 0.0
+    assert point.normal_stress == ratio
+    assert point.state == pytest.approx(-alpha * math.log(ratio), abs=1e-15)
+    if inertia:
+        assert point.log_rate == 0.0
+        stress = ratio * (scene.mu_star - alpha * math.log(ratio)) - scene.mu_star
+        assert point.friction == pytest.approx(stress, abs=1e-14)
+    else:
+        excess = scene.mu_star / ratio - scene.mu_star + alpha * math.log(ratio)
+        assert point.log_rate == pytest.approx(excess / scene.a, abs=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_step_of_nothing_is_none(case):
+    """Every number of the equations is that of the scene without it."""
+    still = Scene(load_velocity_ratio=2.0, **CASES[case])
+    assert still.with_(normal_stress_step=0.0).numbers == still.numbers
+    segments = protocol([{"velocity": 2.0, "normal_stress": 1.0}])
+    assert Scene(loading=segments, **CASES[case]).segments[0][0].numbers == still.numbers
+
+
+def test_driving_that_is_inclined_adds_to_what_is_imposed():
+    """``s = 1 + e + cot(phi) g`` along a whole motion, to rounding."""
+    scene = Scene(phi=55.0, normal_stress_step=0.1, load_velocity_ratio=3.0, stiffness_ratio=2.0)
+    motion = simulate(scene)
+    deviation = motion["shear_stress"] - scene.mu_star
+    expected = 1.1 + deviation / math.tan(math.radians(55.0))
+    assert np.allclose(motion["normal_stress_ratio"], expected, rtol=1e-12, atol=0)
+
+
+def test_critical_stiffness_is_that_before_the_step():
+    for case in CASES.values():
+        still = Scene(**case)
+        assert still.with_(normal_stress_step=0.3).stiffness == still.stiffness
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
+@pytest.mark.parametrize("alpha", [0.0, 0.4])
+def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
+    """It starts at u = mu_* (q - 1)/a - alpha (1/a - 1/b) ln q with q = sigma_*/sigma; under a load
+    point at rest the threshold is h(u) = -q k/k_cr, where the norm is far enough off. A relative
+    1e-6 on either side decides.
+    """
+    threshold = {"slip": lambda x: x, "slowness": lambda x: -math.log1p(-x)}
+    threshold["perrin_rice_zheng"] = math.asinh
+    at = threshold[law]
+    scene = Scene(
+        law=law,
+        normal_stress="imposed",
+        alpha=alpha,
+        stiffness_ratio=0.4,
+        instability_norm=1e20,
+        b_over_a=1.6,
+    )
+
+    def start(q: float) -> float:
+        direct, evolving = scene.mu_star / scene.a, alpha * (1.0 / scene.a - 1.0 / scene.b)
+        return direct * (q - 1.0) - evolving * math.log(q)
+
+    q = brentq(lambda q: start(q) - at(0.4 * q), 1.0, 1.24, xtol=1e-15)
+    step = 1.0 / q - 1.0
+    for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
+        stepped = scene.with_(normal_stress_step=share * step)
+        assert swing(stepped, Accuracy(1e-9), Meter(100_000)).reached is reached
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+@pytest.mark.parametrize("case", CASES)
+def test_a_cut_after_a_step_changes_nothing(case, inertia):
+    """A protocol that says the same again: as far as the tolerance of both tells."""
+    scene = Scene(inertia=inertia, stiffness_ratio=1.5, **CASES[case])
+    once = protocol([{"velocity": 2.0, "normal_stress": 0.98, "duration": 6.0}])
+    first = {"velocity": 2.0, "normal_stress": 0.98, "duration": 2.5}
+    twice = protocol([first, {"velocity": 2.0, "duration": 3.5}])
+    whole, cut = (simulate(scene.with_(loading=kind), rtol=1e-9) for kind in (once, twice))
+    at = {"time": 6.0}
+    for name in ("shear_stress", "normal_stress_ratio", "state_variable"):
+        one, other = (float(np.interp(6.0, m["time"], m[name])) for m in (whole, cut))
+        assert one == pytest.approx(other, rel=1e-6), (name, at)
+
+
+def test_units_of_the_rig():
+    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+    kind = rig.protocol([{"velocity": "1 um/s", "normal_stress": "5.5 MPa"}])
+    assert kind.history[0].normal_stress == pytest.approx(0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: Scene(normal_stress_step=-1.0), "must be greater than -1"),
+        (
+            lambda: Scene(normal_stress="constant", normal_stress_step=0.1),
+            "is changed by the loading.*normal_stress='imposed'",
+        ),
+        (
+            lambda: Scene(normal_stress="imposed", normal_stress_step=0.1, stress_dependence=0.5),
+            "not for normal stress that the loading changes",
+        ),
+        (lambda: Scene(normal_stress="imposed", phi=60.0), "set normal_stress='variable'"),
+        (
+            lambda: protocol([{"velocity": 1.0, "normal_stress": 0.0}]),
+            "normal_stress.*must be greater than 0",
+        ),
+    ],
+)
+def test_what_is_wrong(wrong, message):
+    with pytest.raises(InvalidValue, match=message):
+        wrong()
