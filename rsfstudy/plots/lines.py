@@ -57,7 +57,7 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
 def _panel(name: str, title: str) -> Panel:
     def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
         _lines(dataset, axes, name)
-        axes.set_title(wrapped(pretty(title), 40))
+        axes.set_title(wrapped(pretty(title), 48))
         return axes
 
     return panel
