@@ -88,6 +88,9 @@ def figure(
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)
             _draw(dataset, axes, panel)
+        for scale in figure.axes:
+            if scale not in drawn:
+                hold_ticks(scale)
         letter(drawn)
         share_legends(figure, drawn)
         overrides = declaration(dataset).overrides

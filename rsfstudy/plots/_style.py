@@ -30,8 +30,6 @@ MM = 1.0 / 25.4
 #: Between the two columns of a journal, in inches.
 _GAP = 6.0 * MM
 _MARKERS = "os^Dv<>P*X"
-#: Drawings after which places that still move are left as they are.
-_MOST_PASSES = 6
 
 
 @contextlib.contextmanager
@@ -201,13 +199,8 @@ def hold_ticks(axes: Axes) -> None:
 
 
 def settle(figure: Figure) -> None:
-    """Give everything its place: ticks take their style when they are made, how much room they need
-    is known only then, and with less room there may be others.
+    """Give everything its place: ticks take their style when they are made, and how much room they
+    need is known only then.
     """
-    places: list[tuple[float, ...]] = []
-    for _pass in range(_MOST_PASSES):
-        before = places
+    for _pass in range(2):
         figure.draw_without_rendering()
-        places = [axes.get_position().bounds for axes in figure.axes]
-        if places == before:
-            return
