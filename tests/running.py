@@ -64,7 +64,7 @@ ENOUGH = {
         "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
     },
     "laws": {"stiffness_ratio": [0.5, 1.0, 2.0]},
-    "laws_cycles": {"load_velocity_ratio": [2.0, 50.0, 250.0]},
+    "laws_cycles": {"load_velocity_ratio": [2.0, 250.0]},
     "laws_velocity_steps": {"stiffness_ratio": [1.25, 1.75]},
     "rate_step_lattice": {"stiffness_ratio": [1.0, 1.5, 2.0]},
     "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},

@@ -95,7 +95,18 @@ def is_seen(artist):
 
 
 def test_nothing_sticks_out_or_covers_anything_else(figure):
+    """The figure of every study; all of its axes are labelled."""
     assert_printable(figure)
+    for axes in figure.axes:
+        assert axes.get_xlabel() or axes.get_label() == "<colorbar>"
+        assert axes.get_ylabel()
+
+
+def test_a_figure_says_where_its_results_are_partial(tmp_path):
+    dataset = run().assign_attrs(completeness="partial: 1 of 2 cells")
+    assert "partial: 1 of 2" in plots.figure(dataset).axes[0].get_title()
+    plots.save(dataset, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
 
 
 def test_it_fits_a_journal(figure):

@@ -141,17 +141,6 @@ def test_every_number_carries_status_error_and_work(result):
     assert "status" in dataset[headline].attrs["ancillary_variables"]
 
 
-def test_the_figure_is_drawn_and_says_where_it_is_partial(result, tmp_path):
-    dataset, _path = result
-    figure = plots.figure(dataset.assign_attrs(completeness="partial: 1 of 2 cells"))
-    for axes in figure.axes:
-        assert axes.get_xlabel() or axes.get_label() == "<colorbar>"
-        assert axes.get_ylabel()
-    assert "partial: 1 of 2" in figure.axes[0].get_title()
-    plots.save(dataset, tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").stat().st_size > 10_000
-
-
 def test_a_plot_outside_of_the_package_is_never_imported(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "os"
