@@ -15,7 +15,7 @@ from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
-from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording
+from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
@@ -57,11 +57,13 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        ``time``, ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring),
-        ``frictional_stress``, ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``,
-        and what a rig reads, ``load_point_displacement`` and ``friction_coefficient`` (spring
-        stress over effective normal stress), along ``sample``; and ``porosity`` and
-        ``pore_pressure`` of a dilatant fault. A motion that cannot go on ends early, with its
+        ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring), ``frictional_stress``,
+        ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``, and what a rig reads,
+        ``load_point_displacement`` and ``friction_coefficient`` (spring stress over effective
+        normal stress), along ``time``; and ``porosity`` and ``pore_pressure`` of a dilatant fault.
+        Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
+        time and what it then is a few floating-point numbers later, as are the points of a rupture
+        too short for its times to differ. A motion that cannot go on ends early, with its
         ``status`` and ``message`` in the attributes.
 
     Raises
@@ -81,14 +83,14 @@ def simulate(
         collections.deque(moving, maxlen=0)
     except Halt as halt:
         status, message = halt.status, str(halt)
-    seen, fluid = recording.seen(scene), scene.parts.fluid.unknowns
+    seen, fluid = strictly_later(recording.seen(scene)), scene.parts.fluid.unknowns
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
     columns |= {LOAD_POINT: load_point_of(scene, seen), FRICTION: friction_of(seen)}
     dataset = _dataset(columns, seen[:, REGIME], recording.regimes)
     dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
-    dataset = dataset.set_coords(["time", "slip", "reference_rate"])
+    dataset = dataset.set_coords(["slip", "reference_rate"])
     return dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -110,9 +112,9 @@ def _dataset(
 ) -> xr.Dataset:
     dataset = xr.Dataset()
     for about, values in columns.items():
-        dataset[about.name] = ("sample", values, _about(about))
+        dataset[about.name] = ("time", values, _about(about))
     dataset["regime"] = (
-        "sample",
+        "time",
         regime.astype(np.int8),
         {
             "long_name": quantity("regime").long_name,

@@ -117,7 +117,7 @@ def _plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
     logs = motion["log10_slip_rate"]
     scale = 1.0
     if "slip_rate" in shown:
-        scale = float((shown["slip_rate"] / 10.0**logs)[0])
+        scale = float(shown["slip_rate"][0]) / 10.0 ** float(logs[0])
     # in ruptures the spring carries what accelerates the mass, too
     friction = motion["frictional_stress"] / motion["normal_stress_ratio"]
     axes.plot(scale * 10.0**logs, friction, **look(0), label="motion")
