@@ -6,11 +6,12 @@ import collections
 import json
 import math
 from collections.abc import Mapping
+from typing import Never
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
@@ -32,7 +33,7 @@ _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
 def simulate(
     scene: Scene,
-    *,
+    *nameless: Never,
     duration: float | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
@@ -69,8 +70,11 @@ def simulate(
     Raises
     ------
     InvalidValue
-        For a duration that is not positive and finite.
+        For a duration that is not positive and finite, or is given without its name.
     """
+    if nameless:
+        remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
+        raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     duration = _as_stated(scene) if duration is None else duration
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")

@@ -115,3 +115,8 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
 def test_meaningless_durations_are_refused(duration):
     with pytest.raises(InvalidValue, match="duration"):
         rsfstudy.simulate(Scene(), duration=duration)
+
+
+def test_a_duration_without_its_name_is_refused():
+    with pytest.raises(InvalidValue, match=r"simulate = 10: .*Write duration=10, in D_c/V_\*"):
+        rsfstudy.simulate(Scene(), 10)

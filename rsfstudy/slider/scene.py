@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import FrozenInstanceError
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, NoReturn
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import assembly, dynamics, fluid, laws, loading, normal_stress, steady
@@ -19,6 +19,7 @@ from rsfstudy.slider.fields import (
     layout_of,
     refuse_unless_idle,
     unknown_field,
+    unnamed,
     without_meaning,
 )
 from rsfstudy.slider.loading.step import Step
@@ -134,7 +135,9 @@ class Scene:
 
         def __getattr__(self, name: str) -> Any: ...
 
-    def __init__(self, **given: Any) -> None:
+    def __init__(self, *nameless: Never, **given: Any) -> None:
+        if nameless:
+            raise unnamed(nameless[0])
         layout = layout_of(tuple(chosen(slot, given) for slot in SLOTS))
         own: tuple[dict[str, Any], ...] = tuple({} for _part in layout.parts)
         for name, value in given.items():
