@@ -16,6 +16,7 @@ FLOORS = {
     "errors": 0,
     "status": 0,
     "quantity": 0,
+    "markup": 0,
     "slider": 1,
     "vocabulary": 2,
     "motion": 2,

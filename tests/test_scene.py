@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import laws, synonyms
@@ -136,3 +137,12 @@ def test_stiffness_is_positive_for_every_scene(a, b_over_a, mu_star, alpha, tilt
         a=a, b_over_a=b_over_a, mu_star=mu_star, alpha=alpha, phi=lowest + tilt * (90.0 - lowest)
     )
     assert 0.0 < scene.stiffness < math.inf
+
+
+def test_tab_completion_offers_what_users_call_and_nothing_else():
+    assert dir(rsfstudy) == sorted(rsfstudy.__all__)
+    assert all(callable(getattr(rsfstudy, name)) for name in dir(rsfstudy))
+    offered = dir(Scene(normal_stress="constant", stiffness=0.02))
+    assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
+    assert not {"alpha", "phi", "functions", "combination", "_layout", "__init__"} & set(offered)
+    assert {"alpha", "phi"} <= set(dir(Scene()))

@@ -25,6 +25,7 @@ from rsfstudy.slider.fields import (
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import SPRING, with_spring
 from rsfstudy.slider.parts import Numbers, Part, checked, copier
+from rsfstudy.slider.shown import Shown
 
 
 class Parts(NamedTuple):
@@ -37,7 +38,7 @@ class Parts(NamedTuple):
     loading: loading.Loading
 
 
-class Scene:
+class Scene(Shown):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -183,9 +184,6 @@ class Scene:
     def _what_it_is(self) -> tuple[object, ...]:
         """Its fields, and its parts of the user's own: a name may stand for several."""
         return *self.as_dict().values(), *(part.what_it_is() for part in self.own_parts)
-
-    def __repr__(self) -> str:
-        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Scene, **{**self.as_dict(), **self._layout.own}), ()
