@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import warnings
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -16,6 +17,7 @@ from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 
@@ -48,6 +50,11 @@ def critical_step(
     xarray.Dataset
         The critical value, its numerical error, and the values beside it that were verified as
         stable and as unstable; the status, the message and the work.
+
+    Warns
+    -----
+    NoAnswer
+        Where there is no critical step, with the status and the message; its numbers are NaN.
     """
     return _measured(CriticalStep(of=of, direction=direction), scene, rtol, engine)
 
@@ -70,6 +77,11 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY
         Recurrence interval, static and dynamic stress drop and range of slip rate, each with its
         numerical error; the orbit along ``phase``; the status (``no_limit_cycle`` where the motion
         settles), the message and the work.
+
+    Warns
+    -----
+    NoAnswer
+        Where there is no cycle, with the status and the message; its numbers are NaN.
     """
     return _measured(LimitCycle(), scene, rtol, engine)
 
@@ -113,6 +125,10 @@ def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Da
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
     check_engine(engine)
     outcome = measure(scene, Accuracy(rtol, engine=engine))
+    if outcome.status is not Status.OK:
+        why = outcome.message or outcome.status.meaning
+        text = f"{measure.name} has no number: {outcome.status.label} ({why})"
+        warnings.warn(text, NoAnswer, stacklevel=3)
     own = {about.name: about for about in measure.quantities}
     inner = measure.inner_coordinates
     variables: dict[str, Any] = {}

@@ -5,13 +5,14 @@ from __future__ import annotations
 import collections
 import json
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Never
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue, brief
+from rsfstudy.errors import InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
@@ -27,6 +28,10 @@ from rsfstudy.vocabulary import quantity
 
 #: Time that a step is followed for, and load point displacement beyond what a protocol states.
 _USUAL, _BEYOND = 50.0, 20.0
+_UNSTEPPED = (
+    "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
+    "displacement_step, hold_time, velocity_steps or loading in the scene."
+)
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
@@ -71,6 +76,11 @@ def simulate(
     ------
     InvalidValue
         For a duration that is not positive and finite, or is given without its name.
+
+    Warns
+    -----
+    NoAnswer
+        Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*.
     """
     if nameless:
         remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
@@ -79,6 +89,8 @@ def simulate(
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")
     check_engine(engine)
+    if all(s.load_velocity == 1.0 and not s.displacement for s in scene.parts.loading.segments):
+        warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
     recording = Recording(list(_REGIMES))
     status, message = Status.OK, ""

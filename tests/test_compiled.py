@@ -328,7 +328,10 @@ def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
         engine.prepare(Scene(law=Tabulated))
-    assert simulate(Scene(law=Tabulated, stiffness=0.01), duration=1.0).attrs["status"] == "ok"
+    assert (
+        simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
+        == "ok"
+    )
 
 
 def guarded(log_rate, state, p):

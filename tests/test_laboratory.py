@@ -317,7 +317,7 @@ def test_the_picture_of_a_motion(laboratory, against):
 def test_what_is_no_motion_has_no_picture():
     with pytest.raises(DataError, match="it is no motion as simulate gives it"):
         picture(xr.Dataset())
-    motion = simulate(Scene(), duration=1.0, rtol=1e-2)
+    motion = simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
     with pytest.raises(InvalidValue, match="against = 'place': is unknown"):
         picture(motion, against="place")
 

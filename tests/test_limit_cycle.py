@@ -10,7 +10,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -152,6 +152,14 @@ def test_public_call_and_si_units():
         rsfstudy.to_si(cycle, normal_stress=-1.0, slip_distance=1e-5)
     with pytest.raises(InvalidValue, match="State it"):
         rsfstudy.to_si(cycle.drop_vars("reference_rate"), normal_stress=1.0, slip_distance=1.0)
+
+
+def test_no_cycle_is_told_and_not_only_nan():
+    with pytest.warns(NoAnswer, match="limit_cycle has no number: no_limit_cycle"):
+        settled = rsfstudy.limit_cycle(
+            Scene(load_velocity_ratio=1.1, stiffness_ratio=3.0), rtol=1e-4
+        )
+    assert math.isnan(settled.recurrence_interval)
 
 
 @pytest.mark.parametrize("phases", [0, 1])

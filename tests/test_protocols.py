@@ -198,7 +198,7 @@ def test_a_trajectory_tells_the_segments_of_its_protocol():
     told = json.loads(motion.attrs["scene"])
     assert told["segments"] == HOLDS
     assert protocol(told["segments"], "held").history == scene.parts.loading.segments
-    assert "segments" not in json.loads(simulate(Scene(), duration=0.1).attrs["scene"])
+    assert "segments" not in json.loads(simulate(Scene(hold_time=1.0), duration=0.1).attrs["scene"])
 
 
 @pytest.mark.parametrize("last", [{"velocity": 2.0}, {"velocity": 2.0, "duration": 3.0}])
