@@ -93,7 +93,12 @@ def to_si(
     slip_distance: float,
     reference_rate: float | None = None,
 ) -> xr.Dataset:
-    """A dataset with its dimensionless quantities in SI units.
+    """A dataset in SI units, all of it: stress in Pa, slip in m, time in s, slip rates in m/s.
+
+    What is no ratio any more is not called one: ``critical_velocity``, ``load_velocity`` and
+    ``effective_normal_stress``; ``slip_rate`` stands beside its logarithm. Pure numbers, such as
+    friction and that logarithm, stay as they are, and so does porosity, for want of a
+    compressibility.
 
     Parameters
     ----------
@@ -111,6 +116,8 @@ def to_si(
     ------
     InvalidValue
         For scales that are not positive, or a dataset that does not say its `reference_rate`.
+    DataError
+        For a dataset that is in other units already, or not of rsfstudy.
     """
     if reference_rate is None:
         if "reference_rate" not in dataset or dataset["reference_rate"].ndim:
