@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep

@@ -12,6 +12,7 @@ from typing import Never
 import numpy as np
 import xarray as xr
 
+import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.errors import InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
@@ -89,7 +90,7 @@ def simulate(
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")
     check_engine(engine)
-    if all(s.load_velocity == 1.0 and not s.displacement for s in scene.parts.loading.segments):
+    if not scene.parts.loading.is_a_step:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
     recording = Recording(list(_REGIMES))

@@ -30,6 +30,7 @@ FLOORS = {
     "plots": 9,
     "cli_simulate": 10,
     "trajectory": 10,
+    "accessor": 10,
     "one_scene": 10,
     "api": 10,
     "assignments": 10,

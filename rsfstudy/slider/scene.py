@@ -378,7 +378,7 @@ class Scene(Shown):
 
     def describe(self) -> dict[str, Any]:
         """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
-        stated = self.parts.loading.segments if "loading" in self._layout.own else ()
+        stated = self.parts.loading.stated if "loading" in self._layout.own else ()
         return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
 
     def owner(self, name: str) -> type[Part] | None:
