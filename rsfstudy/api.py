@@ -14,6 +14,7 @@ import xarray as xr
 from rich import progress as bars
 from rich.console import Console
 
+import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.compute import own_code, provenance, runner
 from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
 from rsfstudy.compute.runner import Keeping, Progress

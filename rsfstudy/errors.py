@@ -1,4 +1,6 @@
-"""The errors a user meets: each says the value, the rule it breaks, the choices and the remedy."""
+"""The errors a user meets: each says the value, the rule it breaks, the choices and the remedy; and
+the warnings.
+"""
 
 from __future__ import annotations
 
@@ -78,6 +80,10 @@ class RunError(RsfStudyError):
 
 class Interrupted(RunError):
     """A run that the user ended."""
+
+
+class NoAnswer(UserWarning):
+    """What was asked of one scene has no number for an answer, or nothing happens in it."""
 
 
 def brief(text: object, most: int = _MOST_CHARACTERS) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import warnings
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
+import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -16,6 +18,7 @@ from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 
@@ -48,6 +51,11 @@ def critical_step(
     xarray.Dataset
         The critical value, its numerical error, and the values beside it that were verified as
         stable and as unstable; the status, the message and the work.
+
+    Warns
+    -----
+    NoAnswer
+        Where there is no critical step, with the status and the message; its numbers are NaN.
     """
     return _measured(CriticalStep(of=of, direction=direction), scene, rtol, engine)
 
@@ -70,6 +78,11 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY
         Recurrence interval, static and dynamic stress drop and range of slip rate, each with its
         numerical error; the orbit along ``phase``; the status (``no_limit_cycle`` where the motion
         settles), the message and the work.
+
+    Warns
+    -----
+    NoAnswer
+        Where there is no cycle, with the status and the message; its numbers are NaN.
     """
     return _measured(LimitCycle(), scene, rtol, engine)
 
@@ -81,7 +94,12 @@ def to_si(
     slip_distance: float,
     reference_rate: float | None = None,
 ) -> xr.Dataset:
-    """A dataset with its dimensionless quantities in SI units.
+    """A dataset in SI units, all of it: stress in Pa, slip in m, time in s, slip rates in m/s.
+
+    What is no ratio any more is not called one: ``critical_velocity``, ``load_velocity`` and
+    ``effective_normal_stress``; ``slip_rate`` stands beside its logarithm. Pure numbers, such as
+    friction and that logarithm, stay as they are, and so does porosity, for want of a
+    compressibility.
 
     Parameters
     ----------
@@ -99,6 +117,8 @@ def to_si(
     ------
     InvalidValue
         For scales that are not positive, or a dataset that does not say its `reference_rate`.
+    DataError
+        For a dataset that is in other units already, or not of rsfstudy.
     """
     if reference_rate is None:
         if "reference_rate" not in dataset or dataset["reference_rate"].ndim:
@@ -113,6 +133,10 @@ def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Da
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
     check_engine(engine)
     outcome = measure(scene, Accuracy(rtol, engine=engine))
+    if outcome.status is not Status.OK:
+        why = outcome.message or outcome.status.meaning
+        text = f"{measure.name} has no number: {outcome.status.label} ({why})"
+        warnings.warn(text, NoAnswer, stacklevel=3)
     own = {about.name: about for about in measure.quantities}
     inner = measure.inner_coordinates
     variables: dict[str, Any] = {}

@@ -5,17 +5,20 @@ from __future__ import annotations
 import collections
 import json
 import math
+import warnings
 from collections.abc import Mapping
+from typing import Never
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
+import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
+from rsfstudy.errors import InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
-from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording
+from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
@@ -26,13 +29,17 @@ from rsfstudy.vocabulary import quantity
 
 #: Time that a step is followed for, and load point displacement beyond what a protocol states.
 _USUAL, _BEYOND = 50.0, 20.0
+_UNSTEPPED = (
+    "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
+    "displacement_step, hold_time, velocity_steps or loading in the scene."
+)
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
 
 def simulate(
     scene: Scene,
-    *,
+    *nameless: Never,
     duration: float | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
@@ -57,22 +64,34 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        ``time``, ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring),
-        ``frictional_stress``, ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``,
-        and what a rig reads, ``load_point_displacement`` and ``friction_coefficient`` (spring
-        stress over effective normal stress), along ``sample``; and ``porosity`` and
-        ``pore_pressure`` of a dilatant fault. A motion that cannot go on ends early, with its
+        ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring), ``frictional_stress``,
+        ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``, and what a rig reads,
+        ``load_point_displacement`` and ``friction_coefficient`` (spring stress over effective
+        normal stress), along ``time``; and ``porosity`` and ``pore_pressure`` of a dilatant fault.
+        Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
+        time and what it then is a few floating-point numbers later, as are the points of a rupture
+        too short for its times to differ. A motion that cannot go on ends early, with its
         ``status`` and ``message`` in the attributes.
 
     Raises
     ------
     InvalidValue
-        For a duration that is not positive and finite.
+        For a duration that is not positive and finite, or is given without its name.
+
+    Warns
+    -----
+    NoAnswer
+        Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*.
     """
+    if nameless:
+        remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
+        raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     duration = _as_stated(scene) if duration is None else duration
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")
     check_engine(engine)
+    if not scene.parts.loading.is_a_step:
+        warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
     recording = Recording(list(_REGIMES))
     status, message = Status.OK, ""
@@ -81,14 +100,14 @@ def simulate(
         collections.deque(moving, maxlen=0)
     except Halt as halt:
         status, message = halt.status, str(halt)
-    seen, fluid = recording.seen(scene), scene.parts.fluid.unknowns
+    seen, fluid = strictly_later(recording.seen(scene)), scene.parts.fluid.unknowns
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
     columns |= {LOAD_POINT: load_point_of(scene, seen), FRICTION: friction_of(seen)}
     dataset = _dataset(columns, seen[:, REGIME], recording.regimes)
     dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
-    dataset = dataset.set_coords(["time", "slip", "reference_rate"])
+    dataset = dataset.set_coords(["slip", "reference_rate"])
     return dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -110,9 +129,9 @@ def _dataset(
 ) -> xr.Dataset:
     dataset = xr.Dataset()
     for about, values in columns.items():
-        dataset[about.name] = ("sample", values, _about(about))
+        dataset[about.name] = ("time", values, _about(about))
     dataset["regime"] = (
-        "sample",
+        "time",
         regime.astype(np.int8),
         {
             "long_name": quantity("regime").long_name,

@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.boundaries import swing
 from rsfstudy.boundaries.touching import touching_point
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -526,6 +526,12 @@ def test_public_call_returns_a_small_dataset():
     assert float(step.critical_displacement) == float(held.critical_displacement)
     assert float(moving.critical_displacement) < float(held.critical_displacement)
     assert np.isfinite(float(step.slip_rate_after_step))
+
+
+def test_no_critical_step_is_told_and_not_only_nan():
+    with pytest.warns(NoAnswer, match="critical_step has no number: unstable_at_any_step"):
+        step = rsfstudy.critical_step(Scene(stiffness_ratio=0.8), rtol=1e-4)
+    assert np.isnan(float(step.critical_velocity_ratio))
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])

@@ -208,7 +208,11 @@ def test_results_say_their_units():
     assert shown.slip_rate.attrs["units"] == "um min-1"
     assert float(shown.slip_rate[0]) == pytest.approx(60.0)
     assert shown.friction_coefficient.attrs["units"] == "1"
+    assert shown.effective_normal_stress.attrs["units"] == "MPa"
+    assert float(shown.effective_normal_stress[0]) == pytest.approx(SIGMA / 1e6)
     assert '"normal_stress": 5000000.0' in shown.attrs["laboratory"]
+    with pytest.raises(DataError, match="in other units already"):
+        RIG.in_units(shown)
     # displacement of the load point is 10 V_* t
     np.testing.assert_allclose(motion.load_point_displacement, 10.0 * motion.time, atol=1e-9)
 
@@ -319,7 +323,7 @@ def test_the_picture_of_a_motion(laboratory, against):
 def test_what_is_no_motion_has_no_picture():
     with pytest.raises(DataError, match="it is no motion as simulate gives it"):
         picture(xr.Dataset())
-    motion = simulate(Scene(), duration=1.0, rtol=1e-2)
+    motion = simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
     with pytest.raises(InvalidValue, match="against = 'place': is unknown"):
         picture(motion, against="place")
 

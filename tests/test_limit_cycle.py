@@ -10,7 +10,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -146,12 +146,27 @@ def test_public_call_and_si_units():
     assert float(si.slip_per_event) == pytest.approx(1e-5 * float(cycle.slip_per_event))
     assert "scale" not in si.slip_per_event.attrs
     np.testing.assert_allclose(si.shear_stress, 100e6 * cycle.shear_stress)
+    rate = 1e-5 * 1.17e-8
+    assert (si.max_slip_rate.attrs["units"], si.slip_rate.attrs["units"]) == ("m s-1", "m s-1")
+    assert float(si.max_slip_rate) == pytest.approx(rate * 10 ** float(cycle.max_log10_slip_rate))
+    relative = float(si.max_slip_rate_error / si.max_slip_rate)
+    assert relative == pytest.approx(math.log(10.0) * float(cycle.max_log10_slip_rate_error))
+    np.testing.assert_allclose(si.effective_normal_stress, 100e6 * cycle.normal_stress_ratio)
+    assert not [n for n, v in si.variables.items() if "scale" in v.attrs or "ss_ratio" in n]
     # what has no scale stays as it is
     assert float(si.max_log10_slip_rate) == float(cycle.max_log10_slip_rate)
     with pytest.raises(InvalidValue, match="must be positive"):
         rsfstudy.to_si(cycle, normal_stress=-1.0, slip_distance=1e-5)
     with pytest.raises(InvalidValue, match="State it"):
         rsfstudy.to_si(cycle.drop_vars("reference_rate"), normal_stress=1.0, slip_distance=1.0)
+
+
+def test_no_cycle_is_told_and_not_only_nan():
+    with pytest.warns(NoAnswer, match="limit_cycle has no number: no_limit_cycle"):
+        settled = rsfstudy.limit_cycle(
+            Scene(load_velocity_ratio=1.1, stiffness_ratio=3.0), rtol=1e-4
+        )
+    assert math.isnan(settled.recurrence_interval)
 
 
 @pytest.mark.parametrize("phases", [0, 1])

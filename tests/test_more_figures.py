@@ -28,7 +28,7 @@ def test_what_happens_around_a_rupture_is_seen(tmp_path_factory):
 
 
 def test_the_picture_of_a_motion_is_printable():
-    drawn = rsfstudy.picture(rsfstudy.simulate(Scene(), duration=1.0, rtol=1e-3))
+    drawn = rsfstudy.picture(rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-3))
     checks.assert_printable(drawn)
     for test in (
         checks.test_it_fits_a_journal,

@@ -4,13 +4,18 @@ remedy.
 
 import dataclasses
 import math
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
+from rsfstudy.slider import laws, synonyms
+from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.parts import number
 
 WRONG = [
     ({"law": "slipp"}, r"law = 'slipp'.*Did you mean 'slip'.*slowness"),
@@ -39,7 +44,48 @@ WRONG = [
     ({"period": 0.0}, r"period = 0.0"),
     ({"reference_rate": -1.0}, r"reference_rate = -1.0"),
     ({"instability_norm": 0.0}, r"instability_norm = 0.0"),
+    # names that others use, answered with ours
+    ({"k": 0.02}, r"'k': is not a field.*Write stiffness_ratio .* or stiffness"),
+    ({"Dc": 1e-5}, r"'Dc': is not a field.*slip_distance to rsfstudy.Laboratory"),
+    ({"b": 0.02}, r"'b': is not a field.*Write b_over_a"),
+    ({"law": "aging"}, r"law = 'aging': is unknown.*Write law='slowness'"),
+    ({"law": "ageing"}, r"law = 'ageing'.*Write law='slowness'"),
+    ({"law": "Aging"}, r"law = 'Aging'.*Write law='slowness'"),
+    ({"law": "Dieterich"}, r"law = 'Dieterich'.*Write law='slowness'"),
+    ({"law": "Ruina"}, r"law = 'Ruina'.*Write law='slip'"),
+    ({"normal_stress": "Constant"}, r"Write normal_stress='constant'"),
 ]
+
+
+@pytest.mark.parametrize(
+    ("value", "remedy"),
+    [
+        ("slowness", "Write law='slowness'"),
+        ({"a": 0.01}, r"Scene\(\*\*fields\)"),
+        (1, "Name the field"),
+    ],
+)
+def test_a_value_without_a_name_is_refused(value, remedy):
+    with pytest.raises(InvalidValue, match=f"is given without a name.*{remedy}"):
+        Scene(value)
+
+
+def test_a_field_of_a_users_own_may_bear_any_name():
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class Renamed(laws.PARTS["slip"]):
+        kappa: float = number(1.0, "$\\kappa$", "1", "a number of its own")
+
+        name = "renamed"
+
+    assert Scene(law=Renamed, kappa=2.0).kappa == 2.0
+
+
+def test_every_synonym_leads_to_a_field_or_law_that_is_there():
+    for name, remedy in synonyms._FIELDS.items():
+        assert name not in FIELDS
+        if remedy.startswith("Write "):
+            assert re.match(r"Write (\w+)", remedy)[1] in FIELDS
+    assert set(synonyms._LAWS.values()) <= set(laws.PARTS)
 
 
 @pytest.mark.parametrize(("fields", "message"), WRONG)
@@ -91,3 +137,12 @@ def test_stiffness_is_positive_for_every_scene(a, b_over_a, mu_star, alpha, tilt
         a=a, b_over_a=b_over_a, mu_star=mu_star, alpha=alpha, phi=lowest + tilt * (90.0 - lowest)
     )
     assert 0.0 < scene.stiffness < math.inf
+
+
+def test_tab_completion_offers_what_users_call_and_nothing_else():
+    assert dir(rsfstudy) == sorted(rsfstudy.__all__)
+    assert all(callable(getattr(rsfstudy, name)) for name in dir(rsfstudy))
+    offered = dir(Scene(normal_stress="constant", stiffness=0.02))
+    assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
+    assert not {"alpha", "phi", "functions", "combination", "_layout", "__init__"} & set(offered)
+    assert {"alpha", "phi"} <= set(dir(Scene()))

@@ -9,12 +9,14 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.motion.recording import REGIME, STATES, strictly_later
 
 
 def test_steady_sliding_stays_steady():
     """Without a step, slip is load point displacement and everything else rests."""
-    motion = rsfstudy.simulate(Scene(), duration=20.0)
+    with pytest.warns(NoAnswer, match=r"nothing is stepped.*load_velocity_ratio"):
+        motion = rsfstudy.simulate(Scene(), duration=20.0)
     np.testing.assert_allclose(motion.slip, motion.time, atol=1e-12)
     np.testing.assert_allclose(motion.log10_slip_rate, 0.0, atol=1e-12)
     np.testing.assert_allclose(motion.shear_stress, 0.76, atol=1e-12)
@@ -29,7 +31,7 @@ def test_a_stable_step_ends_in_the_new_steady_state(inertia):
     motion = rsfstudy.simulate(scene, duration=300.0, rtol=1e-9)
     mu_ss = scene.mu_star - (scene.b - scene.a) * math.log(1.5)
     sigma = (1 - scene.mu_star * cot_phi(scene)) / (1 - mu_ss * cot_phi(scene))
-    end = motion.isel(sample=-1)
+    end = motion.isel(time=-1)
     assert float(end.log10_slip_rate) == pytest.approx(math.log10(1.5), abs=1e-8)
     assert float(end.normal_stress_ratio) == pytest.approx(sigma, abs=1e-9)
     assert float(end.shear_stress) == pytest.approx(mu_ss * sigma, abs=1e-9)
@@ -38,10 +40,8 @@ def test_a_stable_step_ends_in_the_new_steady_state(inertia):
 
 def test_slip_is_the_integral_of_slip_rate():
     motion = rsfstudy.simulate(Scene(load_velocity_ratio=1.5, law="slowness"), duration=30.0)
-    rate = 10.0**motion.log10_slip_rate
-    slip = np.concatenate(
-        [[0.0], np.cumsum(np.diff(motion.time) * (rate[1:] + rate[:-1]).values / 2)]
-    )
+    rate = 10.0**motion.log10_slip_rate.values
+    slip = np.concatenate([[0.0], np.cumsum(np.diff(motion.time) * (rate[1:] + rate[:-1]) / 2)])
     # trapezoids between samples
     np.testing.assert_allclose(motion.slip, slip, rtol=1e-3, atol=1e-3)
 
@@ -61,7 +61,7 @@ def test_stick_slip_runs_through_its_regimes_in_one_time():
     )
     motion = rsfstudy.simulate(scene, duration=100.0)
     assert motion.attrs["status"] == "ok"
-    assert (np.diff(motion.time) >= 0.0).all()
+    assert (np.diff(motion.time) > 0.0).all()
     assert (np.diff(motion.slip) > -1e-9).all()
     assert set(np.unique(motion.regime)) == {1, 2}
     assert float(motion.log10_slip_rate.max()) == pytest.approx(9.39, abs=0.01)
@@ -70,16 +70,54 @@ def test_stick_slip_runs_through_its_regimes_in_one_time():
     assert sum(work.values()) == motion.attrs["rhs_evaluations"]
 
 
+def test_time_is_an_index_though_stress_jumps():
+    """Held, pushed by 0.5 D_c at time 2, and let go on: spring stress jumps at once."""
+    segments = [{"velocity": 0.0, "duration": 2.0}, {"velocity": 1.0, "duration": 1.0, "step": 0.5}]
+    scene = Scene(stiffness=0.1, normal_stress="constant", loading=rsfstudy.protocol(segments))
+    motion = rsfstudy.simulate(scene, rtol=1e-5)
+    assert (np.diff(motion.time) > 0.0).all()
+    before, after = motion.shear_stress.sel(time=slice(2.0, 2.0 + 1e-9)).values[:2]
+    assert after - before == pytest.approx(0.1 * 0.5, rel=1e-9)
+    halfway = motion.interp(time=1.5)
+    assert float(halfway.load_point_displacement) == pytest.approx(0.0, abs=1e-12)
+    in_si = rsfstudy.to_si(motion, normal_stress=7e6, slip_distance=3e-5)
+    assert (np.diff(in_si.time) > 0.0).all()
+    nearest = in_si.sel(time=2.0 / scene.reference_rate, method="nearest")
+    assert float(nearest.shear_stress) == pytest.approx(7e6 * before)
+
+
+def test_rows_of_one_time_are_told_apart_and_those_that_say_nothing_left_out():
+    """Of two rows that differ in the regime alone the later one stays; times are close to those
+    recorded, and differ in any units.
+    """
+    table = np.zeros((6, STATES + 1))
+    table[:, 0] = [0.0, 0.0, 1e9, 1e9, 1e9, 1e9]
+    table[:, 1] = [0.0, 1.0, 2.0, 2.0, 3.0, 4.0]
+    table[:, REGIME] = [0, 0, 1, 2, 2, 2]
+    kept = strictly_later(table)
+    assert kept[:, 1].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert kept[2, REGIME] == 2
+    np.testing.assert_allclose(kept[:, 0], [0.0, 0.0, 1e9, 1e9, 1e9], rtol=1e-14, atol=1e-280)
+    for units in (1.0, 1.1, 1 / 3, 8.547e7, 1e-9):
+        assert (np.diff(kept[:, 0] * units) > 0.0).all()
+    assert strictly_later(table[:0]).shape == table[:0].shape
+
+
 def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
     cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
-    assert cut.sizes["sample"] > 10
+    assert cut.sizes["time"] > 10
     opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
     assert opened.attrs["status"] == "normal_stress_lost"
-    assert opened.sizes["sample"] == 0
+    assert opened.sizes["time"] == 0
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf])
 def test_meaningless_durations_are_refused(duration):
     with pytest.raises(InvalidValue, match="duration"):
         rsfstudy.simulate(Scene(), duration=duration)
+
+
+def test_a_duration_without_its_name_is_refused():
+    with pytest.raises(InvalidValue, match=r"simulate = 10: .*Write duration=10, in D_c/V_\*"):
+        rsfstudy.simulate(Scene(), 10)

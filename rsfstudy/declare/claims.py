@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
+from rsfstudy.declare.shown import Verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 
@@ -145,9 +145,7 @@ class Claim:
         return ours, REPRODUCED if holds else DIFFERS
 
 
-def verdicts(
-    dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]
-) -> pd.DataFrame:
+def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]) -> Verdicts:
     """A table of claims, one row each.
 
     Claims hold for a study as declared. Where a fixed value of the scene or of the measure was
@@ -177,7 +175,7 @@ def verdicts(
                 "moved": verdict not in (claim.expected, NOT_APPLICABLE),
             }
         )
-    return pd.DataFrame(rows)
+    return Verdicts(rows)
 
 
 def _is_number(value: object) -> bool:

@@ -18,6 +18,7 @@ from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select,
 from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
+from rsfstudy.declare.shown import study_html
 from rsfstudy.declare.wording import short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
@@ -368,6 +369,9 @@ class Study:
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }
+
+    def _repr_html_(self) -> str:
+        return study_html(self)
 
 
 def _given(measure: Measure) -> str:

@@ -16,12 +16,13 @@ def settings(overrides: Mapping[str, Any]) -> str:
     texts = {
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
-    return ", ".join(f"{name}={_listed(values)}" for name, values in texts.items())
+    return ", ".join(f"{name}={listed(values)}" for name, values in texts.items())
 
 
-def _listed(values: Sequence[Any]) -> str:
+def listed(values: Sequence[Any], between: str = ",") -> str:
+    """Values as one types them, a long list cut short."""
     shown = [short(value) for value in values]
-    return ",".join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
+    return between.join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
 
 
 def short(value: Any) -> str:

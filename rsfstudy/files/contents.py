@@ -128,7 +128,7 @@ def check(dataset: xr.Dataset) -> None:
     for variable in _OF_EVERY_LATTICE:
         if variable not in dataset.data_vars:
             raise refused(variable, "is missing")
-    digests = fit(_from_json(dataset, "digests"), Mapping[str, str], "digests")
+    digests = fit(from_json(dataset, "digests"), Mapping[str, str], "digests")
     for variable in map(str, dataset.variables):
         if variable in digests or variable in _OF_EVERY_LATTICE:  # a notebook may have added others
             _check_kind(variable, dataset[variable])
@@ -143,7 +143,7 @@ def declaration(dataset: xr.Dataset) -> Declaration:
     DataError
         If the dataset carries none, or not as rsfstudy writes it.
     """
-    plain = _from_json(dataset, "declaration")
+    plain = from_json(dataset, "declaration")
     declared: Declaration = fit(plain, Declaration, "declaration")
     if provenance(dataset)["fingerprint"]["own_code"] == "none":
         scene(declared.base)
@@ -207,11 +207,12 @@ def provenance(dataset: xr.Dataset) -> Provenance:
     DataError
         If the dataset does not say, or not as rsfstudy writes it.
     """
-    origin: Provenance = fit(_from_json(dataset, "provenance"), Provenance, "provenance")
+    origin: Provenance = fit(from_json(dataset, "provenance"), Provenance, "provenance")
     return origin
 
 
-def _from_json(dataset: xr.Dataset, name: str) -> Any:
+def from_json(dataset: xr.Dataset, name: str) -> Any:
+    """What an attribute of a dataset holds as JSON; raises DataError where it does not."""
     if name not in dataset.attrs:
         raise refused(name, "is missing")
     try:

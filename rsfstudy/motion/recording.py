@@ -24,6 +24,9 @@ OBSERVED = (
 )
 #: Columns behind those: the regime, and from this one on the states.
 REGIME, STATES = len(OBSERVED), len(OBSERVED) + 1
+#: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
+#: they still differ in other units, where each is rounded anew.
+_APART, _LEAST = 4, 1e-290
 #: Samples within each integration step of a recorded motion: enough for a smooth curve.
 SAMPLES = 4
 
@@ -56,6 +59,8 @@ class Recording:
         """What was taken in since the last such time, or the start, has ended at this one."""
         for rows in self._rows[self._ended :]:
             np.minimum(rows[:, 0], time, out=rows[:, 0])
+        if self._ended < len(self._rows):
+            self._rows[-1][-1:, 0] = time
         self._ended = len(self._rows)
 
     def seen(self, scene: Scene, until: Event | None = None) -> np.ndarray:
@@ -77,6 +82,23 @@ def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...
     """
     stresses = point.spring, point.friction, point.normal_stress
     return time, slip, point.log_rate, *stresses, point.state, regime, *point.psis
+
+
+def strictly_later(table: np.ndarray) -> np.ndarray:
+    """A recorded motion whose times strictly increase.
+
+    A regime or segment begins with a row at the time at which another has ended. It takes the place
+    of one that holds the same; where they differ, it follows a few floating-point numbers later, as
+    do rows of a rupture shorter than the spacing of those numbers.
+    """
+    same = (np.diff(np.delete(table, REGIME, axis=1), axis=0) == 0.0).all(axis=1)
+    table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
+    times, earliest = table[:, 0].tolist(), -math.inf
+    for place, time in enumerate(times):
+        times[place] = max(time, earliest)
+        earliest = times[place] + max(_APART * math.ulp(times[place]), _LEAST)
+    table[:, 0] = times
+    return table
 
 
 def along_path(table: np.ndarray, points: int) -> dict[str, np.ndarray]:

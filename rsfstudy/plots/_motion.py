@@ -85,7 +85,7 @@ def picture(
         upper.set_ylabel(_FRICTION)
         upper.tick_params(labelbottom=False)
         _rate(shown, lower, against)
-        lower.set_xlabel(_labelled(shown[against], laboratory))
+        lower.set_xlabel(_labelled(shown[against]))
         _plane(motion, shown, plane)
         letter(figure.axes)
         figure.suptitle(wrapped(pretty(_title(motion)), 120))
@@ -117,9 +117,10 @@ def _plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
     logs = motion["log10_slip_rate"]
     scale = 1.0
     if "slip_rate" in shown:
-        scale = float((shown["slip_rate"] / 10.0**logs)[0])
+        scale = float(shown["slip_rate"][0]) / 10.0 ** float(logs[0])
     # in ruptures the spring carries what accelerates the mass, too
-    friction = motion["frictional_stress"] / motion["normal_stress_ratio"]
+    normal = "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
+    friction = motion["frictional_stress"] / motion[normal]
     axes.plot(scale * 10.0**logs, friction, **look(0), label="motion")
     axes.plot(scale * 10.0 ** logs[0], friction[0], "o", color=look(0)["color"], label="its start")
     rates = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
@@ -146,10 +147,10 @@ def _steady(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | Non
     return np.asarray(scene.mu_star + np.array(excess))
 
 
-def _labelled(values: xr.DataArray, laboratory: Laboratory | None) -> str:
+def _labelled(values: xr.DataArray) -> str:
     name = str(values.attrs["long_name"])
     name = f"{name[0].upper()}{name[1:]}"
-    units = values.attrs.get("scale", "") if laboratory is None else values.attrs["units"]
+    units = values.attrs.get("scale", values.attrs["units"])
     scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$"}
     return f"{name} ({scales.get(units, _written(units))})"
 

@@ -136,7 +136,8 @@ class Laboratory:
     def in_units(
         self, dataset: xr.Dataset, *, stress: str = "Pa", length: str = "m", time: str = "s"
     ) -> xr.Dataset:
-        """Results or a motion in units of the rig, which its attributes name.
+        """Results or a motion in units of the rig, which its attributes name; all of it, as
+        `rsfstudy.to_si` says.
 
         Parameters
         ----------
@@ -144,6 +145,13 @@ class Laboratory:
             In units of the slider.
         stress, length, time : str
             As in ``stress="MPa", length="um"``; velocities and stiffnesses follow.
+
+        Raises
+        ------
+        InvalidValue
+            For units of another kind.
+        DataError
+            For a dataset that is in other units already, or not of rsfstudy.
         """
         units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
         size = {name: factor("units", *pair) for name, pair in units.items()}
@@ -153,13 +161,7 @@ class Laboratory:
         units |= {"V_*/D_c": (f"{time}-1", "")}
         units |= {"V_*": (f"{length} {time}-1", ""), "sigma_*/D_c": (f"{stress} {length}-1", "")}
         by = {n: Scale(s.factor / size[n], units[n][0]) for n, s in self.scales.items()}
-        result = scaled(dataset, by)
-        if "log10_slip_rate" in dataset:
-            rate = by["V_*"]
-            about = {"long_name": "slip rate", "units": rate.units}
-            values = dataset["log10_slip_rate"]
-            result["slip_rate"] = (values.dims, 10.0**values.values * rate.factor, about)
-        return result.assign_attrs(laboratory=json.dumps(self.as_dict()))
+        return scaled(dataset, by).assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
         """What was stated, in SI units."""

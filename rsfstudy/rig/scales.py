@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import xarray as xr
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import DataError, InvalidValue
+
+#: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.
+_RATIOS = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_normal_stress"}
+#: Names of logarithms of slip rates, and how their descriptions begin and end.
+_LOGARITHM = re.compile(r"(\w+_)?log10_slip_rate")
+_WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
 
 class Scale(NamedTuple):
@@ -49,12 +57,50 @@ def scales(normal_stress: float, slip_distance: float, reference_rate: float) ->
 
 
 def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
-    """A dataset with its dimensionless quantities multiplied by their scales, which it says."""
+    """A dataset in other units, all of it.
+
+    What says its ``scale`` is multiplied by it and says its units instead; its name no longer calls
+    it a ratio: ``critical_velocity``, ``load_velocity``, ``effective_normal_stress``. Beside the
+    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are.
+
+    Raises
+    ------
+    DataError
+        Where nothing says its scale.
+    """
     result = dataset.copy()
-    for name, values in dataset.variables.items():
-        scale = by.get(values.attrs.get("scale", ""))
-        if scale is not None:
-            kept = {key: value for key, value in values.attrs.items() if key != "scale"}
-            about = kept | {"units": scale.units}
-            result[name] = (values.dims, values.values * scale.factor, about)
-    return result
+    logarithms = [n for n in map(str, dataset.variables) if _LOGARITHM.fullmatch(n)]
+    measured = [n for n, v in dataset.variables.items() if v.attrs.get("scale", "") in by]
+    if not measured:
+        text = "nothing in the dataset says its scale: it is in other units already, or not ours"
+        raise DataError(text)
+    for name in measured:
+        values = dataset[name]
+        scale = by[values.attrs["scale"]]
+        kept = {key: value for key, value in values.attrs.items() if key != "scale"}
+        result[name] = (values.dims, values.values * scale.factor, kept | {"units": scale.units})
+    for name in logarithms:
+        result = result.assign(_slip_rate(dataset, name, by["V_*"]))
+    new = {str(name): _renamed(str(name)) for name in measured}
+    return result.rename({old: name for old, name in new.items() if name != old})
+
+
+def _renamed(name: str) -> str:
+    """A name for what is no ratio any more."""
+    for ratio, quantity in _RATIOS.items():
+        name = name.replace(ratio, quantity)
+    return name
+
+
+def _slip_rate(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
+    """The slip rate of a logarithm of one, and of its error, if there is one."""
+    log, plain = dataset[name].variable, name.replace("log10_", "")
+    words = str(log.attrs.get("long_name", plain))
+    about = {"long_name": re.sub(_WORDS, "", words), "units": scale.units}
+    found = {plain: xr.Variable(log.dims, 10.0**log.values * scale.factor, about)}
+    if f"{name}_error" in dataset:
+        error = dataset[f"{name}_error"].variable
+        about = about | {"long_name": f"numerical error estimate of {about['long_name']}"}
+        size = found[plain].values * math.log(10.0) * error.values
+        found[f"{plain}_error"] = xr.Variable(error.dims, size, about)
+    return found

@@ -12,6 +12,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
 from rsfstudy.slider.numbers import SPRING, Slider
 from rsfstudy.slider.parts import Part, checked, is_flag, names_of, quantities_of
+from rsfstudy.slider.synonyms import instead_of_choice, instead_of_field, instead_of_unnamed
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,9 @@ def chosen(slot: Slot, given: Mapping[str, Any]) -> type[Part]:
     if slot.name in SLOT_FIELDS:
         name = given.get(slot.name, slot.default)
         if not isinstance(name, str) or name not in slot.choices:
-            raise InvalidValue(slot.name, name, "is unknown", choices=(*slot.choices, *slot.own))
+            choices = (*slot.choices, *slot.own)
+            remedy = instead_of_choice(slot.name, name, choices)
+            raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
         return slot.choices[name]
     if value is not None:
         others = ", ".join(slot.callers) or "the other fields"
@@ -367,4 +370,12 @@ def unknown_field(name: str, value: Any, layout: Layout) -> InvalidValue:
             rule = f"has no meaning for {slot.name}={part.name!r}"
             remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
-    return InvalidValue("field", name, "is not a field of a scene", choices=layout.fields)
+    remedy, rule = instead_of_field(name), "is not a field of a scene"
+    # what looks alike would mislead where the name is known to mean something else
+    return InvalidValue("field", name, rule, choices=() if remedy else layout.fields, remedy=remedy)
+
+
+def unnamed(value: Any) -> InvalidValue:
+    """The error for a value that is given to a scene without a name."""
+    remedy = instead_of_unnamed(value, {slot.name: slot.choices for slot in NAMED})
+    return InvalidValue("Scene", value, "is given without a name", remedy=remedy)

@@ -31,13 +31,20 @@ class Protocol(Loading, metaclass=_Kind):
 
     name = "protocol"
     history: ClassVar[tuple[Segment, ...]] = ()
-    #: Time in D_c/V_* that was stated, after which the last velocity goes on.
+    #: How long in D_c/V_* the last segment was stated to last, and all of those that say so; after
+    #: that the last velocity goes on.
+    last: ClassVar[float] = math.inf
     lasts: ClassVar[float] = 0.0
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """As they were stated."""
+        """As they were stated, the last without end."""
         return self.history
+
+    @property
+    def stated(self) -> tuple[Segment, ...]:
+        """As they were stated."""
+        return *self.history[:-1], self.history[-1]._replace(duration=self.last)
 
     @classmethod
     def what_it_is(cls) -> object:
@@ -88,21 +95,25 @@ def protocol(
             raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).at(
                 f"segment {number}"
             )
-    lasts = math.fsum(s.duration for s in history if s.duration < math.inf)
-    history[-1] = history[-1]._replace(duration=math.inf)
-    return _made(name, tuple(history), lasts)
+    return _made(name, tuple(history))
 
 
-def _made(name: str, history: tuple[Segment, ...], lasts: float) -> type[Protocol]:
-    # no module has it, so that it is sent to workers as it is, and its segments are looked at
-    members = {"name": name, "history": history, "lasts": lasts, "__module__": _NOWHERE}
+def _made(name: str, stated: tuple[Segment, ...]) -> type[Protocol]:
+    members = {
+        "name": name,
+        "history": (*stated[:-1], stated[-1]._replace(duration=math.inf)),
+        "last": stated[-1].duration,
+        "lasts": math.fsum(s.duration for s in stated if s.duration < math.inf),
+        # no module has it, so that it is sent to workers as it is, and its segments are looked at
+        "__module__": _NOWHERE,
+    }
     return dataclass(frozen=True, kw_only=True)(type(name, (Protocol,), members))
 
 
 def _reduced(kind: type[Protocol]) -> str | tuple[Any, ...]:
     if kind.__module__ != _NOWHERE:
         return kind.__qualname__
-    return _made, (kind.name, kind.history, kind.lasts)
+    return _made, (kind.name, kind().stated)
 
 
 # a class has no `__reduce__` that pickle would ask

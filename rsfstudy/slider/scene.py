@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import FrozenInstanceError
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, NoReturn
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import assembly, dynamics, fluid, laws, loading, normal_stress, steady
@@ -19,11 +19,13 @@ from rsfstudy.slider.fields import (
     layout_of,
     refuse_unless_idle,
     unknown_field,
+    unnamed,
     without_meaning,
 )
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import SPRING, with_spring
 from rsfstudy.slider.parts import Numbers, Part, checked, copier
+from rsfstudy.slider.shown import Shown
 
 
 class Parts(NamedTuple):
@@ -36,7 +38,7 @@ class Parts(NamedTuple):
     loading: loading.Loading
 
 
-class Scene:
+class Scene(Shown):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -138,7 +140,9 @@ class Scene:
 
         def __getattr__(self, name: str) -> Any: ...
 
-    def __init__(self, **given: Any) -> None:
+    def __init__(self, *nameless: Never, **given: Any) -> None:
+        if nameless:
+            raise unnamed(nameless[0])
         layout = layout_of(tuple(chosen(slot, given) for slot in SLOTS))
         own: tuple[dict[str, Any], ...] = tuple({} for _part in layout.parts)
         for name, value in given.items():
@@ -184,9 +188,6 @@ class Scene:
     def _what_it_is(self) -> tuple[object, ...]:
         """Its fields, and its parts of the user's own: a name may stand for several."""
         return *self.as_dict().values(), *(part.what_it_is() for part in self.own_parts)
-
-    def __repr__(self) -> str:
-        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Scene, **{**self.as_dict(), **self._layout.own}), ()
@@ -397,7 +398,7 @@ class Scene:
 
     def describe(self) -> dict[str, Any]:
         """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
-        stated = self.parts.loading.segments if "loading" in self._layout.own else ()
+        stated = self.parts.loading.stated if "loading" in self._layout.own else ()
         return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
 
     def owner(self, name: str) -> type[Part] | None:

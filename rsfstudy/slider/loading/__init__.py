@@ -57,6 +57,11 @@ class Loading(Part):
         raise TypeError(f"{type(self).__name__} loads nothing")
 
     @property
+    def stated(self) -> tuple[Segment, ...]:
+        """The same as the user stated it: the last segment may say how long it lasts."""
+        return self.segments
+
+    @property
     def is_a_step(self) -> bool:
         """Whether it changes anything about steady sliding at V_*."""
         return any(

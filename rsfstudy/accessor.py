@@ -1,0 +1,214 @@
+"""The accessor ``.rsf`` of datasets: which scene or study they are of, and what can be asked of
+them. A dataset has it once xarray has opened a file, where this module is found as a backend, or
+rsfstudy has made the dataset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from xarray.backends import BackendEntrypoint
+
+from rsfstudy.errors import DataError, InvalidValue
+
+# all else is loaded when asked for: xarray imports this module whatever file it opens
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rsfstudy import plots
+    from rsfstudy.declare.study import Study
+    from rsfstudy.slider.parts import Part
+    from rsfstudy.slider.scene import Scene
+
+_FOREIGN = (
+    "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
+    "Take it from rsfstudy.simulate, critical_step, limit_cycle, run or open, or from a file of "
+    "theirs, with its attributes."
+)
+
+
+@xr.register_dataset_accessor("rsf")  # type: ignore[no-untyped-call]
+class Accessor:
+    """What a dataset of rsfstudy says of itself: a motion, the answer for one scene, or the results
+    of a study.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any; one that is not of rsfstudy is refused with `DataError` when something is asked of it.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    @property
+    def scene(self) -> Scene:
+        """The scene: of results of a study that of the one cell that is selected.
+
+        Raises
+        ------
+        InvalidValue
+            Where no single cell is selected, or a part is a user's own and not known here.
+        """
+        if self._is_study:
+            return self.study.scene(_cell_of(self._dataset, self.study))
+        return _scene_of(self._dataset)
+
+    @property
+    def study(self) -> Study:
+        """The study that made the dataset, all of it, whatever is selected.
+
+        Raises
+        ------
+        DataError
+            Where the dataset is of one scene.
+        InvalidValue
+            Where the study has code of a user's own.
+        """
+        from rsfstudy.files import contents, restore
+
+        self._must_be_of_a_study()
+        declared, about = contents.declaration(self._dataset), contents.provenance(self._dataset)
+        if about["fingerprint"]["own_code"] != "none":
+            rule = "has code of a user's own, and code is never taken from a dataset"
+            remedy = f"Import the study from the file that declares it. {about['declared_in']}"
+            raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
+        return restore.from_declaration(declared)
+
+    def to_si(self, **scales: float) -> xr.Dataset:
+        """The dataset in SI units.
+
+        Parameters
+        ----------
+        **scales
+            ``normal_stress``, ``slip_distance`` and ``reference_rate`` of `rsfstudy.to_si`.
+        """
+        from rsfstudy.one_scene import to_si
+
+        self._must_be_ours()
+        return to_si(self._dataset, **scales)
+
+    def check(self) -> pd.DataFrame:
+        """The claims of the study held against the dataset, as `rsfstudy.check` gives them."""
+        from rsfstudy import api
+
+        self._must_be_of_a_study()
+        return api.check(self._dataset)
+
+    def plot(self, *what: Any, **how: Any) -> plots.Figure:
+        """The figure of the dataset.
+
+        Parameters
+        ----------
+        *what, **how
+            As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
+            `rsfstudy.picture` for a motion (`laboratory`, `against`).
+        """
+        from rsfstudy import api
+        from rsfstudy.plots._motion import picture
+
+        draw = api.plot if self._is_study else picture
+        return draw(self._dataset, *what, **how)
+
+    def failures(self) -> pd.DataFrame:
+        """The cells that failed or gave no number.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row a cell: its coordinates on the axes of the study, ``status`` and ``message``. Of
+            one scene, a row without coordinates, or none.
+        """
+        import pandas as pd
+
+        from rsfstudy.files import contents
+        from rsfstudy.status import Status
+
+        if not self._is_study:
+            ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
+            rows = [] if ended["status"] == Status.OK.label else [ended]
+            return pd.DataFrame(rows, columns=list(ended))
+        status = self._dataset["status"]
+        failed = status.values != int(Status.OK)
+        names = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
+        columns = {n: self._dataset[n].broadcast_like(status).values[failed] for n in names}
+        labels = {int(code): code.label for code in Status}
+        columns["status"] = [labels[code] for code in status.values[failed].tolist()]
+        columns["message"] = self._dataset["message"].values[failed]
+        return pd.DataFrame(columns)
+
+    @property
+    def _is_study(self) -> bool:
+        self._must_be_ours()
+        return "declaration" in self._dataset.attrs
+
+    def _must_be_ours(self) -> None:
+        if not {"scene", "declaration"} & set(self._dataset.attrs):
+            raise DataError(_FOREIGN)
+
+    def _must_be_of_a_study(self) -> None:
+        if not self._is_study:
+            raise DataError("the dataset is of one scene: no study made it. Ask for its scene.")
+
+
+class Backend(BackendEntrypoint):
+    """``xarray.open_dataset(path, engine="rsfstudy")``, which checks the file as `rsfstudy.open`
+    does. xarray loads it with all its backends, and with it the accessor.
+    """
+
+    description = "Results of rsfstudy, checked when they are opened"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
+
+    def open_dataset(  # type: ignore[override]  # no other options: the file is read whole
+        self, filename_or_obj: str | Path, *, drop_variables: str | Iterable[str] | None = None
+    ) -> xr.Dataset:
+        """The results in a file, in memory."""
+        from rsfstudy import api
+
+        return api.open(filename_or_obj).drop_vars(drop_variables or [])
+
+
+def _cell_of(dataset: xr.Dataset, study: Study) -> int:
+    """The number of the cell that is selected."""
+    from rsfstudy.files.lattice import coordinates
+
+    ours = xr.Dataset(coords=coordinates(study))
+    places = []
+    for name in study.dimensions:
+        given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
+        if given.size != 1:
+            remedy = f"Select a cell first, as in dataset.isel({name}=0)."
+            raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
+        found = np.flatnonzero(ours[name].values == given[0])
+        if not found.size:
+            remedy = "Ask before you convert it to other units."
+            raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)
+        places.append(int(found[0]))
+    return int(np.ravel_multi_index(places, study.shape))
+
+
+def _scene_of(dataset: xr.Dataset) -> Scene:
+    """The scene that the attributes of a dataset describe."""
+    from rsfstudy.files import contents
+    from rsfstudy.slider.fields import SLOTS, named
+    from rsfstudy.slider.protocol import Protocol, protocol
+
+    plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
+    segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
+    own: dict[str, type[Part]] = {name: part for slot in SLOTS for name, part in slot.own.items()}
+    # protocols of one name differ: the segments tell which it was
+    if segments and issubclass(own.get(loading, Protocol), Protocol):
+        rebuilt = protocol(segments, loading)
+        own[named("loading", rebuilt)] = rebuilt
+    for slot in SLOTS:
+        name = plain.get(slot.name)
+        if isinstance(name, str) and name not in {*slot.choices, *own}:
+            remedy = "Make a scene with the class itself first, so that its name is known."
+            raise InvalidValue(
+                slot.name, name, "is a user's own, and not known here", remedy=remedy
+            )
+    return contents.scene(plain, own, "scene")

@@ -1,0 +1,79 @@
+"""What others call the fields of a scene and its laws, and what to write here instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+_SPRING = "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*)"
+_SLIP = "Slip is in units of D_c here: state D_c as slip_distance to rsfstudy.Laboratory or to_si."
+_STRESS = (
+    "Stress is in units of sigma_* here: state sigma_* as normal_stress to rsfstudy.Laboratory or "
+    "to_si."
+)
+_VELOCITY = (
+    "Slip rate is in units of V_* here: state V_* as reference_velocity to rsfstudy.Laboratory."
+)
+_MASS = "Write inertia=True, and period for its period of free oscillation in s."
+_OF_SIMULATE = "It belongs to rsfstudy.simulate(scene, duration=...)."
+
+
+def _each(names: str, remedy: str) -> dict[str, str]:
+    return dict.fromkeys(names.split(), remedy)
+
+
+#: What to do instead of stating a field by another name.
+_FIELDS: Mapping[str, str] = {
+    **_each("k K kappa spring_constant", f"Write {_SPRING}."),
+    **_each("b B", "Write b_over_a, which is b/a."),
+    **_each("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
+    **_each("A", "Write a."),
+    **_each("Dc dc D_c d_c DC L dcrit", _SLIP),
+    **_each("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
+    **_each("sigma sigma_n sigman sigma0 sigma_star", _STRESS),
+    **_each(
+        "V0 V_0 v0 v_0 Vl vl vlp velocity load_velocity", "Write load_velocity_ratio: V_0/V_*."
+    ),
+    **_each("V_star v_star vstar Vref vref V_ref v_ref", _VELOCITY),
+    **_each("m M mass", _MASS),
+    **_each("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
+    **_each("T", "Write period, in s."),
+    **_each("evolution evolution_law state_law friction_law", "Write law."),
+    **_each("duration t_end tmax", _OF_SIMULATE),
+}
+#: Laws by their other names.
+_LAWS: Mapping[str, str] = {
+    **_each("aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"),
+    **_each("slowness_law", "slowness"),
+    **_each("ruina ruina_dieterich rr slip_law", "slip"),
+    **_each("prz perrin", "perrin_rice_zheng"),
+    **_each("kato_tullis kato", "composite"),
+    **_each("okubo cutoff", "cut_off"),
+}
+
+
+def instead_of_field(name: str) -> str:
+    """What to write instead of a field of this name; empty where nobody knows."""
+    return _FIELDS.get(name, "")
+
+
+def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
+    """What to write instead of this value of what fills a slot; empty where nobody knows."""
+    if not isinstance(value, str):
+        return ""
+    plain = value.strip().lower().replace("-", "_").replace(" ", "_")
+    if slot == "law" and plain == "nagata":
+        return "Write stress_dependence=..., beside any law."
+    ours = _LAWS.get(plain, plain) if slot == "law" else plain
+    return f"Write {slot}={ours!r}." if ours in choices else ""
+
+
+def instead_of_unnamed(value: Any, slots: Mapping[str, Iterable[str]]) -> str:
+    """How to name a value that was given to a scene without a name."""
+    for slot, choices in slots.items():
+        found = instead_of_choice(slot, value, choices)
+        if found:
+            return found
+    if isinstance(value, Mapping):
+        return "Write Scene(**fields)."
+    return "Name the field, as in Scene(law='slowness', stiffness_ratio=0.8)."

@@ -1,0 +1,192 @@
+"""What a dataset says of itself by its accessor `.rsf`."""
+
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import rsfstudy
+import rsfstudy.accessor  # datasets of others have it too, whichever test is the first
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.declare.claims import Claim
+from rsfstudy.errors import DataError, InvalidValue, NoAnswer
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.slider import laws
+
+STUDY = Study(
+    name="soft_and_stiff",
+    title="Critical velocity step of a soft and a stiff spring",
+    base=Scene(normal_stress="constant"),
+    axes=[Axis("law", ["slip", "slowness"]), Axis("stiffness_ratio", [0.8, 1.2])],
+    measure=CriticalStep(),
+    claims=[
+        Claim(
+            id="S1", statement="a step", source="mathematics", variable="critical_velocity_ratio",
+            where={"law": "slip", "stiffness_ratio": 1.2}, published=1.0, tolerance=0.0,
+            relation="above", reason="it leads away",
+        )
+    ],
+)  # fmt: skip
+SI = {"normal_stress": 1e8, "slip_distance": 1e-5}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    output = tmp_path_factory.mktemp("outputs")
+    study = rsfstudy.api.declaration(STUDY, 1e-4, {})
+    rsfstudy.run(study, workers=0, output=output, progress=False)
+    return output / "soft_and_stiff.nc"
+
+
+@pytest.fixture(scope="module")
+def results(file):
+    return xr.load_dataset(file)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        Scene(law="slowness", load_velocity_ratio=1.5, phi=65.0),
+        Scene(
+            stiffness=0.1,
+            loading=rsfstudy.protocol(
+                [{"velocity": 3.0, "duration": 0.3}, {"velocity": 1.0, "duration": 0.1}], "there"
+            ),
+        ),
+    ],
+)
+def test_a_motion_knows_its_scene(scene, tmp_path):
+    motion = rsfstudy.simulate(scene, duration=0.5, rtol=1e-3)
+    assert motion.rsf.scene == scene
+    motion.to_netcdf(tmp_path / "motion.nc")
+    with xr.open_dataset(tmp_path / "motion.nc") as again:
+        assert again.rsf.scene == scene
+        assert again.rsf.failures().empty
+    in_si = motion.rsf.to_si(**SI)
+    xr.testing.assert_identical(in_si, rsfstudy.to_si(motion, **SI))
+    assert in_si.rsf.scene == scene
+
+
+def test_two_protocols_of_one_name_are_told_apart_by_their_segments():
+    motions = []
+    for velocity in (2.0, 3.0):
+        loading = rsfstudy.protocol([{"velocity": velocity}], "same")
+        motions.append(rsfstudy.simulate(Scene(loading=loading), duration=0.1, rtol=1e-3))
+    assert [motion.rsf.scene.load_velocity for motion in motions] == [2.0, 3.0]
+
+
+def test_an_answer_knows_its_scene_and_why_it_has_no_number():
+    scene = Scene(stiffness_ratio=0.8)
+    with pytest.warns(NoAnswer):
+        step = rsfstudy.critical_step(scene, rtol=1e-3)
+    assert step.rsf.scene == scene
+    (row,) = step.rsf.failures().to_dict("records")
+    assert row["status"] == "unstable_at_any_step"
+    for ask in (lambda: step.rsf.study, step.rsf.check):
+        with pytest.raises(DataError, match="is of one scene"):
+            ask()
+    with pytest.raises(DataError, match="no motion"):
+        step.rsf.plot()
+
+
+def test_a_part_of_a_users_own_must_be_known():
+    @dataclass(frozen=True, kw_only=True)
+    class Mine(laws.PARTS["slip"]):
+        name = "mine_alone"
+
+    scene = Scene(law=Mine, stiffness_ratio=2.0, load_velocity_ratio=1.1)
+    motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-3)
+    assert motion.rsf.scene == scene
+    stranger = motion.assign_attrs(scene=motion.attrs["scene"].replace("mine_alone", "yours"))
+    with pytest.raises(InvalidValue, match="law = 'yours': is a user's own, and not known here"):
+        _ = stranger.rsf.scene
+
+
+def test_results_know_their_study_and_each_cell_its_scene(results):
+    assert results.rsf.study.describe()["axes"] == STUDY.describe()["axes"]
+    for number, (law, stiffness) in enumerate(
+        [("slip", 0.8), ("slip", 1.2), ("slowness", 0.8), ("slowness", 1.2)]
+    ):
+        cell = results.sel(law=law, stiffness_ratio=stiffness)
+        assert cell.rsf.scene == STUDY.scene(number)
+        assert cell.rsf.study.size == 4
+    with pytest.raises(InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\]: leaves the cell open"):
+        _ = results.sel(law="slip").rsf.scene
+    with pytest.raises(InvalidValue, match=r"law = \[\]: leaves the cell open"):
+        _ = results.isel(law=0, stiffness_ratio=0, drop=True).rsf.scene
+    elsewhere = results.isel(law=0, stiffness_ratio=0).assign_coords(stiffness_ratio=7.0)
+    with pytest.raises(InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not on that axis"):
+        _ = elsewhere.rsf.scene
+
+
+def test_failures_name_the_cells_without_a_number(results):
+    failures = results.rsf.failures()
+    assert list(failures.columns) == ["law", "stiffness_ratio", "status", "message"]
+    assert failures.law.tolist() == ["slip", "slowness"]
+    assert failures.stiffness_ratio.tolist() == [0.8, 0.8]
+    assert set(failures.status) == {"unstable_at_any_step"}
+    assert len(results.isel(law=0, stiffness_ratio=0).rsf.failures()) == 1
+    assert results.isel(law=0, stiffness_ratio=1).rsf.failures().empty
+
+
+def test_results_are_checked_drawn_and_converted(results):
+    assert results.rsf.check().verdict.tolist() == ["reproduced"]
+    assert isinstance(results.rsf.plot("critical_velocity_ratio"), Figure)
+    velocity = results.rsf.to_si(**SI).critical_velocity
+    np.testing.assert_allclose(velocity, results.critical_velocity_ratio * 1e-5 * 1.17e-8)
+
+
+def test_a_motion_is_drawn_in_any_units():
+    motion = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=0.5, rtol=1e-3)
+    drawn = motion.rsf.plot(against="time")
+    assert drawn.axes[1].get_xlabel() == "Time since the step ($D_c/V_*$)"
+    in_si = motion.rsf.to_si(**SI).rsf.plot(against="time")
+    assert in_si.axes[1].get_xlabel() == "Time since the step (s)"
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda rsf: rsf.scene,
+        lambda rsf: rsf.study,
+        lambda rsf: rsf.to_si(**SI),
+        lambda rsf: rsf.check(),
+        lambda rsf: rsf.plot(),
+        lambda rsf: rsf.failures(),
+    ],
+)
+def test_a_foreign_dataset_is_refused(ask):
+    foreign = xr.Dataset({"temperature": ("x", [1.0])})
+    with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
+        ask(foreign.rsf)
+
+
+@pytest.mark.parametrize("scene", ["LC08_L1TP", "[1]", '{"law": "slip"}'])
+def test_an_attribute_of_the_same_name_is_no_scene(scene):
+    with pytest.raises(DataError, match="^scene"):
+        _ = xr.Dataset(attrs={"scene": scene}).rsf.scene
+
+
+def test_a_file_that_xarray_opens_has_it_and_the_import_alone_loads_nothing(file):
+    asked = (
+        "import sys, rsfstudy\n"
+        "assert 'xarray' not in sys.modules\n"
+        "import xarray\n"
+        f"print(len(xarray.open_dataset({str(file)!r}).rsf.failures()))\n"
+        "assert not {'distributed', 'matplotlib'} & set(sys.modules)"
+    )
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=False)
+    assert (ran.stdout.strip(), ran.stderr) == ("2", "")
+
+
+def test_xarray_opens_results_with_our_checks(file, results, tmp_path):
+    ours = xr.open_dataset(file, engine="rsfstudy", drop_variables=["wall_time"])
+    xr.testing.assert_equal(ours, results.drop_vars("wall_time"))
+    edited = results.assign(critical_velocity_ratio=results.critical_velocity_ratio + 1.0)
+    edited.to_netcdf(tmp_path / "edited.nc")
+    with pytest.raises(DataError, match="edited"):
+        xr.open_dataset(tmp_path / "edited.nc", engine="rsfstudy")

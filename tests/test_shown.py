@@ -1,0 +1,84 @@
+"""Scenes, studies and verdicts as tables of a notebook."""
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.declare.claims import Claim, verdicts
+from rsfstudy.markup import symbol, table
+from rsfstudy.measures.critical_step import CriticalStep
+
+
+def rows(html):
+    """The texts of each row of a table; it is well-formed."""
+    tree = ElementTree.fromstring(f"<div>{html}</div>")
+    return [["".join(cell.itertext()) for cell in row] for row in tree.iter("tr")]
+
+
+def test_a_scene_states_symbol_value_unit_and_meaning():
+    shown = rows(Scene(hold_time=100.0, normal_stress="constant")._repr_html_())
+    assert shown[0] == ["field", "symbol", "value", "unit", "meaning"]
+    by_name = {row[0]: row[1:] for row in shown}
+    assert by_name["b_over_a"][:2] == ["b/a", f"{Scene().b_over_a:g}"]
+    assert by_name["hold_time"][1:] == ["100", "Dc/V*", by_name["hold_time"][3]]
+    assert by_name["reference_rate"][2] == "s-1"
+    assert by_name["inertia"][1] == "no"
+    assert "phi" not in by_name  # without meaning at constant normal stress
+
+
+def test_a_study_states_its_axes_and_what_all_cells_share():
+    study = Study(
+        name="angles",
+        title="Angles < 90",
+        base=Scene(law="slip", a=0.011),
+        axes=[Axis("phi", np.linspace(45.0, 75.0, 20)), Axis("b_over_a", [2.0, 3.0])],
+        measure=CriticalStep(),
+    )
+    shown = study._repr_html_()
+    assert "Angles &lt; 90 (40 cells)" in shown
+    table_of = {row[0]: row for row in rows(shown)}
+    assert table_of["phi"][2] == "45, 46.5789, 48.1579, ..., 75 (20)"
+    assert table_of["phi"][3] == "degree"
+    assert table_of["b_over_a"][2] == "2, 3 (2)"
+    assert table_of["a"][2] == "0.011"
+    assert table_of["critical_velocity_ratio"][2] == "V*"
+
+
+def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
+    about = {"statement": "x < y", "source": "paper", "variable": "slope", "where": {}}
+    numbers = {"published": 2.0, "tolerance": 0.1, "reason": "rounded"}
+    claims = [
+        Claim(id="C1", **about, **numbers),
+        Claim(id="C2", **about, **numbers | {"published": 3.0}),
+    ]
+    found = verdicts(xr.Dataset({"slope": 2.05}), claims, {})
+    shown = rows(found._repr_html_())
+    assert shown[1] == ["C1", "x < y", "2", "2.05", "0.1: rounded", "reproduced"]
+    assert shown[2][5] == "differs, and was expected to be: reproduced"
+    assert type(found[found.moved]) is pd.DataFrame
+    assert found[found.moved]["id"].tolist() == ["C2"]
+
+
+@pytest.mark.parametrize(
+    ("formula", "written"),
+    [
+        ("$k/k_{cr}(V_*)$", "<i>k/k<sub>cr</sub>(V<sub>*</sub>)</i>"),
+        (
+            r"$\Delta\tau_s/\sigma_*$",
+            "<i>Δτ<sub>s</sub>/\N{GREEK SMALL LETTER SIGMA}<sub>*</sub></i>",
+        ),
+        (r"$\log_{10}(V/V_*)$", "<i>log<sub>10</sub>(V/V<sub>*</sub>)</i>"),
+        (r"$V(0^+)\,\nonsense{x}$", "<i>V(0<sup>+</sup>)x</i>"),
+        ("a<b", "a&lt;b"),
+    ],
+)
+def test_symbols_need_no_mathjax(formula, written):
+    assert symbol(formula) == written
+
+
+def test_texts_of_strangers_stay_texts():
+    assert "<script>" not in table(["<script>"], [["<script>"]], "<script>")
