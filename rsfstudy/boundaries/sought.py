@@ -250,14 +250,16 @@ class DisplacementSteps(Steps):
 
     def mass_delays(self, size: float, rtol: float) -> bool:
         """The slider falls behind by less than (K/a) w**2 of slip, w the norm just after the step.
-        That is a delay on the same path, but for what the load point moves meanwhile.
+        That is a delay on the same path, but for what the load point moves meanwhile, and for half
+        of b times that slip, which the state misses because slip rate is lower.
         """
         scene = self.scene_at(size)
         if not scene.has_mass:
             return False
         rate = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
         behind = scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2
-        return behind * scene.load_velocity / rate > 0.1 * rtol * size
+        missed = 0.5 * scene.a * scene.parts.law.size_over_a / scene.stiffness
+        return behind * (scene.load_velocity / rate + missed) > 0.1 * rtol * size
 
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13)."""

@@ -89,10 +89,14 @@ def has_landed(log_rate: float, growth: float, below: float, missing: float, giv
     The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
     (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
     unnoticed. And the slow manifold must not hand straight back.
+
+    A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
+    that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there.
     """
-    if growth > 0.0 and log_rate > below + 1.0:
-        return False
     norm = max(norm_at(log_rate, given), norm_at(below, given))
+    has_peak = missing < 0.0 and given.softness * norm**2 > given.landing
+    if growth > 0.0 and (log_rate > below + 1.0 or has_peak):
+        return False
     remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_rate - below))
     settled = max(norm / given.norm, weight_of_mass(below, missing, given)) < 0.5
     return settled and remaining < given.landing
