@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
-from rich import progress as bars
-from rich.console import Console
 
 from rsfstudy.compute import own_code, provenance, runner
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
-from rsfstudy.compute.runner import Keeping, Progress
+from rsfstudy.compute.cells import Task, sendable, serial
+from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
+from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
 from rsfstudy.measures import Outcome
-from rsfstudy.motion.engines import COMPILED, check_engine, compiled_engine, compiling
+from rsfstudy.motion.engines import COMPILED, check_engine
+from rsfstudy.progress import compile_with_notice, shown
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,12 +41,12 @@ def run(
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = places.DEFAULT,
+    output: str | Path | None = OUTPUT,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
-    time_limit: float = DEFAULT_TIME_LIMIT,
+    time_limit: float = TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -67,7 +66,7 @@ def run(
     output : path, optional
         Directory for the results and the journal of finished cells; None writes nothing.
     progress : bool
-        Show a progress bar.
+        Show a progress bar, or lines where the standard error is no terminal.
     fresh : bool
         Forget the finished cells and compute all again.
     rtol : float, optional
@@ -132,7 +131,8 @@ def declaration(
 def prepared(
     study: Study, keeping: Keeping, workers: Workers, progress: bool = True
 ) -> Callable[[], xr.Dataset]:
-    """A function that runs the study, once everything has been checked; `progress` shows a bar.
+    """A function that runs the study, once everything has been checked; `progress` shows how
+    far it has come.
 
     Raises
     ------
@@ -150,51 +150,14 @@ def prepared(
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
-            _compile(ready.plan.examples, progress)
-        with _bar(study.name, progress) as show:
+            compile_with_notice(ready.plan.examples, progress)
+        with shown(study.name, progress) as show:
             return ready(workers.mapper(ready.worker_log), show)
 
     return run
 
 
-def _compile(examples: Sequence[Scene], show: bool) -> None:
-    """Compile what such scenes need, before any cell is timed, and say how long it took."""
-    console, before = Console(stderr=True, quiet=not show), replace(compiling)
-    with console.status("compiling the equations ..."):
-        for scene in examples:
-            compiled_engine().prepare(scene)
-    programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
-    if programs:
-        console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")
-
-
-@contextlib.contextmanager
-def _bar(name: str, show: bool) -> Iterator[Progress]:
-    if not show:
-        yield lambda _done, _all: None
-        return
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TextColumn("cells"),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    bar = bars.Progress(*columns)
-    task = bar.add_task(name, total=None)
-
-    def update(done: int, total: int) -> None:
-        bar.start()  # only now, because a run may fail before its first report
-        bar.update(task, completed=done, total=total)
-
-    try:
-        yield update
-    finally:
-        bar.stop()
-
-
-def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
     Raises
@@ -268,7 +231,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = DEFAULT_TIME_LIMIT,
+    time_limit: float = TIME_LIMIT,
 ) -> pd.DataFrame:
     """Compute the cells of a results file again, from its own declaration, and compare the numbers.
 

@@ -12,17 +12,16 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from rich import box
-from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
 from rsfstudy import api
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
+from rsfstudy.console import console
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
 from rsfstudy.declare.wording import settings, short
-from rsfstudy.errors import RunError
 from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
@@ -33,32 +32,6 @@ OK, FAILED = 0, 1
 _MOST_SHOWN = 40
 #: Characters of a number, as `short` writes it.
 _A_NUMBER = 10
-
-
-class Plain(Console):
-    """A console that prints any text literally, brackets included; only control characters, which
-    would steer the terminal, are spelt out.
-    """
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Text with control characters spelt out."""
-        return super().render_str(spelt(text), **options)
-
-    def print(self, *objects: Any, **options: Any) -> None:
-        """Print; the output may go to a file on a full disk, which is a `RunError`."""
-        try:
-            super().print(*objects, **options)
-        except OSError as error:
-            raise RunError(f"cannot print: {error.strerror}.") from error
-
-
-def spelt(text: str) -> str:
-    """Text with its control characters spelt out."""
-    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-    return "".join(c if isinstance(c, str) else c.decode() for c in characters)
-
-
-console = Plain(markup=False, emoji=False)
 
 
 def declaration(study: Study) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sqlite3
 import subprocess
 import sys
@@ -163,10 +164,14 @@ def command(*words, **environment) -> subprocess.Popen:
 
 
 def ended(process: subprocess.Popen) -> tuple[int, str, str]:
-    """Exit status, output and errors, once it has ended."""
+    """Exit status, output, and errors without the lines of progress, once it has ended."""
     out, said = process.communicate(timeout=HANGS)
     assert "Traceback" not in said, said
-    return process.returncode, out, said
+    return (
+        process.returncode,
+        out,
+        re.sub(r"^\w+: \d+ of \d+ cells after .*\n", "", said, flags=re.M),
+    )
 
 
 def called(words: Sequence[str]) -> tuple[int, str]:

@@ -123,8 +123,9 @@ def test_plot_draws_beside_a_file(results, tmp_path):
 def test_list_and_show():
     listed = call("list")
     assert listed.returncode == 0
-    for name in rsfstudy.studies():
-        assert name in listed.stdout
+    said = " ".join(listed.stdout.split())
+    for name, study in rsfstudy.studies().items():
+        assert f"{name} {study.title}" in said
     shown = call("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
     assert "6, of which 6 differ" in shown.stdout

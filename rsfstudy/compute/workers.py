@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 from rsfstudy.compute.cells import (
-    DEFAULT_TIME_LIMIT,
     WAITING,
     FinishedCells,
     Mapper,
@@ -32,6 +31,7 @@ from rsfstudy.compute.cells import (
 )
 from rsfstudy.compute.clusters import local_cluster
 from rsfstudy.compute.plan import Batch
+from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -64,7 +64,7 @@ class Workers:
 
     processes: int = 2
     client: Any = None
-    time_limit: float = DEFAULT_TIME_LIMIT
+    time_limit: float = TIME_LIMIT
 
     def __post_init__(self) -> None:
         whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
