@@ -46,6 +46,7 @@ def run(
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
+    budget: int | None = None,
     time_limit: float = TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
@@ -73,6 +74,9 @@ def run(
         Accuracy of the cells.
     engine : {"scipy", "compiled"}, optional
         What integrates motions; compiled, which needs Numba, is much faster.
+    budget : int, optional
+        Right-hand sides a cell may evaluate before it ends as `work_budget_spent`. Cells that have
+        an answer keep it where more is allowed.
     time_limit : float
         CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
         times as much wall time. There is no limit in this process (``workers=0``).
@@ -100,7 +104,7 @@ def run(
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
-    declared = declaration(study, rtol, overrides, engine)
+    declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = Keeping(
         output=places.directory(output),
         format=format,
@@ -115,14 +119,12 @@ def run(
 
 def declaration(
     study: str | Path | Study,
-    rtol: float | None,
     overrides: Mapping[str, Any],
-    engine: str | None = None,
+    **accuracy: Any,
 ) -> Study:
-    """A study with another accuracy, other values and another engine, checked."""
+    """A study with other values and fields of its accuracy, those that are not None; checked."""
     declared = study if isinstance(study, Study) else catalogue.load(str(study))
-    asked = {"rtol": rtol, "engine": engine}
-    changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    changes = {name: value for name, value in accuracy.items() if value is not None}
     if changes:
         declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
     return declared.with_(**overrides) if overrides else declared

@@ -108,6 +108,7 @@ def show(**given: Any) -> int:
 @options.scheduler
 @options.rtol
 @options.engine
+@options.budget
 @options.time_limit
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
 @click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")

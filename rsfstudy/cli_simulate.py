@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from rsfstudy.motion.accuracy import DEFAULT_RTOL
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
 
 #: What a laboratory may state, and an example of it.
@@ -53,6 +53,13 @@ def _of_rig(command: Any) -> Any:
 )
 @_of_rig
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")
+@click.option(
+    "--budget",
+    type=click.IntRange(1),
+    default=DEFAULT_BUDGET,
+    show_default=True,
+    help="Right-hand sides it may evaluate.",
+)
 @click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, show_default=True)
 @click.option(
     "--output",

@@ -38,7 +38,7 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
         if settings or rtol is not None:
             raise click.UsageError("a results file is shown as it is, without --set or --rtol")
         return terminal.results(api.open(name), name)
-    terminal.declaration(_declared(catalogue.load(name), settings, rtol))
+    terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol))
     return OK
 
 
@@ -52,6 +52,7 @@ def run(
     scheduler: str | None,
     rtol: float | None,
     engine: str | None,
+    budget: int | None,
     time_limit: float,
     form: str | None,
     style: str | None,
@@ -60,7 +61,10 @@ def run(
 ) -> int:
     """Run a study, or all."""
     names = _results(name, every)
-    studies = [_declared(catalogue.load(n), settings, rtol, engine) for n in names]
+    studies = [
+        _declared(catalogue.load(n), settings, rtol=rtol, engine=engine, budget=budget)
+        for n in names
+    ]
     left_out = _left_out(studies) if every and engine is None else []
     studies = [study for study in studies if study.name not in {end.study for end in left_out}]
     command = shlex.join(["rsfstudy", *sys.argv[1:]])
@@ -226,10 +230,8 @@ def _results(name: str | None, every: bool) -> list[str]:
     return list(catalogue.names()) if name is None else [name]
 
 
-def _declared(
-    study: Study, settings: tuple[str, ...], rtol: float | None, engine: str | None = None
-) -> Study:
-    return api.declaration(study, rtol, assignments.overrides(study, settings), engine)
+def _declared(study: Study, settings: tuple[str, ...], **accuracy: Any) -> Study:
+    return api.declaration(study, assignments.overrides(study, settings), **accuracy)
 
 
 @contextlib.contextmanager

@@ -26,6 +26,7 @@ def simulate(
     duration: str | None,
     against: str,
     rtol: float,
+    budget: int,
     engine: str,
     output: Path,
     **rig: str | None,
@@ -36,7 +37,7 @@ def simulate(
     laboratory = _laboratory(rig)
     scene = _scene(_fields(settings), protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
-    motion = simulated(scene, duration=lasts, rtol=rtol, engine=engine)
+    motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
     _write(motion, laboratory, output, _ABSCISSAE[against])
     status = Status[motion.attrs["status"].upper()]
     return terminal.OK if status.is_answer else terminal.FAILED

@@ -12,7 +12,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.slider.scene import Scene
@@ -26,6 +26,7 @@ def critical_step(
     *,
     rtol: float = DEFAULT_RTOL,
     engine: str = SCIPY,
+    budget: int = DEFAULT_BUDGET,
 ) -> xr.Dataset:
     """The critical step of one scene.
 
@@ -42,6 +43,8 @@ def critical_step(
         Relative accuracy of V_0/V_* - 1, or of the displacement.
     engine : {"scipy", "compiled"}
         What integrates motions; compiled, which needs Numba, is much faster.
+    budget : int
+        Right-hand sides it may evaluate before it ends as `work_budget_spent`.
 
     Returns
     -------
@@ -49,19 +52,30 @@ def critical_step(
         The critical value, its numerical error, and the values beside it that were verified as
         stable and as unstable; the status, the message and the work.
     """
-    return _measured(CriticalStep(of=of, direction=direction), scene, rtol, engine)
+    return _measured(
+        CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
+    )
 
 
-def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY) -> xr.Dataset:
+def limit_cycle(
+    scene: Scene,
+    *,
+    events: int = LimitCycle.events,
+    rtol: float = DEFAULT_RTOL,
+    engine: str = SCIPY,
+    budget: int = DEFAULT_BUDGET,
+) -> xr.Dataset:
     """The stick-slip limit cycle of one scene.
 
     Parameters
     ----------
     scene : Scene
         The slider, with the load point velocity after the step; usually with inertia.
+    events : int
+        Most events to wait for a cycle that repeats.
     rtol : float
         Relative accuracy of the recurrence interval and the stress drops, and of ln V.
-    engine : {"scipy", "compiled"}
+    engine, budget
         As in `critical_step`.
 
     Returns
@@ -71,7 +85,7 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY
         numerical error; the orbit along ``phase``; the status (``no_limit_cycle`` where the motion
         settles), the message and the work.
     """
-    return _measured(LimitCycle(), scene, rtol, engine)
+    return _measured(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
 
 
 def to_si(
@@ -109,10 +123,10 @@ def to_si(
     return scaled(dataset, scales(normal_stress, slip_distance, reference_rate))
 
 
-def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Dataset:
+def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
-    check_engine(engine)
-    outcome = measure(scene, Accuracy(rtol, engine=engine))
+    check_engine(accuracy.engine)
+    outcome = measure(scene, accuracy)
     own = {about.name: about for about in measure.quantities}
     inner = measure.inner_coordinates
     variables: dict[str, Any] = {}
@@ -127,8 +141,8 @@ def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Da
     dataset = xr.Dataset(variables, coords={**inner, "reference_rate": rate})
     dataset.attrs = {
         "scene": json.dumps(scene.describe()),
-        "rtol": rtol,
-        "engine": engine,
+        "rtol": accuracy.rtol,
+        "engine": accuracy.engine,
         "status": outcome.status.label,
         "message": outcome.message,
     }

@@ -52,6 +52,12 @@ engine = click.option(
     help="What integrates motions; compiled, which needs Numba, is much faster.  "
     "[default: the study's, scipy]",
 )
+budget = click.option(
+    "--budget",
+    type=click.IntRange(1),
+    help="Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
+    "[default: the study's, 500000]",
+)
 workers = click.option(
     "--workers",
     type=click.IntRange(1),

@@ -165,6 +165,18 @@ def test_wrong_usage_is_status_2_with_a_remedy(words, message, tmp_path):
     assert not (tmp_path / "o").exists()
 
 
+def test_a_spent_budget_names_the_option_that_raises_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "500")
+    few = ["--serial", "--set", "b_over_a=2", "--output", tmp_path]
+    ran = call("run", NAME, *few, "--budget", "300")
+    assert ran.returncode == 1
+    assert "--budget 1200 (budget=) allows more" in " ".join(ran.stdout.split())
+    motion = ("simulate", "--budget", "500", "--output", tmp_path / "motion.png")
+    ran = call(*motion, "--set", "load_velocity_ratio=1.2", "--duration", "1e3")
+    assert ran.returncode == 1
+    assert "--budget 2000" in ran.stdout
+
+
 def test_results_that_are_not_there_are_status_1(tmp_path):
     checked = call("check", NAME, "--output", tmp_path)
     assert checked.returncode == 1

@@ -73,6 +73,7 @@ def test_stick_slip_runs_through_its_regimes_in_one_time():
 def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
     cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
+    assert cut.attrs["message"].endswith("--budget 2000 (budget=) allows more")
     assert cut.sizes["sample"] > 10
     opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
     assert opened.attrs["status"] == "normal_stress_lost"

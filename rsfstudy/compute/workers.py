@@ -252,7 +252,8 @@ def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
         if seconds > task.time_limit:
             text = (
                 f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
-                "on the clock; the worker's log shows where it was"
+                "on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
+                "allows more"
             )
             outcome = Outcome(Status.TIME_LIMIT_SPENT, message=text)
             return [task.layout.finished(key, outcome, seconds)]
