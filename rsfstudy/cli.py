@@ -87,11 +87,13 @@ def list_studies(context: click.Context) -> None:
 @click.argument("name")
 @options.settings
 @options.rtol
+@options.output
 def show(**given: Any) -> int:
     """Show a study before it is run, or what is in a results file.
 
-    Of a study, by its NAME or file: what varies, what is fixed and measured, and what it costs. Of
-    a results file: its numbers, where they come from, and how to reproduce each cell that failed.
+    Of a study, by its NAME or file: what varies, what is fixed and measured, and what it costs, as
+    long as its cells took last where they are kept in OUTPUT. Of a results file: its numbers, where
+    they come from, and how to reproduce each cell that failed.
     """
     from rsfstudy import commands
 

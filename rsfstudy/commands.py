@@ -32,13 +32,13 @@ _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 _RESULTS = (".nc", ".zarr")
 
 
-def show(name: str, settings: tuple[str, ...], rtol: float | None) -> int:
+def show(name: str, settings: tuple[str, ...], rtol: float | None, output: Path) -> int:
     """Show a study, or a results file."""
     if Path(name).suffix in _RESULTS:
         if settings or rtol is not None:
             raise click.UsageError("a results file is shown as it is, without --set or --rtol")
         return terminal.results(api.open(name), name)
-    terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol))
+    terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol), output)
     return OK
 
 

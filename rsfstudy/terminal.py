@@ -15,7 +15,7 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api
+from rsfstudy import api, cost
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.console import console
@@ -34,8 +34,10 @@ _MOST_SHOWN = 40
 _A_NUMBER = 10
 
 
-def declaration(study: Study) -> None:
-    """Print a study: its axes, what is fixed and measured, its cells and what they cost."""
+def declaration(study: Study, output: Path) -> None:
+    """Print a study: its axes, what is fixed and measured, its cells and what they cost, by what is
+    kept in a directory of results.
+    """
     console.print(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
         console.print(study.summary + "\n")
@@ -49,26 +51,29 @@ def declaration(study: Study) -> None:
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
     table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items()))
     about = {n: v for n, v in study.measure.describe().items() if n not in varied}
-    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in about.items()))
+    table.add_row("measure", ", ".join(f"{n} = {_brief(v)}" for n, v in about.items()))
     table.add_row("gives", ", ".join(study.measure.variables))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
-    table.add_row("cells", f"{study.size}, of which {len(Plan(study).different)} differ")
-    work, seconds = estimated_cost(study)
-    rtol = study.accuracy.rtol
-    cost = f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {rtol:g}"
-    table.add_row("cost", cost)
+    plan = Plan(study)
+    table.add_row("cells", f"{study.size}, of which {len(plan.different)} differ")
+    table.add_row("cost", cost.in_words(plan, output))
     console.print(table)
+
+
+def _brief(value: Any) -> str:
+    """A field of a measure; of a list of whole problems, how many they are."""
+    return f"{len(value)} of them" if isinstance(value, tuple | list) else str(value)
 
 
 def announce(study: Study) -> None:
     """Print what a run at this accuracy will cost, before it starts."""
-    work, seconds = estimated_cost(study)
+    work, seconds = estimated_cost(Plan(study))
     ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
     console.print(
         f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
-        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, {seconds:.0f} s on "
-        "one core",
+        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
+        f"{cost.guessed(seconds)}",
         highlight=False,
     )
 
@@ -109,7 +114,7 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
     claims(dataset)
     failures(dataset, str(files[0]))
     console.print(f"{name}: {_tally(dataset)}")
-    console.print(f"wrote {' and '.join(map(str, files))}")
+    console.print(f"wrote {' and '.join(map(str, files))}", soft_wrap=True)
 
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
@@ -132,7 +137,7 @@ def summary(ends: Sequence[Ended]) -> None:
         status = Text(end.wrong or "ok", style="green" if end.is_fine else "red")
         if end.left_out:
             status = Text(f"left out: {end.left_out.partition(' (')[0]}", style="yellow")
-        table.add_row(end.study, status, f"{end.seconds:.0f} s", end.verdicts or "-")
+        table.add_row(end.study, status, cost.clock(end.seconds), end.verdicts or "-")
     console.print(table)
 
 

@@ -39,6 +39,7 @@ FLOORS = {
     "commands": 10,
     "commands_simulate": 10,
     "console": 10,
+    "cost": 10,
     "progress": 10,
     "terminal": 10,
     "cli": 10,

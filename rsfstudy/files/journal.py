@@ -7,6 +7,7 @@ fingerprint, and a journal with another fingerprint is refused.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sqlite3
@@ -248,6 +249,34 @@ class Journal:
             ]
             if known:
                 yield [cell for cell, _row in known], [row for _cell, row in known]
+
+
+@dataclass(frozen=True)
+class Timed:
+    """How long cells took.
+
+    Attributes
+    ----------
+    fingerprint : mapping
+        What else decided their numbers.
+    seconds : mapping of bytes to float
+        Wall time of each cell that was timed, by its key.
+    """
+
+    fingerprint: Mapping[str, Any]
+    seconds: Mapping[bytes, float]
+
+
+def timed(path: Path) -> Timed | None:
+    """How long the cells of a journal took; None where there is none that can be read just now."""
+    try:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
+            (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
+            seconds = db.execute("SELECT key, seconds FROM cells WHERE seconds IS NOT NULL")
+            return Timed(dict(json.loads(known)), dict(seconds))
+    except (OSError, sqlite3.Error, TypeError, ValueError):
+        return None
 
 
 def _alone(path: Path | str) -> sqlite3.Connection:
