@@ -22,6 +22,7 @@ from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
+from rsfstudy.files.side_by_side import Comparison, side_by_side
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine
 from rsfstudy.progress import compile_with_notice, shown
@@ -251,7 +252,8 @@ def rerun(
     -------
     pandas.DataFrame
         One row a variable: how many values are identical, how many there are, the largest
-        difference. In its ``attrs``, under ``differs``, what decides a number and is not as it was.
+        difference, and how many differ by more than both error estimates. In its ``attrs``, under
+        ``differs``, what decides a number and is not as it was.
 
     Raises
     ------
@@ -277,6 +279,32 @@ def rerun(
     where = Workers(workers, client, time_limit)
     ours = prepared(declared, keeping, where, progress)()
     return compared(theirs, ours)
+
+
+def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
+    """What differs between two datasets (or named studies' results, or files): in declaration, in
+    what made them, and in numbers, cell by cell where both have the same place on every axis.
+
+    Parameters
+    ----------
+    first, second : xarray.Dataset, str or Path
+        Their lattices may differ.
+
+    Returns
+    -------
+    Comparison
+        Its ``numbers`` is a pandas.DataFrame, one row a variable, which tells in how many cells the
+        two differ by more than the sum of both error estimates; ``agrees`` is true where none do,
+        no status differs, and there is something to compare.
+
+    Raises
+    ------
+    InvalidValue
+        Where an axis of one has no counterpart in the other, not even a fixed value.
+    DataError
+        Where a file is missing or damaged.
+    """
+    return side_by_side(*(d if isinstance(d, xr.Dataset) else open(d) for d in (first, second)))
 
 
 def cell(

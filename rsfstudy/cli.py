@@ -170,6 +170,22 @@ def plot(**given: Any) -> int:
 
 
 @cli.command()
+@click.argument("first")
+@click.argument("second")
+@options.output
+def compare(**given: Any) -> int:
+    """Compare two results files: declaration, versions, numbers.
+
+    Or the results of two studies, by name. Cells are matched by their places on the axes, and
+    numbers held against the sum of both error estimates. Exit status 0 where nothing differs beyond
+    them, 1 where a number or a status does, or no cell is in both.
+    """
+    from rsfstudy import commands
+
+    return commands.compare(**given)
+
+
+@cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--cell",

@@ -15,7 +15,7 @@ from typing import Any
 import click
 import xarray as xr
 
-from rsfstudy import api, assignments, terminal
+from rsfstudy import api, assignments, terminal, terminal_numbers
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
@@ -169,6 +169,13 @@ def rerun(
             time_limit=time_limit,
         )
     return terminal.agreement(table)
+
+
+def compare(first: str, second: str, output: Path) -> int:
+    """Compare two results files."""
+    files = [places.results(name, output) for name in (first, second)]
+    datasets = [api.open(file) for file in files]
+    return terminal_numbers.comparison(files, datasets, api.compare(*datasets))
 
 
 def check(name: str | None, every: bool, output: Path) -> int:

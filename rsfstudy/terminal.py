@@ -15,7 +15,7 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api, cost
+from rsfstudy import api, cost, terminal_numbers
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.console import console
@@ -27,6 +27,7 @@ from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
@@ -148,7 +149,9 @@ def _tally(dataset: xr.Dataset) -> str:
 
 
 def results(dataset: xr.Dataset, file: str) -> int:
-    """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
+    """The numbers of a results file, where they come from, what else is in it, and which cells
+    failed; FAILED if any did.
+    """
     attrs, about = dataset.attrs, contents.provenance(dataset)
     console.print(f"{attrs['id']}: {attrs['title']}\n", style="bold")
     table = Table("", "", box=None, show_header=False)
@@ -160,10 +163,15 @@ def results(dataset: xr.Dataset, file: str) -> int:
     table.add_row("made by", f"{about['command']}, {about['time']}")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
-    for name, values in dataset.data_vars.items():
-        words = values.attrs.get("long_name", "")  # what a notebook added may have none
-        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {words}")
     console.print(table)
+    terminal_numbers.headline(dataset)
+    _reductions(dataset)
+    holds = Table(Column("it holds", overflow="fold"), "", box=None)
+    for name, values in dataset.data_vars.items():
+        if coverage(str(name)) == "modelResult":
+            words = values.attrs.get("long_name", "")  # what a notebook added may have none
+            holds.add_row(str(name), f"{words} ({', '.join(map(str, values.dims))})".strip())
+    console.print(holds)
     return failures(dataset, file)
 
 
@@ -203,8 +211,12 @@ def _reductions(dataset: xr.Dataset) -> None:
     dimensions.
     """
     made = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
-    for slope in [name for name in made if f"{name}_stderr" in dataset]:
-        frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
+    beside = ("stderr", "misfit", "points")
+    for slope in made:
+        names = [slope, *(f"{slope}_{end}" for end in beside)]
+        if not set(names) <= set(dataset.data_vars):
+            continue  # of another kind, or a notebook left some out
+        frame = dataset[names]
         rows = frame.to_dataframe().reset_index()
         places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
         numbers = (slope, "standard error", "largest misfit", "points")
@@ -216,16 +228,10 @@ def _reductions(dataset: xr.Dataset) -> None:
                 for n, w in zip(numbers, widths, strict=True)
             ),
             box=box.SIMPLE_HEAD,
-            title=dataset[slope].attrs["comment"],
+            title=dataset[slope].attrs.get("comment", slope),
             title_justify="left",
         )
-        wanted = [
-            *dataset[slope].dims,
-            slope,
-            f"{slope}_stderr",
-            f"{slope}_misfit",
-            f"{slope}_points",
-        ]
+        wanted = [*dataset[slope].dims, *names]
         for *place, value, error, misfit, points in rows[wanted].itertuples(index=False):
             table.add_row(
                 *map(short, place), short(value), f"{error:.2g}", f"{misfit:.2g}", str(points)

@@ -22,7 +22,9 @@ import xarray as xr
 from click.testing import CliRunner
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli
+
+# what prints takes its width from the environment when it is loaded: not from that of a test
+from rsfstudy import Axis, Scene, Study, cli, commands  # noqa: F401
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep

@@ -42,6 +42,7 @@ FLOORS = {
     "cost": 10,
     "progress": 10,
     "terminal": 10,
+    "terminal_numbers": 10,
     "cli": 10,
     "__init__": 10,
     "named_studies": 10,
@@ -55,7 +56,7 @@ HOMES = {
     "numba": {f"motion/compiled/{name}" for name in ("building", "calls", "machine")},
     "click": {"cli", "cli_simulate", "commands", "options"},
     "pint": {"rig/units"},
-    "rich": {"console", "progress", "terminal"},
+    "rich": {"console", "progress", "terminal", "terminal_numbers"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
 }

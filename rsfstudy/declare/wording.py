@@ -16,10 +16,11 @@ def settings(overrides: Mapping[str, Any]) -> str:
     texts = {
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
-    return ", ".join(f"{name}={_listed(values)}" for name, values in texts.items())
+    return ", ".join(f"{name}={listed(values)}" for name, values in texts.items())
 
 
-def _listed(values: Sequence[Any]) -> str:
+def listed(values: Sequence[Any]) -> str:
+    """Values one after the other, long lists cut short."""
     shown = [short(value) for value in values]
     return ",".join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
 
