@@ -56,6 +56,7 @@ def _of_rig(command: Any) -> Any:
 @click.option(
     "--budget",
     type=click.IntRange(1),
+    metavar="N",
     default=DEFAULT_BUDGET,
     show_default=True,
     help="Right-hand sides it may evaluate.",

@@ -214,7 +214,7 @@ def plot(
         drawn = _drawn(dataset, target or look.beside(place), look, own)
         status = status if drawn else FAILED
         for file in drawn:
-            console.print(f"{file}", highlight=False)
+            console.print(f"{file}")
     return status
 
 

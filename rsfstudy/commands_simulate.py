@@ -87,7 +87,7 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, agai
     except OSError as error:
         raise DataError(f"{output}: cannot be written ({error})") from error
     said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
-    console.print(f"{said}\nwrote {output} and {data}", highlight=False)
+    console.print(f"{said}\nwrote {output} and {data}")
 
 
 def _fields(settings: tuple[str, ...]) -> dict[str, Any]:

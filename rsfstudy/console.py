@@ -33,5 +33,5 @@ def spelt(text: str) -> str:
     return "".join(c if isinstance(c, str) else c.decode() for c in characters)
 
 
-console = Plain(markup=False, emoji=False)
+console = Plain(markup=False, emoji=False, highlight=False)
 stderr = Plain(stderr=True, markup=False, emoji=False, highlight=False)

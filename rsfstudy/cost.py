@@ -21,6 +21,7 @@ def in_words(plan: Plan, output: Path) -> str:
         Directory of its results: what is kept there tells how long cells took.
     """
     work, guess = estimated_cost(plan)
+    work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
     text = f"about {work:,} right-hand sides at rtol {plan.study.accuracy.rtol:g}; "
     kept = output / f"{plan.study.name}.cells.sqlite"
     took = journal.timed(kept)

@@ -44,6 +44,7 @@ settings = click.option(
 rtol = click.option(
     "--rtol",
     type=float,
+    metavar="RTOL",
     help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
 )
 engine = click.option(
@@ -55,12 +56,14 @@ engine = click.option(
 budget = click.option(
     "--budget",
     type=click.IntRange(1),
+    metavar="N",
     help="Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
     "[default: the study's, 500000]",
 )
 workers = click.option(
     "--workers",
     type=click.IntRange(1),
+    metavar="N",
     default=2,
     show_default=True,
     help="Worker processes of this machine.",
@@ -70,9 +73,10 @@ scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing
 time_limit = click.option(
     "--time-limit",
     type=float,
+    metavar="SECONDS",
     default=TIME_LIMIT,
     show_default=True,
-    help="Seconds of CPU time after which a worker gives a cell up.",
+    help="CPU time after which a worker gives a cell up.",
 )
 study = click.option(
     "--study",

@@ -50,14 +50,20 @@ def declaration(study: Study, output: Path) -> None:
         table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
     varied = {field for axis in study.axes for field in axis.fields}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items()))
+    table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items() if v))
+    table.add_row("0 or absent", ", ".join(n for n, v in fixed.items() if not v) or "-")
     about = {n: v for n, v in study.measure.describe().items() if n not in varied}
     table.add_row("measure", ", ".join(f"{n} = {_brief(v)}" for n, v in about.items()))
-    table.add_row("gives", ", ".join(study.measure.variables))
+    gives = study.measure.variables
+    with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
+    told = [f"{n}{words}" for n, words in with_errors.items() if not n.endswith("_error")]
+    table.add_row("gives", ", ".join(told))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
     plan = Plan(study)
-    table.add_row("cells", f"{study.size}, of which {len(plan.different)} differ")
+    different = len(plan.different)
+    others = f", of which {different:,} differ" if different < study.size else ""
+    table.add_row("cells", f"{study.size:,}{others}")
     table.add_row("cost", cost.in_words(plan, output))
     console.print(table)
 
@@ -75,7 +81,6 @@ def announce(study: Study) -> None:
         f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
         f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
         f"{cost.guessed(seconds)}",
-        highlight=False,
     )
 
 

@@ -54,7 +54,7 @@ def headline(dataset: xr.Dataset) -> None:
         row += [_number(cell[f"{name}_error"].item(), ".1e")] if has_error else []
         row += [labels[int(cell["status"])]] if others else []
         table.add_row(*row)
-    console.print(f"\n{_caption(dataset, name, few['status'].size)}", highlight=False)
+    console.print(f"\n{_caption(dataset, name, few['status'].size)}")
     console.print(table)
 
 
@@ -79,7 +79,7 @@ def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Com
     """
     for letter, file, dataset in zip("AB", files, datasets, strict=True):
         about = provenance(dataset)
-        console.print(f"{letter}: {file}, {about['time']}, {about['command']}", highlight=False)
+        console.print(f"{letter}: {file}, {about['time']}, {about['command']}")
     _pairs("declaration", found.declaration)
     _pairs("made by", found.origin)
     _cells(found)

@@ -128,7 +128,7 @@ def test_list_and_show():
         assert f"{name} {study.title}" in said
     shown = call("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
-    assert "6, of which 6 differ" in shown.stdout
+    assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
     assert "right-hand sides" in shown.stdout
 
 
@@ -165,16 +165,15 @@ def test_wrong_usage_is_status_2_with_a_remedy(words, message, tmp_path):
     assert not (tmp_path / "o").exists()
 
 
-def test_a_spent_budget_names_the_option_that_raises_it(tmp_path, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "500")
+def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
     few = ["--serial", "--set", "b_over_a=2", "--output", tmp_path]
     ran = call("run", NAME, *few, "--budget", "300")
     assert ran.returncode == 1
-    assert "--budget 1200 (budget=) allows more" in " ".join(ran.stdout.split())
+    assert "--budget 1200 (budget=)" in ran.stdout
     motion = ("simulate", "--budget", "500", "--output", tmp_path / "motion.png")
     ran = call(*motion, "--set", "load_velocity_ratio=1.2", "--duration", "1e3")
     assert ran.returncode == 1
-    assert "--budget 2000" in ran.stdout
+    assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
 
 
 def test_results_that_are_not_there_are_status_1(tmp_path):
