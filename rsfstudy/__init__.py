@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import cell, check, open, plot, rerun, run, studies
+    from rsfstudy.api import cell, check, compare, open, plot, rerun, run, studies
     from rsfstudy.declare.axis import Axis
     from rsfstudy.declare.study import Study
     from rsfstudy.one_scene import critical_step, limit_cycle, to_si
@@ -38,6 +38,7 @@ _HOMES = {
     "cell": "api",
     "open": "api",
     "check": "api",
+    "compare": "api",
     "plot": "api",
     "studies": "api",
     "simulate": "trajectory",
@@ -54,6 +55,7 @@ __all__ = [
     "Study",
     "cell",
     "check",
+    "compare",
     "critical_step",
     "limit_cycle",
     "open",

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
-from rich import progress as bars
-from rich.console import Console
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.compute import own_code, provenance, runner
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT, Task, sendable, serial
-from rsfstudy.compute.runner import Keeping, Progress
+from rsfstudy.compute.cells import Task, sendable, serial
+from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
+from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
+from rsfstudy.files.side_by_side import Comparison, side_by_side
 from rsfstudy.measures import Outcome
-from rsfstudy.motion.engines import COMPILED, check_engine, compiled_engine, compiling
+from rsfstudy.motion.engines import COMPILED, check_engine
+from rsfstudy.progress import compile_with_notice, shown
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -43,12 +43,13 @@ def run(
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = places.DEFAULT,
+    output: str | Path | None = OUTPUT,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
-    time_limit: float = DEFAULT_TIME_LIMIT,
+    budget: int | None = None,
+    time_limit: float = TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -68,13 +69,16 @@ def run(
     output : path, optional
         Directory for the results and the journal of finished cells; None writes nothing.
     progress : bool
-        Show a progress bar.
+        Show a progress bar, or lines where the standard error is no terminal.
     fresh : bool
         Forget the finished cells and compute all again.
     rtol : float, optional
         Accuracy of the cells.
     engine : {"scipy", "compiled"}, optional
         What integrates motions; compiled, which needs Numba, is much faster.
+    budget : int, optional
+        Right-hand sides a cell may evaluate before it ends as `work_budget_spent`. Cells that have
+        an answer keep it where more is allowed.
     time_limit : float
         CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
         times as much wall time. There is no limit in this process (``workers=0``).
@@ -102,7 +106,7 @@ def run(
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
     """
-    declared = declaration(study, rtol, overrides, engine)
+    declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = Keeping(
         output=places.directory(output),
         format=format,
@@ -117,14 +121,12 @@ def run(
 
 def declaration(
     study: str | Path | Study,
-    rtol: float | None,
     overrides: Mapping[str, Any],
-    engine: str | None = None,
+    **accuracy: Any,
 ) -> Study:
-    """A study with another accuracy, other values and another engine, checked."""
+    """A study with other values and fields of its accuracy, those that are not None; checked."""
     declared = study if isinstance(study, Study) else catalogue.load(str(study))
-    asked = {"rtol": rtol, "engine": engine}
-    changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    changes = {name: value for name, value in accuracy.items() if value is not None}
     if changes:
         declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
     return declared.with_(**overrides) if overrides else declared
@@ -133,7 +135,8 @@ def declaration(
 def prepared(
     study: Study, keeping: Keeping, workers: Workers, progress: bool = True
 ) -> Callable[[], xr.Dataset]:
-    """A function that runs the study, once everything has been checked; `progress` shows a bar.
+    """A function that runs the study, once everything has been checked; `progress` shows how
+    far it has come.
 
     Raises
     ------
@@ -151,51 +154,14 @@ def prepared(
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
-            _compile(ready.plan.examples, progress)
-        with _bar(study.name, progress) as show:
+            compile_with_notice(ready.plan.examples, progress)
+        with shown(study.name, progress) as show:
             return ready(workers.mapper(ready.worker_log), show)
 
     return run
 
 
-def _compile(examples: Sequence[Scene], show: bool) -> None:
-    """Compile what such scenes need, before any cell is timed, and say how long it took."""
-    console, before = Console(stderr=True, quiet=not show), replace(compiling)
-    with console.status("compiling the equations ..."):
-        for scene in examples:
-            compiled_engine().prepare(scene)
-    programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
-    if programs:
-        console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")
-
-
-@contextlib.contextmanager
-def _bar(name: str, show: bool) -> Iterator[Progress]:
-    if not show:
-        yield lambda _done, _all: None
-        return
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TextColumn("cells"),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    bar = bars.Progress(*columns)
-    task = bar.add_task(name, total=None)
-
-    def update(done: int, total: int) -> None:
-        bar.start()  # only now, because a run may fail before its first report
-        bar.update(task, completed=done, total=total)
-
-    try:
-        yield update
-    finally:
-        bar.stop()
-
-
-def open(name: str | Path, output: str | Path = places.DEFAULT) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
     Raises
@@ -269,7 +235,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = DEFAULT_TIME_LIMIT,
+    time_limit: float = TIME_LIMIT,
 ) -> pd.DataFrame:
     """Compute the cells of a results file again, from its own declaration, and compare the numbers.
 
@@ -287,7 +253,8 @@ def rerun(
     -------
     pandas.DataFrame
         One row a variable: how many values are identical, how many there are, the largest
-        difference. In its ``attrs``, under ``differs``, what decides a number and is not as it was.
+        difference, and how many differ by more than both error estimates. In its ``attrs``, under
+        ``differs``, what decides a number and is not as it was.
 
     Raises
     ------
@@ -313,6 +280,32 @@ def rerun(
     where = Workers(workers, client, time_limit)
     ours = prepared(declared, keeping, where, progress)()
     return compared(theirs, ours)
+
+
+def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
+    """What differs between two datasets (or named studies' results, or files): in declaration, in
+    what made them, and in numbers, cell by cell where both have the same place on every axis.
+
+    Parameters
+    ----------
+    first, second : xarray.Dataset, str or Path
+        Their lattices may differ.
+
+    Returns
+    -------
+    Comparison
+        Its ``numbers`` is a pandas.DataFrame, one row a variable, which tells in how many cells the
+        two differ by more than the sum of both error estimates; ``agrees`` is true where none do,
+        no status differs, and there is something to compare.
+
+    Raises
+    ------
+    InvalidValue
+        Where an axis of one has no counterpart in the other, not even a fixed value.
+    DataError
+        Where a file is missing or damaged.
+    """
+    return side_by_side(*(d if isinstance(d, xr.Dataset) else open(d) for d in (first, second)))
 
 
 def cell(

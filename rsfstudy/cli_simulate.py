@@ -1,4 +1,4 @@
-"""The command line: one motion of one slider, its picture and its data."""
+"""The command line: how `simulate` is spelt, one motion of one slider with its picture and data."""
 
 from __future__ import annotations
 
@@ -6,16 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-import xarray as xr
 
-from rsfstudy import assignments, terminal
-from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.motion.accuracy import DEFAULT_RTOL
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.protocol_file import read_protocol
-from rsfstudy.slider.scene import Scene
-from rsfstudy.status import Status
 
 #: What a laboratory may state, and an example of it.
 _RIG = {
@@ -26,8 +19,6 @@ _RIG = {
     "period": "10 ms",
     "mass": "1e4 kg/m^2",
 }
-_AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
-_ABSCISSAE = {"displacement": "load_point_displacement", "slip": "slip", "time": "time"}
 
 
 def _of_rig(command: Any) -> Any:
@@ -55,13 +46,21 @@ def _of_rig(command: Any) -> Any:
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
 @click.option(
     "--against",
-    type=click.Choice(list(_ABSCISSAE)),
+    type=click.Choice(["displacement", "slip", "time"]),
     default="displacement",
     show_default=True,
     help="Abscissa of the picture; displacement is that of the load point.",
 )
 @_of_rig
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")
+@click.option(
+    "--budget",
+    type=click.IntRange(1),
+    metavar="N",
+    default=DEFAULT_BUDGET,
+    show_default=True,
+    help="Right-hand sides it may evaluate.",
+)
 @click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, show_default=True)
 @click.option(
     "--output",
@@ -70,93 +69,11 @@ def _of_rig(command: Any) -> Any:
     show_default=True,
     help="File of the picture; the data stand beside it as NetCDF.",
 )
-def simulate(
-    settings: tuple[str, ...],
-    protocol_file: Path | None,
-    duration: str | None,
-    against: str,
-    rtol: float,
-    engine: str,
-    output: Path,
-    **rig: str | None,
-) -> int:
-    """Follow one motion of one slider, draw it, and write it: friction and slip rate along it, and
-    its path on the phase plane.
+def simulate(**given: Any) -> int:
+    """Follow one motion of one slider, draw it and write it.
+
+    The picture shows friction and slip rate along it, and its path on the phase plane.
     """
-    from rsfstudy.trajectory import simulate as simulated
+    from rsfstudy import commands_simulate
 
-    if output.suffix not in (".png", ".pdf", ".svg"):
-        raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
-    laboratory = _laboratory(rig)
-    scene = _scene(_fields(settings), protocol_file, laboratory)
-    lasts = None if duration is None else _duration(duration, laboratory)
-    motion = simulated(scene, duration=lasts, rtol=rtol, engine=engine)
-    _write(motion, laboratory, output, _ABSCISSAE[against])
-    status = Status[motion.attrs["status"].upper()]
-    return terminal.OK if status.is_answer else terminal.FAILED
-
-
-def _laboratory(rig: dict[str, str | None]) -> Laboratory | None:
-    """The rig that the options state, if they state one."""
-    stated = {name: _number(text) for name, text in rig.items() if text is not None}
-    for name in _AT_LEAST if stated else ():
-        if name not in stated:
-            remedy = "A rig is stated by these three at least."
-            option = f"--{name.replace('_', '-')}"
-            raise InvalidValue(option, None, "must be stated", remedy=remedy)
-    return Laboratory(**stated) if stated else None
-
-
-def _scene(
-    fields: dict[str, Any], protocol_file: Path | None, laboratory: Laboratory | None
-) -> Scene:
-    if protocol_file is not None:
-        fields["loading"] = read_protocol(protocol_file, laboratory)
-    return laboratory.scene(**fields) if laboratory else Scene(**fields)
-
-
-def _duration(text: str, laboratory: Laboratory | None) -> float:
-    """In D_c/V_*."""
-    stated = _number(text)
-    if laboratory is not None:
-        return laboratory.dimensionless(stated, name="--duration")
-    if isinstance(stated, str):
-        remedy = "Give a number in D_c/V_*, or state the rig too."
-        raise InvalidValue("--duration", stated, "has units, and no rig is stated", remedy=remedy)
-    return stated
-
-
-def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str) -> None:
-    """The picture, and the data beside it."""
-    from rsfstudy.plots import styled
-    from rsfstudy.plots._motion import picture
-
-    data = output.with_suffix(".nc")
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        with styled():
-            picture(motion, laboratory, against=against).savefig(output)
-        (laboratory.in_units(motion) if laboratory else motion).to_netcdf(data)
-    except OSError as error:
-        raise DataError(f"{output}: cannot be written ({error})") from error
-    said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
-    terminal.console.print(f"{said}\nwrote {output} and {data}", highlight=False)
-
-
-def _fields(settings: tuple[str, ...]) -> dict[str, Any]:
-    fields: dict[str, Any] = {}
-    for text in settings:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not (name and equals and value):
-            raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
-        if name in fields:
-            raise InvalidValue("--set", text, f"sets {name} twice")
-        fields[name] = assignments.value(value)
-    return fields
-
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return commands_simulate.simulate(**given)

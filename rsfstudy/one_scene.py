@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.slider.scene import Scene
@@ -29,6 +29,7 @@ def critical_step(
     *,
     rtol: float = DEFAULT_RTOL,
     engine: str = SCIPY,
+    budget: int = DEFAULT_BUDGET,
 ) -> xr.Dataset:
     """The critical step of one scene.
 
@@ -45,6 +46,8 @@ def critical_step(
         Relative accuracy of V_0/V_* - 1, or of the displacement.
     engine : {"scipy", "compiled"}
         What integrates motions; compiled, which needs Numba, is much faster.
+    budget : int
+        Right-hand sides it may evaluate before it ends as `work_budget_spent`.
 
     Returns
     -------
@@ -57,19 +60,30 @@ def critical_step(
     NoAnswer
         Where there is no critical step, with the status and the message; its numbers are NaN.
     """
-    return _measured(CriticalStep(of=of, direction=direction), scene, rtol, engine)
+    return _measured(
+        CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
+    )
 
 
-def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY) -> xr.Dataset:
+def limit_cycle(
+    scene: Scene,
+    *,
+    events: int = LimitCycle.events,
+    rtol: float = DEFAULT_RTOL,
+    engine: str = SCIPY,
+    budget: int = DEFAULT_BUDGET,
+) -> xr.Dataset:
     """The stick-slip limit cycle of one scene.
 
     Parameters
     ----------
     scene : Scene
         The slider, with the load point velocity after the step; usually with inertia.
+    events : int
+        Most events to wait for a cycle that repeats.
     rtol : float
         Relative accuracy of the recurrence interval and the stress drops, and of ln V.
-    engine : {"scipy", "compiled"}
+    engine, budget
         As in `critical_step`.
 
     Returns
@@ -84,7 +98,7 @@ def limit_cycle(scene: Scene, *, rtol: float = DEFAULT_RTOL, engine: str = SCIPY
     NoAnswer
         Where there is no cycle, with the status and the message; its numbers are NaN.
     """
-    return _measured(LimitCycle(), scene, rtol, engine)
+    return _measured(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
 
 
 def to_si(
@@ -129,10 +143,10 @@ def to_si(
     return scaled(dataset, scales(normal_stress, slip_distance, reference_rate))
 
 
-def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Dataset:
+def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
-    check_engine(engine)
-    outcome = measure(scene, Accuracy(rtol, engine=engine))
+    check_engine(accuracy.engine)
+    outcome = measure(scene, accuracy)
     if outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
@@ -151,8 +165,8 @@ def _measured(measure: Measure, scene: Scene, rtol: float, engine: str) -> xr.Da
     dataset = xr.Dataset(variables, coords={**inner, "reference_rate": rate})
     dataset.attrs = {
         "scene": json.dumps(scene.describe()),
-        "rtol": rtol,
-        "engine": engine,
+        "rtol": accuracy.rtol,
+        "engine": accuracy.engine,
         "status": outcome.status.label,
         "message": outcome.message,
     }

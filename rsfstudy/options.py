@@ -1,4 +1,4 @@
-"""Options that several commands take."""
+"""Options that several commands take. What needs more than click to check them is imported then."""
 
 from __future__ import annotations
 
@@ -6,18 +6,16 @@ from pathlib import Path
 
 import click
 
-from rsfstudy.compute.cells import DEFAULT_TIME_LIMIT
-from rsfstudy.files import places
+from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
 from rsfstudy.motion.engines import ENGINES
-
-#: Endings of figures, as `rsfstudy.plots` writes them.
-FIGURES = ("png", "pdf", "svg")
 
 every = click.option("--all", "every", is_flag=True, help="Every named study.")
 
 
 def directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
     """A directory for results."""
+    from rsfstudy.files import places
+
     return places.directory(value)
 
 
@@ -25,7 +23,7 @@ output = click.option(
     "--output",
     type=click.Path(file_okay=False),
     callback=directory,
-    default=places.DEFAULT,
+    default=OUTPUT,
     show_default=True,
     help="Directory of the results.",
 )
@@ -46,6 +44,7 @@ settings = click.option(
 rtol = click.option(
     "--rtol",
     type=float,
+    metavar="RTOL",
     help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
 )
 engine = click.option(
@@ -54,9 +53,17 @@ engine = click.option(
     help="What integrates motions; compiled, which needs Numba, is much faster.  "
     "[default: the study's, scipy]",
 )
+budget = click.option(
+    "--budget",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
+    "[default: the study's, 500000]",
+)
 workers = click.option(
     "--workers",
     type=click.IntRange(1),
+    metavar="N",
     default=2,
     show_default=True,
     help="Worker processes of this machine.",
@@ -66,16 +73,17 @@ scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing
 time_limit = click.option(
     "--time-limit",
     type=float,
-    default=DEFAULT_TIME_LIMIT,
+    metavar="SECONDS",
+    default=TIME_LIMIT,
     show_default=True,
-    help="Seconds of CPU time after which a worker gives a cell up.",
+    help="CPU time after which a worker gives a cell up.",
 )
 study = click.option(
     "--study",
     type=click.Path(path_type=Path),
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
-quiet = click.option("--quiet", is_flag=True, help="No progress bar.")
+quiet = click.option("--quiet", is_flag=True, help="Do not show how far it has come.")
 
 
 def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:

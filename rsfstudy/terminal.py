@@ -12,22 +12,22 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from rich import box
-from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api
+from rsfstudy import api, cost, terminal_numbers
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
+from rsfstudy.console import console
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
 from rsfstudy.declare.wording import settings, short
-from rsfstudy.errors import RunError
 from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
@@ -35,34 +35,10 @@ _MOST_SHOWN = 40
 _A_NUMBER = 10
 
 
-class Plain(Console):
-    """A console that prints any text literally, brackets included; only control characters, which
-    would steer the terminal, are spelt out.
+def declaration(study: Study, output: Path) -> None:
+    """Print a study: its axes, what is fixed and measured, its cells and what they cost, by what is
+    kept in a directory of results.
     """
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Text with control characters spelt out."""
-        return super().render_str(spelt(text), **options)
-
-    def print(self, *objects: Any, **options: Any) -> None:
-        """Print; the output may go to a file on a full disk, which is a `RunError`."""
-        try:
-            super().print(*objects, **options)
-        except OSError as error:
-            raise RunError(f"cannot print: {error.strerror}.") from error
-
-
-def spelt(text: str) -> str:
-    """Text with its control characters spelt out."""
-    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-    return "".join(c if isinstance(c, str) else c.decode() for c in characters)
-
-
-console = Plain(markup=False, emoji=False)
-
-
-def declaration(study: Study) -> None:
-    """Print a study: its axes, what is fixed and measured, its cells and what they cost."""
     console.print(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
         console.print(study.summary + "\n")
@@ -74,29 +50,37 @@ def declaration(study: Study) -> None:
         table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
     varied = {field for axis in study.axes for field in axis.fields}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items()))
+    table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items() if v))
+    table.add_row("0 or absent", ", ".join(n for n, v in fixed.items() if not v) or "-")
     about = {n: v for n, v in study.measure.describe().items() if n not in varied}
-    table.add_row("measure", ", ".join(f"{n} = {v}" for n, v in about.items()))
-    table.add_row("gives", ", ".join(study.measure.variables))
+    table.add_row("measure", ", ".join(f"{n} = {_brief(v)}" for n, v in about.items()))
+    gives = study.measure.variables
+    with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
+    told = [f"{n}{words}" for n, words in with_errors.items() if not n.endswith("_error")]
+    table.add_row("gives", ", ".join(told))
     table.add_row("reduced to", ", ".join(r.describe()["name"] for r in study.reductions) or "-")
     table.add_row("claims", ", ".join(dict.fromkeys(c.id for c in study.claims)) or "-")
-    table.add_row("cells", f"{study.size}, of which {len(Plan(study).different)} differ")
-    work, seconds = estimated_cost(study)
-    rtol = study.accuracy.rtol
-    cost = f"about {work:,} right-hand sides, {seconds:.0f} s on one core at rtol {rtol:g}"
-    table.add_row("cost", cost)
+    plan = Plan(study)
+    different = len(plan.different)
+    others = f", of which {different:,} differ" if different < study.size else ""
+    table.add_row("cells", f"{study.size:,}{others}")
+    table.add_row("cost", cost.in_words(plan, output))
     console.print(table)
+
+
+def _brief(value: Any) -> str:
+    """A field of a measure; of a list of whole problems, how many they are."""
+    return f"{len(value)} of them" if isinstance(value, tuple | list) else str(value)
 
 
 def announce(study: Study) -> None:
     """Print what a run at this accuracy will cost, before it starts."""
-    work, seconds = estimated_cost(study)
+    work, seconds = estimated_cost(Plan(study))
     ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
     console.print(
         f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
-        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, {seconds:.0f} s on "
-        "one core",
-        highlight=False,
+        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
+        f"{cost.guessed(seconds)}",
     )
 
 
@@ -136,7 +120,7 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
     claims(dataset)
     failures(dataset, str(files[0]))
     console.print(f"{name}: {_tally(dataset)}")
-    console.print(f"wrote {' and '.join(map(str, files))}")
+    console.print(f"wrote {' and '.join(map(str, files))}", soft_wrap=True)
 
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
@@ -159,7 +143,7 @@ def summary(ends: Sequence[Ended]) -> None:
         status = Text(end.wrong or "ok", style="green" if end.is_fine else "red")
         if end.left_out:
             status = Text(f"left out: {end.left_out.partition(' (')[0]}", style="yellow")
-        table.add_row(end.study, status, f"{end.seconds:.0f} s", end.verdicts or "-")
+        table.add_row(end.study, status, cost.clock(end.seconds), end.verdicts or "-")
     console.print(table)
 
 
@@ -170,7 +154,9 @@ def _tally(dataset: xr.Dataset) -> str:
 
 
 def results(dataset: xr.Dataset, file: str) -> int:
-    """What is in a results file, where it comes from, and which cells failed; FAILED if any did."""
+    """The numbers of a results file, where they come from, what else is in it, and which cells
+    failed; FAILED if any did.
+    """
     attrs, about = dataset.attrs, contents.provenance(dataset)
     console.print(f"{attrs['id']}: {attrs['title']}\n", style="bold")
     table = Table("", "", box=None, show_header=False)
@@ -182,10 +168,15 @@ def results(dataset: xr.Dataset, file: str) -> int:
     table.add_row("made by", f"{about['command']}, {about['time']}")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     table.add_row("with", f"{versions}; git {about['git']}; {about['machine']}")
-    for name, values in dataset.data_vars.items():
-        words = values.attrs.get("long_name", "")  # what a notebook added may have none
-        table.add_row(str(name), f"({', '.join(map(str, values.dims))}) {words}")
     console.print(table)
+    terminal_numbers.headline(dataset)
+    _reductions(dataset)
+    holds = Table(Column("it holds", overflow="fold"), "", box=None)
+    for name, values in dataset.data_vars.items():
+        if coverage(str(name)) == "modelResult":
+            words = values.attrs.get("long_name", "")  # what a notebook added may have none
+            holds.add_row(str(name), f"{words} ({', '.join(map(str, values.dims))})".strip())
+    console.print(holds)
     return failures(dataset, file)
 
 
@@ -225,8 +216,12 @@ def _reductions(dataset: xr.Dataset) -> None:
     dimensions.
     """
     made = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
-    for slope in [name for name in made if f"{name}_stderr" in dataset]:
-        frame = dataset[[slope, f"{slope}_stderr", f"{slope}_misfit", f"{slope}_points"]]
+    beside = ("stderr", "misfit", "points")
+    for slope in made:
+        names = [slope, *(f"{slope}_{end}" for end in beside)]
+        if not set(names) <= set(dataset.data_vars):
+            continue  # of another kind, or a notebook left some out
+        frame = dataset[names]
         rows = frame.to_dataframe().reset_index()
         places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
         numbers = (slope, "standard error", "largest misfit", "points")
@@ -238,16 +233,10 @@ def _reductions(dataset: xr.Dataset) -> None:
                 for n, w in zip(numbers, widths, strict=True)
             ),
             box=box.SIMPLE_HEAD,
-            title=dataset[slope].attrs["comment"],
+            title=dataset[slope].attrs.get("comment", slope),
             title_justify="left",
         )
-        wanted = [
-            *dataset[slope].dims,
-            slope,
-            f"{slope}_stderr",
-            f"{slope}_misfit",
-            f"{slope}_points",
-        ]
+        wanted = [*dataset[slope].dims, *names]
         for *place, value, error, misfit, points in rows[wanted].itertuples(index=False):
             table.add_row(
                 *map(short, place), short(value), f"{error:.2g}", f"{misfit:.2g}", str(points)

@@ -19,7 +19,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.stepping import Halt, Meter, more_work
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.protocol import Protocol
@@ -100,6 +100,8 @@ def simulate(
         collections.deque(moving, maxlen=0)
     except Halt as halt:
         status, message = halt.status, str(halt)
+        if status is Status.WORK_BUDGET_SPENT:
+            message += more_work(budget)
     seen, fluid = strictly_later(recording.seen(scene)), scene.parts.fluid.unknowns
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sqlite3
 import subprocess
 import sys
@@ -21,7 +22,9 @@ import xarray as xr
 from click.testing import CliRunner
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli
+
+# what prints takes its width from the environment when it is loaded: not from that of a test
+from rsfstudy import Axis, Scene, Study, cli, commands  # noqa: F401
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError
 from rsfstudy.measures.critical_step import CriticalStep
@@ -163,10 +166,14 @@ def command(*words, **environment) -> subprocess.Popen:
 
 
 def ended(process: subprocess.Popen) -> tuple[int, str, str]:
-    """Exit status, output and errors, once it has ended."""
+    """Exit status, output, and errors without the lines of progress, once it has ended."""
     out, said = process.communicate(timeout=HANGS)
     assert "Traceback" not in said, said
-    return process.returncode, out, said
+    return (
+        process.returncode,
+        out,
+        re.sub(r"^\w+: \d+ of \d+ cells after .*\n", "", said, flags=re.M),
+    )
 
 
 def called(words: Sequence[str]) -> tuple[int, str]:

@@ -37,8 +37,7 @@ SI = {"normal_stress": 1e8, "slip_distance": 1e-5}
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     output = tmp_path_factory.mktemp("outputs")
-    study = rsfstudy.api.declaration(STUDY, 1e-4, {})
-    rsfstudy.run(study, workers=0, output=output, progress=False)
+    rsfstudy.run(STUDY, rtol=1e-4, workers=0, output=output, progress=False)
     return output / "soft_and_stiff.nc"
 
 

@@ -64,7 +64,7 @@ def test_every_integrator_solves_a_cycle(method):
 
 
 def solved(integrator: str, digits: float, **fields) -> Outcome:
-    measure = WorkPrecision((PROBLEM,), integrator, digits, **{"budget": 9_000, **fields})
+    measure = WorkPrecision((PROBLEM,), integrator, digits, **{"run_budget": 9_000, **fields})
     return measure(SCENE, Accuracy())
 
 
@@ -133,7 +133,7 @@ def test_integrator_and_accuracy_are_axes():
         problem=["rigid response", "critical step"],
         integrator=["DOP853", "RK23", "DOP853 + Radau"],
         requested_digits=[4, 6],
-        budget=4_000,
+        run_budget=4_000,
         repeats=1,
         workers=0,
         output=None,
@@ -160,8 +160,8 @@ def test_what_cannot_be_asked_is_refused():
     for digits in (1.0, 12.0, -400.0):
         with pytest.raises(InvalidValue, match="requested_digits = .* must lie between 2 and 11"):
             catalogue.load("accuracy_cost").with_(requested_digits=[4.0, digits])
-    with pytest.raises(InvalidValue, match="budget = 0"):
-        catalogue.load("accuracy_cost").with_(budget=0)
+    with pytest.raises(InvalidValue, match="run_budget = 0"):
+        catalogue.load("accuracy_cost").with_(run_budget=0)
     with pytest.raises(InvalidValue, match="repeats = 0"):
         WorkPrecision(repeats=0)
 

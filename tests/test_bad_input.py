@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from running import FAULTY, SMALL, call, called, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, plots, terminal
+from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy.console import console
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, restore, store
@@ -382,7 +383,7 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatc
 
 def test_what_would_steer_the_terminal_is_spelt_out(capsys):
     """A title from a file could rewrite what stands above it."""
-    terminal.console.print("a\x1b[2J\x07b\n[red]")
+    console.print("a\x1b[2J\x07b\n[red]")
     assert capsys.readouterr().out == "a\\x1b[2J\\x07b\n[red]\n"
 
 

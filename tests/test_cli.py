@@ -123,11 +123,12 @@ def test_plot_draws_beside_a_file(results, tmp_path):
 def test_list_and_show():
     listed = call("list")
     assert listed.returncode == 0
-    for name in rsfstudy.studies():
-        assert name in listed.stdout
+    said = " ".join(listed.stdout.split())
+    for name, study in rsfstudy.studies().items():
+        assert f"{name} {study.title}" in said
     shown = call("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
-    assert "6, of which 6 differ" in shown.stdout
+    assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
     assert "right-hand sides" in shown.stdout
 
 
@@ -162,6 +163,17 @@ def test_wrong_usage_is_status_2_with_a_remedy(words, message, tmp_path):
     assert message in " ".join(ran.stderr.split())
     assert "Traceback" not in ran.stderr
     assert not (tmp_path / "o").exists()
+
+
+def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
+    few = ["--serial", "--set", "b_over_a=2", "--output", tmp_path]
+    ran = call("run", NAME, *few, "--budget", "300")
+    assert ran.returncode == 1
+    assert "--budget 1200 (budget=)" in ran.stdout
+    motion = ("simulate", "--budget", "500", "--output", tmp_path / "motion.png")
+    ran = call(*motion, "--set", "load_velocity_ratio=1.2", "--duration", "1e3")
+    assert ran.returncode == 1
+    assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
 
 
 def test_results_that_are_not_there_are_status_1(tmp_path):

@@ -42,7 +42,7 @@ WRONG = {
         ("runs out of memory", "cell_raised", "MemoryError"),
         ("recurses", "cell_raised", "RecursionError"),
         ("exits", "cell_raised", "SystemExit: bye"),
-        ("spends", "work_budget_spent", "500000"),
+        ("spends", "work_budget_spent", "--budget 2000000 (budget=) allows more"),
         ("nan", "not_finite", "total = nan"),
         ("nothing", "not_finite", "total = nan"),
         ("no outcome", "cell_raised", "must be an Outcome with a Status"),
@@ -140,6 +140,7 @@ def test_a_cell_that_computes_for_ever(sturdy):
     dataset = lost(declared("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
+    assert "--time-limit" in dataset.message.values[1]
     assert "faulty.py" in log.read_text()  # where it was
 
 

@@ -15,6 +15,7 @@ from running import call, named_results, run
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.declare import catalogue
+from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
@@ -360,7 +361,7 @@ def results(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("form", plots.FORMATS)
+@pytest.mark.parametrize("form", FIGURES)
 def test_plot_writes_the_file_it_is_told_to(form, results, tmp_path):
     target = tmp_path / "deep" / f"fig.{form}"
     ran = call("plot", results, "--output", target)

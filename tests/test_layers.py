@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import rsfstudy
 from rsfstudy import slider
 
@@ -14,6 +16,7 @@ ROOT = Path(rsfstudy.__file__).parent
 #: From the bottom up; no two share a floor, but for what users call.
 FLOORS = {
     "errors": 0,
+    "defaults": 0,
     "status": 0,
     "quantity": 0,
     "markup": 0,
@@ -35,7 +38,13 @@ FLOORS = {
     "api": 10,
     "assignments": 10,
     "options": 10,
+    "commands": 10,
+    "commands_simulate": 10,
+    "console": 10,
+    "cost": 10,
+    "progress": 10,
     "terminal": 10,
+    "terminal_numbers": 10,
     "cli": 10,
     "__init__": 10,
     "named_studies": 10,
@@ -47,9 +56,9 @@ HOMES = {
     "llvmlite": {"motion/compiled/building", "motion/compiled/calls"},
     "matplotlib": {"plots"},
     "numba": {f"motion/compiled/{name}" for name in ("building", "calls", "machine")},
-    "click": {"cli", "cli_simulate", "options"},
+    "click": {"cli", "cli_simulate", "commands", "options"},
     "pint": {"rig/units"},
-    "rich": {"api", "cli", "terminal"},
+    "rich": {"console", "progress", "terminal", "terminal_numbers"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
 }
@@ -115,3 +124,22 @@ def test_workers_load_no_more_than_the_physics_needs():
     asked = f"import sys, rsfstudy.compute.cells; print(*{heavy} & set(sys.modules))"
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == ""
+
+
+HEAVY = (
+    "numpy scipy pandas xarray netCDF4 matplotlib dask distributed numba rich importlib.metadata"
+)
+
+
+@pytest.mark.parametrize("words", [["--help"], ["list"], ["run", "--help"], ["show", "--help"]])
+def test_help_and_the_list_of_studies_load_next_to_nothing(words):
+    """They answer at once: nothing is loaded that they do not need."""
+    asked = (
+        "import contextlib, sys; from rsfstudy.cli import main\n"
+        f"sys.argv = ['rsfstudy', *{words}]\n"
+        "with contextlib.suppress(SystemExit): main()\n"
+        f"print('loaded:', *set({HEAVY.split()}) & set(sys.modules))"
+    )
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "loaded:"
+    assert len(ran.stdout.splitlines()) > 10

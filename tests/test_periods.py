@@ -179,12 +179,14 @@ def test_motions_that_still_grow_are_not_said_to_have_no_period():
     found = Bifurcation(transient=16, events=16)(slow(0.999, displacement_step=0.1), Accuracy(1e-6))
     assert found.status is Status.WORK_BUDGET_SPENT
     assert "no cycle repeats yet" in found.message
+    assert found.message.endswith("--set transient=32 (transient=) waits for more")
 
 
 @pytest.mark.parametrize("events", [1, 3, 6])
 def test_few_events_say_nothing_of_periods(events):
     found = LimitCycle(phases=2, events=events)(slow(0.853), Accuracy(1e-4))
     assert found.status is Status.WORK_BUDGET_SPENT
+    assert f"--set events={2 * events}" in found.message
 
 
 def test_periods_with_mass_and_variable_normal_stress():

@@ -1,5 +1,5 @@
-"""The README tells the truth: its Python runs as it stands, its commands exist, its numbers are
-ours.
+"""The README and its pages tell the truth: their Python runs as it stands, their commands exist,
+their numbers are ours.
 """
 
 import ast
@@ -16,14 +16,30 @@ from rsfstudy.cli import cli
 from rsfstudy.slider import laws
 from rsfstudy.slider.parts import names_of
 
-README = (Path(__file__).parent.parent / "README.md").read_text()
-BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+ROOT = Path(__file__).parent.parent
+#: The README, and the pages that go on from it.
+FILES = [ROOT / "README.md", *sorted((ROOT / "studies" / "pages").glob("*.md"))]
+TEXT = "\n".join(file.read_text() for file in FILES)
+BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 #: The block that is a file of its own, run by its path.
 FILE = next(i for i, block in enumerate(BLOCKS) if "study = Study(" in block)
 
 
+def test_the_readme_is_read_in_a_few_minutes():
+    assert len(FILES[0].read_text().splitlines()) <= 170
+
+
+def test_links_lead_somewhere():
+    """And the README to each of its pages."""
+    for file in FILES:
+        links = re.findall(r"\]\((?!https?:)([^)#]+)", file.read_text())
+        assert all((file.parent / link).exists() for link in links), file
+    named = re.findall(r"\]\((studies/pages/[^)#]+)", FILES[0].read_text())
+    assert {ROOT / name for name in named} == set(FILES[1:])
+
+
 def test_the_study_of_your_own_fits_in_thirty_lines():
-    assert "<!-- file angle.py -->\n```python\n" + BLOCKS[FILE] in README
+    assert "<!-- file angle.py -->\n```python\n" + BLOCKS[FILE] in TEXT
     assert len(BLOCKS[FILE].splitlines()) <= 30
 
 
@@ -56,18 +72,18 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
 
 
 def test_commands_and_options_exist():
-    for command in re.findall(r"^rsfstudy (\w+)", README, re.MULTILINE):
+    for command in re.findall(r"^rsfstudy (\w+)", TEXT, re.MULTILINE):
         assert command in cli.commands
     options = {
         option for command in cli.commands.values() for o in command.params for option in o.opts
     }
-    for option in re.findall(r"`(--[a-z-]+)", README):
+    for option in re.findall(r"`(--[a-z-]+)", TEXT):
         assert option in options
 
 
 def test_the_table_of_promises_names_tests_that_exist():
     """And none of the tests of running, files and faults is left out."""
-    table = README[README.index("| promise | tests |") : README.index("### Scale")]
+    table = TEXT[TEXT.index("| promise | tests |") : TEXT.index("## Scale")]
     named = set(re.findall(r"`(test_\w+\.py)`", table))
     here = Path(__file__).parent
     assert all((here / name).is_file() for name in named)
@@ -77,22 +93,22 @@ def test_the_table_of_promises_names_tests_that_exist():
 
 def test_every_study_is_listed():
     for name in rsfstudy.studies():
-        assert f"| `{name}` |" in README
+        assert f"| `{name}` |" in TEXT
 
 
 def test_every_law_is_listed():
     for name, law in laws.PARTS.items():
-        row = re.search(rf"^\| (?:`\w+`, )*`{name}`.*$", README, re.MULTILINE)
+        row = re.search(rf"^\| (?:`\w+`, )*`{name}`.*$", TEXT, re.MULTILINE)
         assert row, name
         own = set(names_of(law)) - set(names_of(laws.Law))
         assert all(f"`{field}`" in row[0] for field in own)
-    assert all(f"`{field}`" in README for field in names_of(laws.Law) if field != "b_over_a")
+    assert all(f"`{field}`" in TEXT for field in names_of(laws.Law) if field != "b_over_a")
 
 
 def test_the_table_of_zeta_is_ours(tmp_path_factory):
     dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     rows = re.findall(
-        r"^\| (constant normal stress|alpha = [\d.]+) \| ([\d.]+) \| ([\d.]+) \|", README, re.M
+        r"^\| (constant normal stress|alpha = [\d.]+) \| ([\d.]+) \| ([\d.]+) \|", TEXT, re.M
     )
     assert len(rows) == dataset.sizes["case"]
     for case, zeta, error in rows:
@@ -118,7 +134,7 @@ def lines_of_code(source: str, nodes: list[ast.stmt]) -> int:
 
 
 def test_what_it_takes_to_add_something_is_counted():
-    rows = re.findall(r"^\|.*`(\w+\.py)` \| (\d+) \| (\d+) \|$", README, re.MULTILINE)
+    rows = re.findall(r"^\|.*`(\w+\.py)` \| (\d+) \| (\d+) \|$", TEXT, re.MULTILINE)
     examples = Path(__file__).parent / "extensions"
     assert {name for name, _part, _file in rows} == {file.name for file in examples.glob("*.py")}
     for name, *stated in rows:
@@ -130,7 +146,7 @@ def test_what_it_takes_to_add_something_is_counted():
 
 
 def test_the_tree_names_every_room_and_no_other():
-    root, tree = Path(rsfstudy.__file__).parent, README[README.index("```\nstudies/") :]
+    root, tree = Path(rsfstudy.__file__).parent, TEXT.split("```\nstudies/")[1].split("```")[0]
     for folder, indent in ((root, "  "), (root / "slider", "    ")):
         lines = re.findall(rf"^{indent}((?:[a-z_]+/? +)*[a-z_]+/?) {{2,}}", tree, re.MULTILINE)
         named = {room.strip("/") for line in lines for room in line.split()}

@@ -388,3 +388,22 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
     monkeypatch.setattr(cells, "computed", counted)
     run(failing, output=tmp_path)
     assert asked == [2.5]
+
+
+# ---- more work ----------------------------------------------------------------------------------
+
+
+def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again(tmp_path):
+    few = {"b_over_a": [2.0], "output": tmp_path}
+    spent = run(SMALL, budget=300, **few)
+    assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
+    assert "--budget 1200 (budget=) allows more" in spent.message.values.flat[0]
+    answered = run(SMALL, budget=100_000, **few)
+    assert (answered.status == int(Status.OK)).all()
+    again = run(SMALL, budget=200_000, **few)
+    same_numbers(again, answered)
+    assert (again.wall_time == answered.wall_time).all()  # not computed anew
+    with pytest.raises(DataError, match="budget: 200000 there, 300 now"):
+        run(SMALL, budget=300, **few)
+    with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now"):
+        run(SMALL, budget=400_000, rtol=1e-6, **few)

@@ -107,6 +107,7 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
     cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
     assert cut.sizes["time"] > 10
+    assert cut.attrs["message"].endswith("--budget 2000 (budget=) allows more")
     opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
     assert opened.attrs["status"] == "normal_stress_lost"
     assert opened.sizes["time"] == 0

@@ -22,6 +22,7 @@ import cloudpickle
 from rsfstudy.compute import own_code, provenance
 from rsfstudy.compute.overheard import Overhearing
 from rsfstudy.declare.cell import Cell, Rows
+from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.files.journal import Finished, Layout
 from rsfstudy.measures import Measure, Outcome
@@ -35,8 +36,6 @@ from rsfstudy.status import Status
 if TYPE_CHECKING:
     from rsfstudy.compute.plan import Batch
 
-#: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
-DEFAULT_TIME_LIMIT = 600.0
 #: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
 WAITING = 10.0
 #: Seconds after which finished cells are handed over: in this process, and by a worker.
@@ -74,7 +73,7 @@ class Task:
 
     measure: Measure
     accuracy: Accuracy
-    time_limit: float = DEFAULT_TIME_LIMIT
+    time_limit: float = TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
     parts: tuple[type[Part], ...] = ()
     own_code: str = "none"

@@ -21,7 +21,7 @@ _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: Time a batch should last in s, and the most cells it may hold: as many are lost with the machine.
 _SECONDS_PER_TASK, LARGEST_BATCH = 0.3, 5000
 #: Typical time of one right-hand side in s, by engine, with its share of everything else.
-_SECONDS_PER_RHS = {SCIPY: 6e-6, COMPILED: 5e-7}
+_SECONDS_PER_RHS = {SCIPY: 1.2e-5, COMPILED: 5e-7}
 #: Cells that are named at a time: their numbers are in memory meanwhile.
 _NAMED_AT_A_TIME = 50_000
 
@@ -101,6 +101,11 @@ class Plan:
             self._name(np.arange(start, min(start + _NAMED_AT_A_TIME, study.size)))
         self.different = _first_of_equals(self.keys)
 
+    def named(self, numbers: np.ndarray) -> list[bytes]:
+        """Names of some cells."""
+        names, width = self.keys[numbers].tobytes(), _KEY.itemsize
+        return [names[at : at + width] for at in range(0, len(names), width)]
+
     def _name(self, numbers: np.ndarray) -> None:
         """Name these cells."""
         for at, block, rows in self.table.split(numbers):
@@ -158,8 +163,7 @@ class Batch:
     @property
     def keys(self) -> list[bytes]:
         """Names of the cells."""
-        names, width = self._plan.keys[self._numbers].tobytes(), _KEY.itemsize
-        return [names[at : at + width] for at in range(0, len(names), width)]
+        return self._plan.named(self._numbers)
 
     def rows(self) -> list[Rows]:
         """The cells as columns of numbers."""
@@ -218,9 +222,10 @@ def scattered(cells: np.ndarray) -> np.ndarray:
     return np.asarray(cells[np.arange(count) * stride % max(1, count)])
 
 
-def estimated_cost(study: Study) -> tuple[int, float]:
+def estimated_cost(plan: Plan) -> tuple[int, float]:
     """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
-    core.
+    core: a guess, because it is the measure that states them, whatever its scenes are.
     """
-    work = len(Plan(study).different) * study.measure.expected_work(study.accuracy)
-    return round(work), work * _SECONDS_PER_RHS[study.accuracy.engine]
+    accuracy = plan.study.accuracy
+    work = len(plan.different) * plan.study.measure.expected_work(accuracy)
+    return round(work), work * _SECONDS_PER_RHS[accuracy.engine]

@@ -17,6 +17,7 @@ from rsfstudy.compute import provenance
 from rsfstudy.compute.cells import FinishedCells, Mapper, Task
 from rsfstudy.compute.plan import Batches, Plan, scattered
 from rsfstudy.declare.study import Study
+from rsfstudy.defaults import FORMATS
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import pieces, store
 from rsfstudy.files.journal import Columns, Journal, Layout
@@ -29,8 +30,6 @@ _LOST = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
 _ANSWERS = frozenset(status.name for status in Status if status.is_answer)
 #: A run ends early when this many cells have failed and none has succeeded.
 _HOPELESS = 10
-
-FORMATS = ("netcdf", "zarr")
 
 Progress = Callable[[int, int], None]
 

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 from rsfstudy.compute.cells import (
-    DEFAULT_TIME_LIMIT,
     WAITING,
     FinishedCells,
     Mapper,
@@ -32,6 +31,7 @@ from rsfstudy.compute.cells import (
 )
 from rsfstudy.compute.clusters import local_cluster
 from rsfstudy.compute.plan import Batch
+from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
@@ -64,7 +64,7 @@ class Workers:
 
     processes: int = 2
     client: Any = None
-    time_limit: float = DEFAULT_TIME_LIMIT
+    time_limit: float = TIME_LIMIT
 
     def __post_init__(self) -> None:
         whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
@@ -252,7 +252,8 @@ def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
         if seconds > task.time_limit:
             text = (
                 f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
-                "on the clock; the worker's log shows where it was"
+                "on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
+                "allows more"
             )
             outcome = Outcome(Status.TIME_LIMIT_SPENT, message=text)
             return [task.layout.finished(key, outcome, seconds)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
 import pkgutil
@@ -10,9 +11,12 @@ import traceback
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
+
+if TYPE_CHECKING:
+    from rsfstudy.declare.study import Study
 
 #: Where the files of `studies/` are installed.
 _PACKAGE = "rsfstudy.named_studies"
@@ -23,6 +27,25 @@ def names() -> tuple[str, ...]:
     package = importlib.import_module(_PACKAGE)
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     return tuple(sorted(name for name in modules if not name.startswith("_")))
+
+
+def titles() -> dict[str, str]:
+    """Titles of the studies, by name, as they stand in their files: none is run, because that would
+    load all that studies are made of.
+    """
+    (place,) = importlib.import_module(_PACKAGE).__path__
+    files = {name: Path(place, f"{name}.py") for name in names()}
+    return {name: _title(file.read_bytes()) for name, file in files.items()}
+
+
+def _title(source: bytes) -> str:
+    """The text given as ``title`` to the call whose value is named `study`."""
+    # what stands before it need not be parsed, which would take as long again
+    declared = ast.parse(source[source.index(b"\nstudy = ") :]).body[0]
+    assert isinstance(declared, ast.Assign)
+    assert isinstance(declared.value, ast.Call)
+    given = {keyword.arg: keyword.value for keyword in declared.value.keywords}
+    return str(ast.literal_eval(given["title"]))
 
 
 def load(name: str) -> Study:
@@ -101,6 +124,8 @@ def _line(error: BaseException, path: Path) -> str:
 
 
 def _declared_in(module: ModuleType, name: str) -> Study:
+    from rsfstudy.declare.study import Study  # here, because names and titles need none of it
+
     study = getattr(module, "study", None)
     if not isinstance(study, Study):
         raise InvalidValue("study", name, "declares no study", remedy="Write study = Study(...).")

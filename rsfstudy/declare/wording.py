@@ -20,7 +20,7 @@ def settings(overrides: Mapping[str, Any]) -> str:
 
 
 def listed(values: Sequence[Any], between: str = ",") -> str:
-    """Values as one types them, a long list cut short."""
+    """Values one after the other, long lists cut short."""
     shown = [short(value) for value in values]
     return between.join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from rsfstudy.files.contents import provenance
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import MEASURED_TIMES
 
+_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
+
 
 def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """How two datasets of one study agree, variable by variable, in the cells that both have.
@@ -23,9 +25,10 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        ``variable``, ``values``, ``identical`` and ``largest_difference``; in ``attrs["differs"]``
-        what decides a number and differs between them. Measured times, which no two runs share, are
-        left out.
+        ``variable``, ``values``, ``identical``, ``largest_difference`` and ``beyond_errors``, how
+        many differ by more than the sum of both error estimates, NaN where there are none; in
+        ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
+        no two runs share, are left out.
     """
     pending = [d["status"] == int(Status.PENDING) for d in (theirs, ours)]
     both = ~(pending[0] | pending[1])
@@ -34,8 +37,8 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         if name in MEASURED_TIMES:
             continue
         if name not in ours or not _comparable(theirs[name], ours[name]):
-            missing = {"values": theirs[name].size, "identical": 0, "largest_difference": np.nan}
-            rows.append({"variable": name, **missing})
+            missing = dict.fromkeys(("largest_difference", "beyond_errors"), np.nan)
+            rows.append({"variable": name, "values": theirs[name].size, "identical": 0, **missing})
             continue
         a, b = theirs[name], ours[name]
         known = np.broadcast_to(True, a.shape)
@@ -43,8 +46,11 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
             known = np.asarray(both.broadcast_like(a).transpose(*a.dims))
         elif not bool(both.all()):
             continue  # a reduction that draws on cells missing in one of them
-        rows.append({"variable": name, **_agreement(a.values[known], b.values[known])})
-    frame = pd.DataFrame(rows)
+        e = f"{name}_error"
+        beside = [d[e].values for d in (theirs, ours) if e in d and d[e].dims == a.dims]
+        errors = [values[known] for values in beside if values.shape == known.shape]
+        rows.append({"variable": name, **_agreement(a.values[known], b.values[known], errors)})
+    frame = pd.DataFrame(rows, columns=_COLUMNS)
     frame.attrs["differs"] = differences(*(provenance(d)["fingerprint"] for d in (theirs, ours)))
     return frame
 
@@ -54,14 +60,20 @@ def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
     return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
 
 
-def _agreement(theirs: np.ndarray, ours: np.ndarray) -> dict[str, Any]:
+def _agreement(
+    theirs: np.ndarray, ours: np.ndarray, errors: Sequence[np.ndarray]
+) -> dict[str, Any]:
+    """How two arrays of values agree; their error estimates are none, or one for each."""
     if theirs.dtype.kind != "f":
-        same = np.asarray(theirs == ours)
-        return {"values": same.size, "identical": int(same.sum()), "largest_difference": np.nan}
-    same = (theirs == ours) | (np.isnan(theirs) & np.isnan(ours))
-    gap = np.abs(theirs - ours)[~same]
-    largest = float(np.max(gap)) if gap.size else 0.0
-    return {"values": same.size, "identical": int(same.sum()), "largest_difference": largest}
+        same, largest = np.asarray(theirs == ours), np.nan
+    else:
+        same = (theirs == ours) | (np.isnan(theirs) & np.isnan(ours))
+        largest = float(np.max(gap)) if (gap := np.abs(theirs - ours)[~same]).size else 0.0
+    beyond = np.nan
+    if len(errors) == 2:
+        # a number that one of them lacks, or whose error is unknown, is beyond any estimate
+        beyond = int((~same & ~(np.abs(theirs - ours) <= errors[0] + errors[1])).sum())
+    return dict(zip(_COLUMNS[1:], (same.size, int(same.sum()), largest, beyond), strict=True))
 
 
 def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

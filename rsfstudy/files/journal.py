@@ -7,6 +7,7 @@ fingerprint, and a journal with another fingerprint is refused.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sqlite3
@@ -147,6 +148,10 @@ class Journal:
                 ) from error
             raise DataError(f"cannot use {self._path}: {error}. {_REMEDY}") from error
         if row is not None and row[0] != wanted:
+            if _allows_more(row[0], wanted):
+                with self._db:
+                    self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
+                return
             self._db.close()
             raise DataError(
                 f"{self._path} holds cells computed differently: {_differences(row[0], ours)}. "
@@ -246,6 +251,34 @@ class Journal:
                 yield [cell for cell, _row in known], [row for _cell, row in known]
 
 
+@dataclass(frozen=True)
+class Timed:
+    """How long cells took.
+
+    Attributes
+    ----------
+    fingerprint : mapping
+        What else decided their numbers.
+    seconds : mapping of bytes to float
+        Wall time of each cell that was timed, by its key.
+    """
+
+    fingerprint: Mapping[str, Any]
+    seconds: Mapping[bytes, float]
+
+
+def timed(path: Path) -> Timed | None:
+    """How long the cells of a journal took; None where there is none that can be read just now."""
+    try:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
+            (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
+            seconds = db.execute("SELECT key, seconds FROM cells WHERE seconds IS NOT NULL")
+            return Timed(dict(json.loads(known)), dict(seconds))
+    except (OSError, sqlite3.Error, TypeError, ValueError):
+        return None
+
+
 def _alone(path: Path | str) -> sqlite3.Connection:
     """Open a database for this process alone, until it is closed or the process ends."""
     db = sqlite3.connect(path, timeout=_WAIT)
@@ -280,6 +313,16 @@ def _forget(path: Path) -> None:
 def _checksum(status: str, message: str, work: int, seconds: float | None, numbers: bytes) -> int:
     known = math.nan if seconds is None else seconds
     return zlib.crc32(numbers, zlib.crc32(f"{status}\0{message}\0{work}\0{known!r}\0".encode()))
+
+
+def _allows_more(theirs: str, ours: str) -> bool:
+    """Whether nothing differs but the work allowed, which is more now: no answer depends on it."""
+    try:
+        before, now = dict(json.loads(theirs)), dict(json.loads(ours))
+        less, more = before.pop("budget"), now.pop("budget")
+        return less < more and before == now
+    except (KeyError, TypeError, ValueError):
+        return False
 
 
 def _brief(value: object) -> str:

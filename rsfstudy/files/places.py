@@ -6,9 +6,8 @@ from pathlib import Path
 
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import check_text
+from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
-
-DEFAULT = Path("outputs")
 
 
 def directory(output: str | Path | None) -> Path | None:
@@ -48,7 +47,7 @@ def results(name: str | Path, output: str | Path | None) -> Path:
         return path
     study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
     try:
-        return _of_study(study, directory(output) or DEFAULT)
+        return _of_study(study, directory(output) or OUTPUT)
     except OSError as error:
         raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
 

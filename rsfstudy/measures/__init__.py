@@ -25,7 +25,7 @@ from rsfstudy.motion.accuracy import (
     Accuracy,
     relative_work,
 )
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.stepping import Halt, Meter, more_work
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.slider.fields import FIELDS
 from rsfstudy.slider.scene import Scene
@@ -214,7 +214,10 @@ class Measure:
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""
-        return self.metered(scene, accuracy)[0]
+        outcome, meter = self.metered(scene, accuracy)
+        if outcome.status is Status.WORK_BUDGET_SPENT and meter.spent > meter.budget:
+            return replace(outcome, message=outcome.message + more_work(meter.budget))
+        return outcome
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
         """The outcome of `__call__`, and the meter with the work that was spent."""

@@ -15,7 +15,7 @@ from rsfstudy.boundaries.cycles import LN10, Cycle
 from rsfstudy.boundaries.periods import Course, Orbit, ReturnMap, course
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, without_period
+from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, more_events, without_period
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -150,7 +150,8 @@ class Bifurcation(Measure):
         if came.orbit is None:
             kept = came.seen[-self.events :]
             values["lyapunov_exponent"] = ReturnMap(scene, accuracy, meter).growth(kept)
-            ended = without_period(scene, came)
+            remedy = more_events(max(self.transient, self.events), "transient")
+            ended = without_period(scene, came, remedy)
             return Outcome(ended.status, values, ended.message)
         values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
         values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}

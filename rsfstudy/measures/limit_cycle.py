@@ -141,7 +141,7 @@ class LimitCycle(Measure):
         if came is None:
             return SETTLES
         if came.orbit is None:
-            return without_period(scene, came)
+            return without_period(scene, came, more_events(self.events))
         orbit = came.orbit.from_largest
         one = ReturnMap(scene, accuracy, meter).again(orbit)
         again = ReturnMap(scene, accuracy.refined(), meter).again(orbit)
@@ -166,9 +166,14 @@ PERIOD = Quantity("period_events", "", "1", "number of events after which a moti
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
 
 
-def without_period(scene: Scene, came: Course) -> Outcome:
+def more_events(events: int, name: str = "events") -> str:
+    """How to wait for more events, to be added to a message."""
+    return f"--set {name}={2 * events} ({name}=) waits for more"
+
+
+def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
     """The outcome of a motion that has not come to a cycle: because it never will, or because it
-    takes its time.
+    takes its time, and what to do then.
     """
     latest = came.seen[len(came.seen) // 2 :]
     peaks = [cycle.fastest / LN10 for cycle in latest]
@@ -179,7 +184,8 @@ def without_period(scene: Scene, came: Course) -> Outcome:
         "D_c/V_*"
     )
     if came.open:
-        return Outcome(Status.WORK_BUDGET_SPENT, message=f"no cycle repeats yet: {text}")
+        why = f"no cycle repeats yet: {text}; {remedy}"
+        return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
 
 
@@ -259,7 +265,7 @@ class Approach:
                 if self._repeats():
                     return True
                 if self.events >= events:
-                    text = f"no cycle repeats within {events} events"
+                    text = f"no cycle repeats within {events} events; {more_events(events)}"
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
                     self._left_at_leap = abs(cycle.end.spring - cycle.begin.spring)

@@ -94,7 +94,7 @@ class WorkPrecision(Measure):
         The accuracy asked for, rtol = 10**-requested_digits.
     repeats : int
         Most timings of a run; long ones need fewer.
-    budget : int
+    run_budget : int
         Right-hand sides a run may evaluate.
     """
 
@@ -102,7 +102,7 @@ class WorkPrecision(Measure):
     integrator: str = "DOP853"
     requested_digits: float = 6.0
     repeats: int = 5
-    budget: int = 41_000
+    run_budget: int = 41_000
     name: ClassVar[str] = "work_precision"
 
     def __post_init__(self) -> None:
@@ -110,7 +110,8 @@ class WorkPrecision(Measure):
             raise InvalidValue("integrator", self.integrator, "is unknown", choices=_CHOICES)
         if self.repeats < 1:
             raise InvalidValue("repeats", self.repeats, "must be at least 1")
-        Accuracy(budget=self.budget)
+        if self.run_budget < 1:
+            raise InvalidValue("run_budget", self.run_budget, "must be at least 1")
         try:
             Accuracy(10.0**-self.requested_digits)
         except (InvalidValue, OverflowError) as error:
@@ -123,7 +124,7 @@ class WorkPrecision(Measure):
         """The accuracy and the integrators that the run is made with."""
         kind, methods = _CHOICES[self.integrator]
         engine = COMPILED if self.integrator == _COMPILED else SCIPY
-        return kind(10.0**-self.requested_digits, self.budget, methods, engine)
+        return kind(10.0**-self.requested_digits, self.run_budget, methods, engine)
 
     @property
     def headline(self) -> str:

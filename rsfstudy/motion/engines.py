@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from rsfstudy.errors import InvalidValue
@@ -84,6 +83,9 @@ def versions(name: str) -> dict[str, str]:
     """Versions of what decides the numbers of an engine, beside those of SciPy."""
     if name == SCIPY:
         return {}
+    # loading it would make each command wait
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return {"numba": version("numba"), "llvmlite": version("llvmlite")}
     except PackageNotFoundError:

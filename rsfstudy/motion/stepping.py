@@ -31,6 +31,11 @@ TOLERANCE_OF_STRIDES = 1e-7
 TIGHTEST = 5e-14
 
 
+def more_work(budget: int) -> str:
+    """How to allow more than a budget, to be added to a message."""
+    return f"; --budget {4 * budget} (budget=) allows more"
+
+
 class Halt(Exception):
     """A motion that cannot go on, with the status that says why."""
 

@@ -22,6 +22,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Figure
 
 from rsfstudy.declare.wording import settings
+from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
 from rsfstudy.plots._style import hold_ticks, letter, make_room, settle, share_legends, size
@@ -36,8 +37,6 @@ Panel = Callable[[xr.Dataset, Axes], Axes]
 
 NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
-#: File formats of figures, by the ending of the file.
-FORMATS = ("png", "pdf", "svg")
 #: Points an inch of what a notebook shows.
 _ON_SCREEN = 150
 #: What would make two files of one figure differ.
@@ -206,8 +205,8 @@ def save(
         Where it cannot be written.
     """
     image, form = io.BytesIO(), path.suffix[1:].lower()
-    if form not in FORMATS:
-        raise InvalidValue("figure", path.name, "needs an ending we write", choices=FORMATS)
+    if form not in FIGURES:
+        raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURES)
     try:
         drawn = figure(dataset, own, variable=variable, style=style)
         with styled(style):

@@ -1,0 +1,282 @@
+"""What the commands do; how each is spelt is in `cli`, which loads this when one is called."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import xarray as xr
+
+from rsfstudy import api, assignments, terminal, terminal_numbers
+from rsfstudy.compute.clusters import existing_cluster
+from rsfstudy.compute.runner import Keeping
+from rsfstudy.compute.workers import Workers
+from rsfstudy.console import console, stderr
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.study import Study
+from rsfstudy.defaults import FIGURES, OUTPUT
+from rsfstudy.errors import Interrupted, RsfStudyError
+from rsfstudy.files import contents, places, restore
+from rsfstudy.motion.engines import lacking
+from rsfstudy.terminal import FAILED, OK, Ended
+
+_ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
+_RESULTS = (".nc", ".zarr")
+
+
+def show(name: str, settings: tuple[str, ...], rtol: float | None, output: Path) -> int:
+    """Show a study, or a results file."""
+    if Path(name).suffix in _RESULTS:
+        if settings or rtol is not None:
+            raise click.UsageError("a results file is shown as it is, without --set or --rtol")
+        return terminal.results(api.open(name), name)
+    terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol), output)
+    return OK
+
+
+def run(
+    name: str | None,
+    every: bool,
+    settings: tuple[str, ...],
+    output: Path,
+    workers: int,
+    serial: bool,
+    scheduler: str | None,
+    rtol: float | None,
+    engine: str | None,
+    budget: int | None,
+    time_limit: float,
+    form: str | None,
+    style: str | None,
+    quiet: bool,
+    **choices: Any,
+) -> int:
+    """Run a study, or all."""
+    names = _results(name, every)
+    studies = [
+        _declared(catalogue.load(n), settings, rtol=rtol, engine=engine, budget=budget)
+        for n in names
+    ]
+    left_out = _left_out(studies) if every and engine is None else []
+    studies = [study for study in studies if study.name not in {end.study for end in left_out}]
+    command = shlex.join(["rsfstudy", *sys.argv[1:]])
+    keeping = Keeping(output=output, command=command, **choices)
+    look = Look(form, style)
+    with _client(scheduler, serial) as client:
+        where = Workers(0 if serial else workers, client, time_limit)
+        ready = [(study, api.prepared(study, keeping, where, not quiet)) for study in studies]
+        for study in studies if rtol is not None else ():
+            terminal.announce(study)
+        if every:
+            return _run_all(ready, keeping, look, left_out)
+        return OK if _run(*ready[0], keeping, look).is_fine else FAILED
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a figure is to be drawn: its file format, its style, and of which variable."""
+
+    form: str | None = None
+    style: str | None = None
+    variable: str | None = None
+
+    def beside(self, results: Path) -> Path:
+        """The figure beside results, which may be no file."""
+        name = results.name.removesuffix(".nc").removesuffix(".zarr")
+        words = [name, self.variable, self.form or FIGURES[0]]
+        return results.with_name(".".join(filter(None, words)))
+
+
+def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping, look: Look) -> Ended:
+    """Compute a study, draw it and print what came out."""
+    assert keeping.output is not None
+    began = time.monotonic()
+    dataset = compute()
+    file = keeping.output / f"{study.name}.{_ENDINGS[keeping.format]}"
+    own = None if isinstance(study.plot, str) else study.plot
+    drawn = _drawn(dataset, look.beside(file), look, own)
+    terminal.report(dataset, study.name, [file, *drawn])
+    return terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
+
+
+def _left_out(studies: Sequence[Study]) -> list[Ended]:
+    """Name the studies whose engine is not installed."""
+    ends = [
+        Ended(study.name, 0.0, left_out=why)
+        for study in studies
+        if (why := lacking(study.accuracy.engine))
+    ]
+    for end in ends:
+        console.print(f"{end.study}: left out: {end.left_out}", style="yellow")
+    return ends
+
+
+def _run_all(
+    ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]],
+    keeping: Keeping,
+    look: Look,
+    left_out: Sequence[Ended],
+) -> int:
+    """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
+    ends: list[Ended] = []
+    try:
+        for study, compute in ready:
+            began = time.monotonic()
+            try:
+                ends.append(_run(study, compute, keeping, look))
+            except Interrupted:
+                raise
+            except RsfStudyError as error:
+                stderr.print(f"error: {error}")
+                ends.append(Ended(study.name, time.monotonic() - began, "not finished"))
+    finally:
+        terminal.summary([*ends, *left_out])
+    return OK if all(end.is_fine for end in ends) else FAILED
+
+
+def rerun(
+    file: Path,
+    place: tuple[str, ...],
+    study: Path | None,
+    output: Path | None,
+    workers: int,
+    serial: bool,
+    scheduler: str | None,
+    time_limit: float,
+    quiet: bool,
+) -> int:
+    """Compute a results file anew, or one cell of it."""
+    if place:
+        with warnings.catch_warnings(record=True) as caught:
+            scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+        return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
+    with _client(scheduler, serial) as client:
+        table = api.rerun(
+            file,
+            study=study,
+            workers=0 if serial else workers,
+            client=client,
+            output=output,
+            progress=not quiet,
+            time_limit=time_limit,
+        )
+    return terminal.agreement(table)
+
+
+def compare(first: str, second: str, output: Path) -> int:
+    """Compare two results files."""
+    files = [places.results(name, output) for name in (first, second)]
+    datasets = [api.open(file) for file in files]
+    return terminal_numbers.comparison(files, datasets, api.compare(*datasets))
+
+
+def check(name: str | None, every: bool, output: Path) -> int:
+    """Hold results against published values."""
+    if not every:
+        return terminal.checked(api.open(_results(name, every)[0], output))
+    status, datasets = OK, []
+    for what in catalogue.names():
+        if (output / f"{what}.nc").exists():
+            datasets.append(api.open(what, output))
+        elif why := lacking(catalogue.load(what).accuracy.engine):
+            console.print(f"{what}: left out: {why}", style="yellow")
+        else:
+            console.print(f"{what}: not run yet", style="red")
+            status = FAILED
+    return max([status, terminal.all_claims(datasets), *map(terminal.failures, datasets)])
+
+
+def plot(
+    name: str | None,
+    every: bool,
+    output: Path | None,
+    form: str | None,
+    style: str | None,
+    variable: str | None,
+    study: Path | None,
+) -> int:
+    """Draw results."""
+    status, look = OK, Look(form, style, variable)
+    target = _target(output, form, every)
+    for what in _results(name, every):
+        results = places.results(what, OUTPUT if target else output)
+        dataset = api.open(results)
+        place = results if output is None else output / results.name
+        own = None if variable else _own_figure(dataset, study)
+        drawn = _drawn(dataset, target or look.beside(place), look, own)
+        status = status if drawn else FAILED
+        for file in drawn:
+            console.print(f"{file}")
+    return status
+
+
+def _target(output: Path | None, form: str | None, every: bool) -> Path | None:
+    """The file that --output names, if it is a figure."""
+    ending = "" if output is None else output.suffix[1:].lower()
+    if ending not in FIGURES:
+        return None
+    if every or form not in (None, ending):
+        raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
+    return output
+
+
+# ---- arguments ------------------------------------------------------------------------------
+
+
+def _results(name: str | None, every: bool) -> list[str]:
+    if every == (name is not None):
+        raise click.UsageError("name one study, or say --all")
+    return list(catalogue.names()) if name is None else [name]
+
+
+def _declared(study: Study, settings: tuple[str, ...], **accuracy: Any) -> Study:
+    return api.declaration(study, assignments.overrides(study, settings), **accuracy)
+
+
+@contextlib.contextmanager
+def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
+    if serial and scheduler:
+        raise click.UsageError("--serial and --scheduler exclude each other")
+    if scheduler is None:
+        yield None
+        return
+    with existing_cluster(scheduler) as client:
+        yield client
+
+
+def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
+    """What draws a figure that is not part of rsfstudy: the study file's own, or plain lines."""
+    from rsfstudy import plots
+    from rsfstudy.plots import lines
+
+    if contents.declaration(dataset).plot in plots.NAMES:
+        if study is not None:
+            catalogue.load(str(study))  # for the parts of its scenes
+        return None
+    try:
+        return restore.own_figure(dataset, study)
+    except RsfStudyError as error:
+        if study is not None:
+            raise
+        stderr.print(f"note: drawn as lines. {error}")
+        return lines
+
+
+def _drawn(dataset: xr.Dataset, path: Path, look: Look, own: Any = None) -> list[Path]:
+    """The figure, if it can be drawn; the results are there already."""
+    from rsfstudy import plots
+
+    try:
+        plots.save(dataset, path, own, variable=look.variable, style=look.style)
+    except (OSError, RsfStudyError) as error:
+        stderr.print(f"no figure: {error}")
+        return []
+    return [path]

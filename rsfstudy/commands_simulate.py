@@ -1,0 +1,109 @@
+"""What the command `simulate` does; how it is spelt is in `cli_simulate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from rsfstudy import assignments, terminal
+from rsfstudy.console import console
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.protocol_file import read_protocol
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+from rsfstudy.trajectory import simulate as simulated
+
+_AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
+_ABSCISSAE = {"displacement": "load_point_displacement", "slip": "slip", "time": "time"}
+
+
+def simulate(
+    settings: tuple[str, ...],
+    protocol_file: Path | None,
+    duration: str | None,
+    against: str,
+    rtol: float,
+    budget: int,
+    engine: str,
+    output: Path,
+    **rig: str | None,
+) -> int:
+    """Follow one motion, draw it and write it."""
+    if output.suffix not in (".png", ".pdf", ".svg"):
+        raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
+    laboratory = _laboratory(rig)
+    scene = _scene(_fields(settings), protocol_file, laboratory)
+    lasts = None if duration is None else _duration(duration, laboratory)
+    motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
+    _write(motion, laboratory, output, _ABSCISSAE[against])
+    status = Status[motion.attrs["status"].upper()]
+    return terminal.OK if status.is_answer else terminal.FAILED
+
+
+def _laboratory(rig: dict[str, str | None]) -> Laboratory | None:
+    """The rig that the options state, if they state one."""
+    stated = {name: _number(text) for name, text in rig.items() if text is not None}
+    for name in _AT_LEAST if stated else ():
+        if name not in stated:
+            remedy = "A rig is stated by these three at least."
+            option = f"--{name.replace('_', '-')}"
+            raise InvalidValue(option, None, "must be stated", remedy=remedy)
+    return Laboratory(**stated) if stated else None
+
+
+def _scene(
+    fields: dict[str, Any], protocol_file: Path | None, laboratory: Laboratory | None
+) -> Scene:
+    if protocol_file is not None:
+        fields["loading"] = read_protocol(protocol_file, laboratory)
+    return laboratory.scene(**fields) if laboratory else Scene(**fields)
+
+
+def _duration(text: str, laboratory: Laboratory | None) -> float:
+    """In D_c/V_*."""
+    stated = _number(text)
+    if laboratory is not None:
+        return laboratory.dimensionless(stated, name="--duration")
+    if isinstance(stated, str):
+        remedy = "Give a number in D_c/V_*, or state the rig too."
+        raise InvalidValue("--duration", stated, "has units, and no rig is stated", remedy=remedy)
+    return stated
+
+
+def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str) -> None:
+    """The picture, and the data beside it."""
+    from rsfstudy.plots import styled
+    from rsfstudy.plots._motion import picture
+
+    data = output.with_suffix(".nc")
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with styled():
+            picture(motion, laboratory, against=against).savefig(output)
+        (laboratory.in_units(motion) if laboratory else motion).to_netcdf(data)
+    except OSError as error:
+        raise DataError(f"{output}: cannot be written ({error})") from error
+    said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
+    console.print(f"{said}\nwrote {output} and {data}")
+
+
+def _fields(settings: tuple[str, ...]) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+    for text in settings:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
+        if name in fields:
+            raise InvalidValue("--set", text, f"sets {name} twice")
+        fields[name] = assignments.value(value)
+    return fields
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

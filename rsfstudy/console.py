@@ -1,0 +1,37 @@
+"""Where commands print: plain text, on the standard output or the standard error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from rsfstudy.errors import RunError
+
+
+class Plain(Console):
+    """A console that prints any text literally, brackets included; only control characters, which
+    would steer the terminal, are spelt out.
+    """
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Text with control characters spelt out."""
+        return super().render_str(spelt(text), **options)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; the output may go to a file on a full disk, which is a `RunError`."""
+        try:
+            super().print(*objects, **options)
+        except OSError as error:
+            raise RunError(f"cannot print: {error.strerror}.") from error
+
+
+def spelt(text: str) -> str:
+    """Text with its control characters spelt out."""
+    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+    return "".join(c if isinstance(c, str) else c.decode() for c in characters)
+
+
+console = Plain(markup=False, emoji=False, highlight=False)
+stderr = Plain(stderr=True, markup=False, emoji=False, highlight=False)

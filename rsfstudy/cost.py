@@ -1,0 +1,63 @@
+"""What a study costs, in words: as its cells took here last, else a guess that says it is one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rsfstudy.compute.plan import Plan, estimated_cost
+from rsfstudy.files import journal
+
+
+def in_words(plan: Plan, output: Path) -> str:
+    """Work and time of a study on one core.
+
+    Parameters
+    ----------
+    plan : Plan
+    output : Path
+        Directory of its results: what is kept there tells how long cells took.
+    """
+    work, guess = estimated_cost(plan)
+    work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
+    text = f"about {work:,} right-hand sides at rtol {plan.study.accuracy.rtol:g}; "
+    kept = output / f"{plan.study.name}.cells.sqlite"
+    took = journal.timed(kept)
+    if took is None or not _alike(plan, took) or not took.seconds:
+        return text + guessed(guess)
+    cells = len(plan.different)
+    known = [took.seconds[key] for key in plan.named(plan.different) if key in took.seconds]
+    if len(known) == cells:
+        return text + f"took {clock(math.fsum(known))} on one core here last ({kept})"
+    missing = (cells - len(known)) * float(np.mean(list(took.seconds.values())))
+    by = f"by the {len(took.seconds):,} cells in {kept}"
+    return text + f"about {clock(math.fsum(known) + missing)} on one core, {by}"
+
+
+def guessed(seconds: float) -> str:
+    """A time that nothing but a count of right-hand sides speaks for."""
+    return f"at a guess {clock(seconds)} on one core, but ten times as long is possible"
+
+
+def clock(seconds: float) -> str:
+    """A time as one says it."""
+    if seconds < 0.05:
+        return "less than 0.1 s"
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def _alike(plan: Plan, took: journal.Timed) -> bool:
+    """Whether cells were computed as accurately as they are to be now, and by the same engine."""
+    asked = plan.study.accuracy
+    return took.fingerprint.get("rtol") == asked.rtol and took.fingerprint.get("engine") == (
+        asked.engine
+    )

@@ -1,0 +1,16 @@
+"""What is so unless told otherwise. Nothing else is imported here: the command line states it in
+its help, which answers at once.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+#: Directory of results.
+OUTPUT = Path("outputs")
+#: Formats of results; the first is the usual one.
+FORMATS = ("netcdf", "zarr")
+#: Formats of figures, by the ending of the file; the first is the usual one.
+FIGURES = ("png", "pdf", "svg")
+#: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
+TIME_LIMIT = 600.0

@@ -1,0 +1,80 @@
+"""How far a run has come: a bar on a terminal and in a notebook, lines everywhere else."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from rich import progress as bars
+from rich.console import Console
+
+from rsfstudy.compute.runner import Progress
+from rsfstudy.motion.engines import compiled_engine, compiling
+from rsfstudy.slider.scene import Scene
+
+#: Lines of a whole run, where there is no bar.
+_LINES = 10
+
+
+@contextlib.contextmanager
+def shown(name: str, show: bool) -> Iterator[Progress]:
+    """What shows how far the run of a study has come, on the standard error."""
+    console = Console(stderr=True)
+    if not show:
+        yield lambda _done, _all: None
+    elif console.is_terminal or console.is_jupyter:
+        with _bar(name, console) as update:
+            yield update
+    else:
+        yield _lines(name, console)
+
+
+@contextlib.contextmanager
+def _bar(name: str, console: Console) -> Iterator[Progress]:
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TextColumn("cells"),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
+    )
+    bar = bars.Progress(*columns, console=console)
+    task = bar.add_task(name, total=None)
+
+    def update(done: int, total: int) -> None:
+        bar.start()  # only now, because a run may fail before its first report
+        bar.update(task, completed=done, total=total)
+
+    try:
+        yield update
+    finally:
+        bar.stop()
+
+
+def _lines(name: str, console: Console) -> Progress:
+    """A line for each tenth of the cells, for log files and pipes."""
+    began, told = time.monotonic(), -1
+
+    def update(done: int, total: int) -> None:
+        nonlocal told
+        if (part := _LINES * done // total) > told:
+            told = part
+            seconds = time.monotonic() - began
+            text = f"{name}: {done:,} of {total:,} cells after {seconds:.0f} s"
+            console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    return update
+
+
+def compile_with_notice(examples: Sequence[Scene], show: bool) -> None:
+    """Compile what such scenes need, before any cell is timed, and say how long it took."""
+    console, before = Console(stderr=True, quiet=not show), replace(compiling)
+    with console.status("compiling the equations ..."):
+        for scene in examples:
+            compiled_engine().prepare(scene)
+    programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
+    if programs:
+        console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")

@@ -1,0 +1,150 @@
+"""What commands print of numbers: the headline of a results file, and how two files compare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from rich import box
+from rich.table import Column, Table
+
+from rsfstudy.console import console
+from rsfstudy.declare.wording import listed, short
+from rsfstudy.errors import brief
+from rsfstudy.files import numbers
+from rsfstudy.files.contents import provenance
+from rsfstudy.files.side_by_side import Comparison
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage
+
+#: Most cells of a lattice that are shown, and most that ended otherwise.
+_MOST_CELLS, _MOST_ENDS = 24, 10
+#: Most characters of a value that differs.
+_MOST_CHARACTERS = 60
+
+
+def headline(dataset: xr.Dataset) -> None:
+    """Print the headline along the axes, with its error estimate and how each cell ended."""
+    name = numbers.headline(dataset)
+    if name is None:
+        return
+    status = dataset["status"]
+    dims = [str(d) for d in status.dims]
+    at = numbers.sample({d: status.sizes[d] for d in dims}, _MOST_CELLS)
+    shown = [n for n in (name, f"{name}_error", "status") if n in dataset]
+    few = dataset[shown].isel(at).transpose(*dims).load()
+    has_error = f"{name}_error" in few
+    others = bool((few["status"] != int(Status.OK)).any())
+    table = Table(
+        *(Column(d, overflow="fold") for d in dims),
+        Column(name, justify="right", overflow="fold"),
+        *([Column("error", justify="right")] if has_error else []),
+        *(["status"] if others else []),
+        box=box.SIMPLE_HEAD,
+    )
+    labels = {int(s): s.label for s in Status}
+    for index in np.ndindex(few["status"].shape):
+        cell = few.isel(dict(zip(dims, index, strict=True)))
+        row = [short(cell[d].item()) for d in dims]
+        row.append(_number(cell[name].item()))
+        row += [_number(cell[f"{name}_error"].item(), ".1e")] if has_error else []
+        row += [labels[int(cell["status"])]] if others else []
+        table.add_row(*row)
+    console.print(f"\n{_caption(dataset, name, few['status'].size)}")
+    console.print(table)
+
+
+def _caption(dataset: xr.Dataset, name: str, shown: int) -> str:
+    """What the headline is, in which units, and how much of it is shown."""
+    about, cells = dataset[name].attrs, dataset["status"].size
+    units = about.get("scale") or about.get("units", "1")
+    text = about.get("long_name", name) + (f", in {units}" if units != "1" else "")
+    return text if shown == cells else f"{text} ({shown} of {cells:,} cells)"
+
+
+def _number(value: float, form: str = ".8g") -> str:
+    return "-" if np.isnan(value) else format(value, form)
+
+
+# ---- two files ----------------------------------------------------------------------------------
+
+
+def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Comparison) -> int:
+    """Print how two results files compare; 1 where a number or a status differs beyond the error
+    estimates, or there is nothing to compare.
+    """
+    for letter, file, dataset in zip("AB", files, datasets, strict=True):
+        about = provenance(dataset)
+        console.print(f"{letter}: {file}, {about['time']}, {about['command']}")
+    _pairs("declaration", found.declaration)
+    _pairs("made by", found.origin)
+    _cells(found)
+    _ends(found.statuses)
+    _agreement(found.numbers)
+    for why in dict.fromkeys(found.left_out.values()):
+        names = [name for name, reason in found.left_out.items() if reason == why]
+        console.print(f"not compared, because {why}: {', '.join(names)}")
+    console.print(_verdict(found), style="green" if found.agrees else "red")
+    return 0 if found.agrees else 1
+
+
+def _pairs(title: str, pairs: Mapping[str, tuple[Any, Any]]) -> None:
+    """Print what is not the same in both."""
+    table = Table(Column(f"{title} differs", overflow="fold"), "A", "B", box=box.SIMPLE_HEAD)
+    for name, values in pairs.items():
+        table.add_row(name, *(brief(short(value), _MOST_CHARACTERS) for value in values))
+    if pairs:
+        console.print(table)
+
+
+def _cells(found: Comparison) -> None:
+    """Print which cells both have, and which only one."""
+    both, first, second = found.cells
+    console.print(f"{both:,} cells in both, {first:,} only in A, {second:,} only in B")
+    for axis, alone in found.points.items():
+        for letter, points in zip("AB", alone, strict=True):
+            if points:
+                console.print(f"{axis} only in {letter} ({len(points)}): {listed(points)}")
+
+
+def _ends(statuses: pd.DataFrame) -> None:
+    """Print the cells that ended otherwise."""
+    if statuses.empty:
+        return
+    table = Table("cell", "A", "B", box=box.SIMPLE_HEAD)
+    for row in statuses[:_MOST_ENDS].to_dict("records"):
+        *place, (_, first), (_, second) = row.items()
+        table.add_row(", ".join(f"{n} = {short(v)}" for n, v in place), first, second)
+    console.print(table)
+    if len(statuses) > _MOST_ENDS:
+        console.print(f"and {len(statuses) - _MOST_ENDS} more")
+
+
+def _agreement(frame: pd.DataFrame) -> None:
+    """Print the numbers that have an error estimate, and the others that are not the same."""
+    table = Table(
+        Column("variable", overflow="fold"),
+        *(Column(n, justify="right") for n in ("values", "same", "beyond errors")),
+        Column("largest gap", justify="right"),
+        box=box.SIMPLE_HEAD,
+    )
+    for row in frame.to_dict("records"):
+        known = not np.isnan(row["beyond_errors"])
+        result = coverage(row["variable"]) == "modelResult"
+        if result and (known or row["identical"] < row["values"]):
+            beyond = f"{row['beyond_errors']:.0f}" if known else "no estimate"
+            gap = _number(row["largest_difference"], ".3g")
+            table.add_row(row["variable"], str(row["values"]), str(row["identical"]), beyond, gap)
+    console.print(table)
+
+
+def _verdict(found: Comparison) -> str:
+    if not found.cells[0]:
+        return "nothing to compare: no finished cell is in both"
+    wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
+    wrong += [f"{len(found.statuses)} cells ended otherwise"] if len(found.statuses) else []
+    return "; ".join(wrong) or "nothing differs beyond error estimates"

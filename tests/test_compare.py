@@ -1,0 +1,213 @@
+"""Two files side by side: what differs in declaration, origin, statuses and numbers, and whether
+beyond error estimates; cells are matched by their places on the axes.
+"""
+
+import json
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from running import call, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import store
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.reduce import LinearFit
+from rsfstudy.status import Status
+
+NUMBER = "critical_stiffness"
+RATIOS = [1.5, 2.0, 2.5, 3.0]
+
+
+def study(*axes, measure=None, **fields):
+    return Study(
+        name="stiffness",
+        title="Critical stiffness",
+        base=Scene(**fields),
+        axes=[*axes, Axis("b_over_a", RATIOS)],
+        measure=measure or LinearStability(),
+    )
+
+
+@pytest.fixture(scope="module")
+def computed():
+    return run(study(Axis("law", ["slip", "slowness"])))
+
+
+@pytest.fixture
+def two(computed):
+    return computed.copy(deep=True), computed.copy(deep=True)
+
+
+def row(found, name=NUMBER):
+    return found.numbers.set_index("variable").loc[name]
+
+
+def test_the_same_agree(two):
+    found = rsfstudy.compare(*two)
+    assert found.agrees
+    assert found.cells == (8, 0, 0)
+    assert (found.numbers["values"] == found.numbers["identical"]).all()
+    assert (found.declaration, found.origin, found.points, found.left_out) == ({}, {}, {}, {})
+
+
+@pytest.mark.parametrize(("part", "beyond"), [(0.9, 0), (1.1, 1)])
+def test_numbers_are_held_against_the_sum_of_both_errors(two, part, beyond):
+    first, second = two
+    first[f"{NUMBER}_error"][1, 2], second[f"{NUMBER}_error"][1, 2] = 1e-5, 3e-5
+    second[NUMBER][1, 2] += part * 4e-5
+    found = rsfstudy.compare(first, second)
+    assert row(found)["beyond_errors"] == beyond
+    assert row(found)["identical"] == 7
+    assert row(found)["largest_difference"] == pytest.approx(part * 4e-5)
+    assert found.agrees == (not beyond)
+
+
+def test_a_number_that_one_lacks_is_beyond_any_error(two):
+    two[1][NUMBER][0, 0] = np.nan
+    assert row(rsfstudy.compare(*two))["beyond_errors"] == 1
+
+
+def test_statuses_that_differ_are_named(two):
+    two[1]["status"][1, 0] = int(Status.NO_STEADY_STATE)
+    found = rsfstudy.compare(*two)
+    assert not found.agrees
+    (ended,) = found.statuses.to_dict("records")
+    assert ended == {
+        "law": "slowness",
+        "b_over_a": 1.5,
+        "first": "ok",
+        "second": "no_steady_state",
+    }
+
+
+def test_cells_are_matched_by_their_places(two):
+    """In another order, on axes that rounding has moved; the others are counted and named."""
+    first, second = two
+    second = second.isel(b_over_a=[3, 1, 0], law=[1])
+    second = second.assign_coords(b_over_a=second.b_over_a * (1.0 + 2e-16))
+    first = first.isel(b_over_a=[0, 1, 2])
+    found = rsfstudy.compare(first, second)
+    assert found.cells == (2, 4, 1)
+    assert row(found)["identical"] == 2
+    assert found.points["law"] == (["slip"], [])
+    assert found.points["b_over_a"] == ([2.5], pytest.approx([3.0]))
+    assert found.agrees
+
+
+def test_cells_that_one_has_not_computed_are_not_compared(two):
+    two[1]["status"][0, :], two[1][NUMBER][0, :] = int(Status.PENDING), np.nan
+    found = rsfstudy.compare(*two)
+    assert found.cells == (4, 4, 0)
+    assert found.agrees
+
+
+def test_without_common_cells_nothing_agrees(two):
+    first, second = two[0].isel(b_over_a=[0]), two[1].isel(b_over_a=[1])
+    assert not rsfstudy.compare(first, second).agrees
+
+
+def test_an_axis_that_the_other_lacks_is_matched_by_its_fixed_value(computed):
+    fixed = run(study(law="slowness"))
+    for pair in ((computed, fixed), (fixed, computed)):
+        found = rsfstudy.compare(*pair)
+        assert sorted(found.cells) == [0, 4, 4]
+        assert row(found)["identical"] == 4
+    named = study(Axis("case", {"one": {"law": "slip"}, "two": {"law": "slowness"}}))
+    with pytest.raises(InvalidValue, match="axis = 'case': is an axis of one of the two"):
+        rsfstudy.compare(fixed, run(named))
+
+
+def test_reductions_of_other_cells_are_left_out(computed):
+    whole = study(Axis("law", ["slip", "slowness"]))
+    fit = LinearFit(name="slope", of=NUMBER, on="b_over_a")
+    whole = replace(whole, reductions=[fit])
+    first, second = run(whole), run(whole.with_(b_over_a=RATIOS[:3]))
+    assert "slope" in rsfstudy.compare(first, second).left_out
+    assert "slope" in set(rsfstudy.compare(first, first).numbers["variable"])
+    fewer = run(whole.with_(law=["slip"]))
+    assert row(rsfstudy.compare(first, fewer), "slope")["values"] == 1
+
+
+@dataclass(frozen=True)
+class Bare(Measure):
+    """A measure without error estimates."""
+
+    factor: float = 1.0
+    name: ClassVar[str] = "bare"
+    headline = "total"
+    typical_work = 1
+
+    @property
+    def variables(self):
+        return {"total": (), "beside": ()}
+
+    def find(self, scene, accuracy, meter):
+        total = self.factor * scene.b_over_a
+        return Outcome(Status.OK, {"total": total, "beside": 2.0 * total})
+
+
+def test_a_headline_without_an_estimate_counts_as_exact():
+    first, second = (run(study(measure=Bare(factor))) for factor in (1.0, 1.0 + 1e-9))
+    found = rsfstudy.compare(first, second)
+    assert found.beyond_errors == ["total"]
+    assert np.isnan(row(found, "beside")["beyond_errors"])
+    assert found.declaration["measure.factor"] == (1.0, 1.0 + 1e-9)
+
+
+def test_declaration_and_origin(two):
+    first, second = two
+    about = json.loads(second.attrs["provenance"])
+    about["versions"]["numpy"] = "0.1"
+    about["machine"] = "an abacus"
+    declared = json.loads(second.attrs["declaration"])
+    declared["accuracy"]["rtol"] = 1e-5
+    changed = {"provenance": json.dumps(about), "declaration": json.dumps(declared)}
+    found = rsfstudy.compare(first, second.assign_attrs(changed))
+    assert found.declaration == {"accuracy.rtol": (1e-7, 1e-5)}
+    assert found.origin["machine"][1] == "an abacus"
+    assert found.agrees
+
+
+# ---- the command --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def files(two, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    first, second = two
+    second[NUMBER][0, 1] += 1e-3
+    second["status"][1, 0] = int(Status.NO_STEADY_STATE)
+    places = tmp_path / "first.nc", tmp_path / "second.nc"
+    for dataset, place in zip((first, second.isel(b_over_a=[0, 1])), places, strict=True):
+        store.write(dataset, place)
+    return places
+
+
+def test_the_command_says_what_differs(files):
+    ran = call("compare", *files)
+    assert ran.returncode == 1, ran.stderr
+    for words in (
+        "4 cells in both, 4 only in A, 0 only in B",
+        "b_over_a only in A (2): 2.5,3",
+        "law = slowness, b_over_a = 1.5",
+        "no_steady_state",
+        f"{NUMBER} differs beyond error estimates; 1 cells ended otherwise",
+    ):
+        assert words in ran.stdout
+
+
+def test_the_command_says_that_nothing_differs(files):
+    ran = call("compare", files[0], files[0])
+    assert ran.returncode == 0, ran.stderr
+    assert "nothing differs beyond error estimates" in ran.stdout
+
+
+def test_exit_statuses(files, tmp_path):
+    assert call("compare", files[0]).returncode == 2
+    assert call("compare", files[0], "nothing").returncode == 2
+    assert call("compare", files[0], tmp_path / "missing.nc").returncode == 1

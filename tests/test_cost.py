@@ -1,0 +1,73 @@
+"""What a study will cost is told as its cells took last, or called a guess."""
+
+import sqlite3
+from dataclasses import replace
+
+import pytest
+from running import SMALL, call, run
+
+from rsfstudy import cost
+from rsfstudy.compute.plan import Plan
+from rsfstudy.motion.accuracy import Accuracy
+
+FILE = "small.cells.sqlite"
+
+
+def words(study, output):
+    return cost.in_words(Plan(study), output)
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A journal whose cells took 10 s each."""
+    output = tmp_path_factory.mktemp("kept")
+    run(SMALL, output=output, rtol=1e-4)
+    with sqlite3.connect(output / FILE) as db:
+        db.execute("UPDATE cells SET seconds = 10.0")
+    db.close()
+    return output
+
+
+LOOSE = replace(SMALL, accuracy=Accuracy(1e-4))
+
+
+def test_the_same_cells_take_what_they_took(kept):
+    assert f"took 1 min 0 s on one core here last ({kept / FILE})" in words(LOOSE, kept)
+    assert "took 20 s on one core here last" in words(LOOSE.with_(b_over_a=[2.5]), kept)
+
+
+def test_other_cells_take_as_long_as_those_that_are_there(kept):
+    more = LOOSE.with_(b_over_a=[2.0, 2.2, 2.4, 2.6])
+    assert f"about 1 min 20 s on one core, by the 6 cells in {kept / FILE}" in words(more, kept)
+
+
+def test_without_cells_of_that_accuracy_it_is_a_guess(kept, tmp_path):
+    for study, output in ((SMALL, kept), (LOOSE, tmp_path)):
+        assert "at a guess" in words(study, output)
+        assert "last" not in words(study, output)
+
+
+def test_a_journal_that_cannot_be_read_is_passed_over(tmp_path):
+    (tmp_path / FILE).write_text("something else")
+    assert "at a guess" in words(LOOSE, tmp_path)
+
+
+def test_show_tells_it(tmp_path):
+    few = ("rate_step_boundary", "--set", "b_over_a=2", "--output", tmp_path)
+    assert "at a guess" in " ".join(call("show", *few).stdout.split())
+    assert call("run", *few, "--serial").returncode == 0
+    assert "on one core here last" in " ".join(call("show", *few).stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (0.04, "less than 0.1 s"),
+        (9.94, "9.9 s"),
+        (59.4, "59 s"),
+        (200.0, "3 min 20 s"),
+        (7500.0, "2 h 5 min"),
+    ],
+)
+def test_a_time_as_one_says_it(seconds, said):
+    assert cost.clock(seconds) == said

@@ -1,0 +1,54 @@
+"""How far a run has come: lines in a log file, a bar on a terminal, nothing where not wanted."""
+
+import io
+import re
+
+import pytest
+from running import call
+
+from rsfstudy import progress
+
+RUN = ("run", "rate_step_boundary", "--serial", "--set", "case=constant normal stress")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def told(stream: io.StringIO, monkeypatch, done: list[int], show: bool = True) -> str:
+    monkeypatch.setattr("sys.stderr", stream)
+    with progress.shown("holds", show) as update:
+        for count in done:
+            update(count, done[-1])
+    return stream.getvalue()
+
+
+def test_a_log_file_gets_a_line_for_each_tenth(monkeypatch):
+    lines = told(io.StringIO(), monkeypatch, list(range(1001))).splitlines()
+    assert [re.sub(r"\d+ s$", "", line) for line in lines] == [
+        f"holds: {count:,} of 1,000 cells after " for count in range(0, 1001, 100)
+    ]
+
+
+def test_few_cells_are_told_as_they_come(monkeypatch):
+    assert len(told(io.StringIO(), monkeypatch, [0, 1, 2, 2, 3]).splitlines()) == 4
+
+
+def test_a_terminal_gets_a_bar(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    said = told(Terminal(), monkeypatch, [0, 5, 10])
+    assert "\x1b[" in said
+    assert "10/10" in said
+
+
+@pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
+def test_quiet_is_quiet(stream, monkeypatch):
+    assert told(stream, monkeypatch, [0, 10], show=False) == ""
+
+
+def test_the_command_tells_it_on_the_standard_error(tmp_path):
+    ran = call(*RUN, "--set", "b_over_a=2,3", "--output", tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "rate_step_boundary: 2 of 2 cells after" in ran.stderr
+    assert "cells after" not in ran.stdout
