@@ -238,6 +238,17 @@ def test_rises_under_a_load_point_that_moves(fields, published):
     assert held.status is Status.STABLE_FOR_ALL_STEPS
 
 
+def test_where_a_rise_makes_sliding_neutral_the_error_says_so():
+    """The boundary is where orbits all but close, 1e-7 from there: loose motions cannot tell how
+    far.
+    """
+    scene = Scene(**IMPOSED, alpha=0.56, stiffness_ratio=1.3, load_velocity_ratio=1.0)
+    value, error, _outcome = found(scene, RISE, Accuracy(1e-5))
+    tight, its_error, _outcome = found(scene, RISE)
+    assert abs(value - tight) <= error + its_error
+    assert error < 1e-4
+
+
 def test_a_rise_may_take_more_from_the_state_than_it_gives_to_friction():
     """alpha ln s beyond mu_* (1 - 1/s): slip rate jumps up, to the norm where s is 3.5."""
     value, _error, outcome = found(Scene(**IMPOSED, alpha=0.56, stiffness_ratio=3.0), RISE)

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from scipy.optimize import brentq
 
-from rsfstudy.boundaries.swing import swing
+from rsfstudy.boundaries.swing import orbits_may_close, stability_margin, swing
 from rsfstudy.boundaries.touching import cycle_misfit, displacement_on_path, rate_step_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.regimes import on_slow_manifold
@@ -110,6 +110,12 @@ class Steps:
         takes time to rise to that after the step.
         """
         return False
+
+    def blur(self, size: float, rtol: float) -> float:
+        """Relative error of a size that motions find where sliding is neutral after the step, which
+        they take it for a little on either side.
+        """
+        return 0.0
 
     def _largest(self) -> float:
         raise TypeError(f"{type(self).__name__} steps nothing")
@@ -358,6 +364,12 @@ class NormalStressSteps(ShotSteps):
         scene = self.scene_at(size)
         behind = _falls_behind(scene)[0] if scene.has_mass else 0.0
         return behind > 0.1 * rtol * size * scene.mu_star / scene.a
+
+    def blur(self, size: float, rtol: float) -> float:
+        """Critical stiffness goes with normal stress, and its logarithm with the size."""
+        scene = self.scene_at(size)
+        near = orbits_may_close(scene) and abs(stability_margin(scene)) < 10.0 * rtol
+        return 2.0 * rtol / size if near else 0.0
 
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rate just after the critical step."""

@@ -256,7 +256,9 @@ class CriticalStep(Measure):
                 raise
             return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
         # the swings that found it would confirm their own errors: the verdicts come from others
-        boundary = Boundary(math.exp(log_size), accuracy.rtol, by_motions=True)
+        size = math.exp(log_size)
+        error = accuracy.rtol + steps.blur(size, accuracy.rtol)
+        boundary = Boundary(size, error, by_motions=True)
         return self._verified(steps, boundary, accuracy.refined(), meter)
 
     def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
