@@ -37,13 +37,14 @@ def critical_step(
     ----------
     scene : Scene
         The slider; whatever value it holds for the quantity sought is ignored.
-    of : {"load_velocity_ratio", "displacement_step"}
-        What is stepped. After a displacement step the load point is held unless the scene states
-        its `load_velocity_ratio`.
+    of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
+        What is stepped. After a step of displacement or of normal stress the load point is held
+        unless the scene states its `load_velocity_ratio`. Steps of normal stress, which trigger by
+        a fall (`direction="down"`), need normal stress that is "imposed" or "variable".
     direction : {"up", "down"}
         Steps that increase, or decrease.
     rtol : float
-        Relative accuracy of V_0/V_* - 1, or of the displacement.
+        Relative accuracy of V_0/V_* - 1, of the displacement, or of the logarithm of normal stress.
     engine : {"scipy", "compiled"}
         What integrates motions; compiled, which needs Numba, is much faster.
     budget : int

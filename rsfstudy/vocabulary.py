@@ -36,6 +36,13 @@ _QUANTITIES = (
         "D_c",
     ),
     Quantity(
+        "critical_normal_stress_step",
+        r"$\Delta\sigma/\sigma_*$",
+        "1",
+        "critical step of imposed normal stress for triggered instability",
+        "sigma_*",
+    ),
+    Quantity(
         "slip_rate_after_step",
         "$V(0^+)/V_*$",
         "1",

@@ -80,6 +80,10 @@ ENOUGH = {
         "stiffness_ratio": [0.4, 0.8],
         "load_velocity_ratio": 10.0 ** np.linspace(0.0, 3.0, 4),
     },
+    "triggering": {
+        "case": ["imposed, alpha = 0", "imposed, alpha = 0.56", "inclined, alpha = 0.56"],
+        "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
+    },
     "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
     "two_states": {
         "stiffness_ratio": [0.84, 0.8531, 0.8567, 0.8655, 0.8659, 0.8663, 0.8667, 0.9, 0.95, 1.02]

@@ -121,8 +121,10 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
 
 
 def friction_acts_alone(scene: Scene) -> bool:
-    """Whether effective normal stress is constant, and only friction damps."""
-    varies = scene.parts.normal_stress.effects or scene.parts.fluid.effects
+    """Whether effective normal stress is constant once the loading has changed it, and only
+    friction damps.
+    """
+    varies = scene.parts.normal_stress.follows_friction or scene.parts.fluid.effects
     return not varies and not scene.dynamics.damping(0.0)
 
 
@@ -132,13 +134,20 @@ def orbits_may_close(scene: Scene) -> bool:
     return law.orbits_close and not law.feels_stress and friction_acts_alone(scene)
 
 
+def ratio_after(scene: Scene) -> float:
+    """Stiffness over the critical one at V_* and at the normal stress after the step, where
+    friction acts alone: critical stiffness is in proportion to normal stress.
+    """
+    return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
+
+
 def neutral(scene: Scene, within: float) -> bool:
     """Whether stiffness is so close to the critical one, both at V_* and at the load point
     velocity, that growth and decay cannot be told apart: by most laws it is critical at every rate
     or at none, where friction acts alone. Where all orbits close at critical stiffness, that is
     known; with the load point held there are none.
     """
-    off = abs(scene.stiffness_ratio - 1.0)
+    off = abs(ratio_after(scene) - 1.0)
     known = scene.log_load_rate == -math.inf or (off == 0.0 and orbits_may_close(scene))
     close = friction_acts_alone(scene) and off < within and not known
     return close and abs(stability_margin(scene)) < within

@@ -1,5 +1,5 @@
-"""The critical step: the smallest step of load point velocity or displacement that triggers
-instability.
+"""The critical step: the smallest step of load point velocity, load point displacement or normal
+stress that triggers instability.
 
 A step is critical when the peak slip rate of the motion it sets off just touches the instability
 norm. Where mass hardly acts up to the norm, the touching path is known at its end: ln V is at the
@@ -18,11 +18,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import toms748
 
-from rsfstudy.boundaries.sought import DisplacementSteps, RateSteps, Steps
+from rsfstudy.boundaries.sought import DisplacementSteps, NormalStressSteps, RateSteps, Steps
 from rsfstudy.boundaries.swing import (
     Swing,
     neutral,
     orbits_may_close,
+    ratio_after,
     settles,
     stability_margin,
     swing,
@@ -39,6 +40,7 @@ from rsfstudy.status import Status
 KINDS: Mapping[str, type[Steps]] = {
     "load_velocity_ratio": RateSteps,
     "displacement_step": DisplacementSteps,
+    "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
 
@@ -51,28 +53,36 @@ _BY_CHANCE = 0.005
 #: Sizes of smaller steps that are looked at where stability may come and go between them.
 _SIZES_BETWEEN = 24
 
+#: Excess of a motion whose first peak is beyond a limit cycle that touches the norm.
+_AT_ONCE = 0.1
+
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
 
 
 @dataclass(frozen=True)
 class Boundary:
-    """A boundary in step size with its numerical error, both before verification."""
+    """A boundary in step size with its numerical error, both before verification; found by motions,
+    or as a limit cycle.
+    """
 
     size: float
     relative_error: float
     by_motions: bool = False
+    of_cycle: bool = False
 
 
 @dataclass(frozen=True)
 class CriticalStep(Measure):
-    """Critical step of the load point.
+    """Critical step of the load point, or of normal stress.
 
     Parameters
     ----------
-    of : {"load_velocity_ratio", "displacement_step"}
-        What is stepped, whatever value the scene holds for it. A load point that is stepped in
-        displacement is held afterwards (V_0 = 0) unless the scene states its `load_velocity_ratio`.
+    of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
+        What is stepped, whatever value the scene holds for it. After a step of displacement or of
+        normal stress the load point is held (V_0 = 0) unless the scene states its
+        `load_velocity_ratio`. Normal stress that is constant has no steps; falls of it trigger
+        (direction "down", and a negative number).
     direction : {"up", "down"}
         Steps that increase, or decrease.
     """
@@ -124,7 +134,7 @@ class CriticalStep(Measure):
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        below = not orbits_may_close(scene) or scene.stiffness_ratio < 1.0
+        below = not orbits_may_close(scene) or ratio_after(scene) < 1.0
         if below and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED,
@@ -170,6 +180,8 @@ class CriticalStep(Measure):
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
                 return Outcome(Status.OK, values)
+            if boundary.of_cycle and below.reached and below.excess > _AT_ONCE:
+                break
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
@@ -244,7 +256,9 @@ class CriticalStep(Measure):
                 raise
             return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
         # the swings that found it would confirm their own errors: the verdicts come from others
-        boundary = Boundary(math.exp(log_size), accuracy.rtol, by_motions=True)
+        size = math.exp(log_size)
+        error = accuracy.rtol + steps.blur(size, accuracy.rtol)
+        boundary = Boundary(size, error, by_motions=True)
         return self._verified(steps, boundary, accuracy.refined(), meter)
 
     def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
@@ -291,7 +305,8 @@ def _from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boun
         return None
     boundary = _boundary(steps, steps.sizes_of_cycle, accuracy, meter)
     # a cycle attracts little: the two errors may have much in common
-    return boundary and replace(boundary, relative_error=5.0 * boundary.relative_error)
+    error = 5.0 * boundary.relative_error if boundary else math.nan
+    return boundary and replace(boundary, relative_error=error, of_cycle=True)
 
 
 def _boundary(

@@ -179,15 +179,17 @@ def steps(
         return changes
 
     def started(unknowns: Vector) -> OdeSolver:
-        return method(
-            rate,
-            0.0,
-            unknowns,
-            -math.inf if backward else math.inf,
-            rtol=tolerance,
-            atol=tolerance * np.asarray(equations.scales),
-            max_step=LONGEST_STEP,
-        )
+        # how long a first step may be is asked of a trial step too
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return method(
+                rate,
+                0.0,
+                unknowns,
+                -math.inf if backward else math.inf,
+                rtol=tolerance,
+                atol=tolerance * np.asarray(equations.scales),
+                max_step=LONGEST_STEP,
+            )
 
     # what limits a step must differ between two tolerances whose results are to tell errors
     finer = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125

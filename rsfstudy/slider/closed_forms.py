@@ -6,6 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from scipy.optimize import brentq
+
+#: Points at which normal stress is looked at for a critical fall, and the smallest and the largest
+#: of them as sigma_*/sigma - 1.
+_FALLS, _SMALLEST_FALL, _LARGEST_FALL = 400, 1e-9, 1e3
+
 
 @dataclass(frozen=True)
 class ClosedForm:
@@ -63,6 +69,57 @@ def velocity_step(b_over_a: float, exponent: float) -> float:
     return 1.0 + 1.0 / ((1.0 - exponent) * (b_over_a - 1.0))
 
 
+def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
+    """What a small change of normal stress is to be multiplied by to be a change of Coulomb stress:
+    ``mu' = mu_* - alpha (1 - a/b)``, because a fall of normal stress also strengthens the state.
+    """
+    return mu_star - alpha * (1.0 - 1.0 / b_over_a)
+
+
+def threshold(exponent: float, pull: float) -> float:
+    """``u = Theta/b + ln V`` at which the family of laws falls no faster than a spring pulls,
+    ``h(u) = -pull``; infinite where it never does.
+    """
+    product = exponent * pull
+    if product >= 1.0:
+        return math.inf
+    return -math.log1p(-product) / exponent if exponent else pull
+
+
+def after_fall(mu_star: float, a: float, b_over_a: float, alpha: float, quotient: float) -> float:
+    """``u = Theta/b + ln V`` just after steady sliding at V_* has its normal stress changed to
+    sigma_*/quotient: ``mu_* (q - 1)/a - alpha (1/a - 1/b) ln q``.
+    """
+    taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(quotient)
+    return (mu_star * (quotient - 1.0) - taken) / a
+
+
+def normal_stress_step(
+    mu_star: float, a: float, b_over_a: float, alpha: float, exponent: float, ratio: float
+) -> float:
+    """Critical fall of imposed normal stress, over sigma_* and negative, by the family of laws:
+    where `after_fall` first is at the `threshold` of ``q k/k_cr``; NaN where it never is.
+
+    With the load point at rest u obeys ``du/d(slip) = (1 - b/a)[h(u) + q k/k_cr]`` over D_c: where
+    it begins above the threshold, slip rate grows without bound.
+    """
+
+    def excess(growth: float) -> float:
+        quotient = 1.0 + growth
+        needed = threshold(exponent, quotient * ratio)
+        return after_fall(mu_star, a, b_over_a, alpha, quotient) - needed
+
+    factor = (_LARGEST_FALL / _SMALLEST_FALL) ** (1.0 / _FALLS)
+    smaller = _SMALLEST_FALL
+    while smaller < _LARGEST_FALL:
+        larger = factor * smaller
+        if excess(larger) >= 0.0:
+            growth = float(brentq(excess, smaller, larger, xtol=1e-18, rtol=1e-14))
+            return -growth / (1.0 + growth)
+        smaller = larger
+    return math.nan
+
+
 FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_at_critical_stiffness": ClosedForm(
         "V_0/V_* = 1 + a/(b-a)",
@@ -94,6 +151,28 @@ FORMS: Mapping[str, ClosedForm] = {
         velocity_step,
         "invariant line of the orbits at k = k_cr, constant normal stress, infinite norm; eps = 0 "
         "is that of Gu et al. (1984)",
+    ),
+    "normal_stress_step": ClosedForm(
+        "1/q - 1 where mu_* (q-1)/a - alpha (1/a - 1/b) ln q = q k/k_cr",
+        ("mu_star", "a", "b_over_a", "alpha", "stiffness_ratio"),
+        lambda mu_star, a, b_over_a, alpha, ratio: normal_stress_step(
+            mu_star, a, b_over_a, alpha, 0.0, ratio
+        ),
+        "h(u*) = -q k/k_cr, q = sigma_*/sigma, slip law, load point held, infinite norm",
+    ),
+    "normal_stress_step_of_the_family": ClosedForm(
+        "1/q - 1 where mu_* (q-1)/a - alpha (1/a - 1/b) ln q = -ln(1 - eps q k/k_cr)/eps",
+        ("mu_star", "a", "b_over_a", "alpha", "law_exponent", "stiffness_ratio"),
+        normal_stress_step,
+        "h(u*) = -q k/k_cr, q = sigma_*/sigma, load point held, infinite norm",
+    ),
+    "coulomb_normal_stress_step": ClosedForm(
+        "-a k/k_cr/[mu_* - alpha (1 - a/b)]",
+        ("mu_star", "a", "b_over_a", "alpha", "stiffness_ratio"),
+        lambda mu_star, a, b_over_a, alpha, ratio: (
+            -a * ratio / effective_friction(mu_star, b_over_a, alpha)
+        ),
+        "the same to first order, by any law: a change of Coulomb stress by a k/k_cr",
     ),
     "net_weakening": ClosedForm(
         "(a-b) sigma_*",

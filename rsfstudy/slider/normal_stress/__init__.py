@@ -31,6 +31,11 @@ class NormalStress(Part):
         return None
 
     @property
+    def follows_friction(self) -> bool:
+        """Whether normal stress changes while slip goes on, and not by the loading alone."""
+        return bool(self.effects)
+
+    @property
     def coupling(self) -> tuple[float, float] | None:
         """d sigma/d tau, and the effect alpha of normal stress on the state, if that is all."""
         return None

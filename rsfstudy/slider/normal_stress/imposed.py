@@ -29,6 +29,7 @@ class Imposed(StateEffect):
 
     name = "imposed"
     normal_stress = staticmethod(normal_stress)
+    follows_friction = False
 
     @property
     def coupling(self) -> tuple[float, float]:

@@ -1,0 +1,189 @@
+"""Three triggers of one slider, and whether a change of Coulomb stress predicts one from the other.
+
+A change of Coulomb stress is ``dtau - mu' dsigma``. A displacement step of the load point changes
+shear stress by K d, and normal stress by cot(phi) times that; a step of imposed normal stress, or
+of sigma_3, changes nothing else. To first order in k/k_cr both trigger at the same change of
+Coulomb stress, with mu' = mu_* - alpha (1 - a/b), by every law that falls with Theta/b + ln V. A
+step of load point velocity changes no stress at once; it is compared by that by which friction at
+V_0 exceeds friction at V_* before the state has changed, a ln(V_0/V_*).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy.boundaries.swing import settles
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.closed_forms import effective_friction
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: The triggers; the fall of normal stress comes first, which constant normal stress refuses.
+_FALL = CriticalStep(of="normal_stress_step", direction="down")
+_PULL, _FASTER = CriticalStep(of="displacement_step"), CriticalStep(of="load_velocity_ratio")
+TRIGGERS = (_FALL, _PULL, _FASTER)
+_ENDS = ("", "_error", "_stable", "_unstable")
+_STEPS = tuple(f"{trigger.headline}{end}" for trigger in TRIGGERS for end in _ENDS)
+_STRESSES = (
+    "coulomb_stress_of_displacement",
+    "coulomb_stress_of_normal_stress",
+    "direct_stress_of_velocity",
+    "coulomb_ratio",
+    "direct_ratio",
+)
+
+_SYMBOL = r"$\Delta\mathrm{CFS}/\sigma_*$"
+_QUANTITIES = (
+    Quantity(
+        "coulomb_stress_of_displacement",
+        _SYMBOL,
+        "1",
+        "change of Coulomb stress by the critical displacement step",
+        "sigma_*",
+    ),
+    Quantity(
+        "coulomb_stress_of_normal_stress",
+        _SYMBOL,
+        "1",
+        "change of Coulomb stress by the critical fall of normal stress",
+        "sigma_*",
+    ),
+    Quantity(
+        "coulomb_ratio",
+        r"$\Delta\mathrm{CFS}_\sigma/\Delta\mathrm{CFS}_\delta$",
+        "1",
+        "change of Coulomb stress by the critical fall of normal stress over that by the critical "
+        "displacement step",
+    ),
+    Quantity(
+        "direct_stress_of_velocity",
+        r"$a\,\ln(V_0/V_*)$",
+        "1",
+        "direct effect of the critical load point velocity step",
+        "sigma_*",
+    ),
+    Quantity(
+        "direct_ratio",
+        r"$a\sigma_*\ln(V_0/V_*)/\Delta\mathrm{CFS}_\delta$",
+        "1",
+        "direct effect of the critical load point velocity step over the change of Coulomb stress "
+        "by the critical displacement step",
+    ),
+    Quantity("effective_friction", r"$\mu'$", "1", "effective friction of Coulomb stress"),
+)
+
+
+@dataclass(frozen=True)
+class Triggers(Measure):
+    """Critical fall of normal stress, critical displacement step and critical velocity step, with
+    the changes of Coulomb stress that the first two are.
+
+    After the first two the load point is held, unless the scene states its `load_velocity_ratio`,
+    which the third looks for. A trigger without a critical step leaves its number out, and says why
+    in the message; the slider answers while the first two have theirs.
+    """
+
+    name: ClassVar[str] = "triggers"
+
+    @property
+    def headline(self) -> str:
+        return "coulomb_ratio"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        stresses = [f"{name}{end}" for name in _STRESSES for end in ("", "_error")]
+        return dict.fromkeys((*stresses, "effective_friction", *_STEPS, "critical_stiffness"), ())
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return _QUANTITIES
+
+    @property
+    def typical_work(self) -> int:
+        return 12_000
+
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        """As for a critical step."""
+        return _FALL.work_by_digits
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """One critical step after the other."""
+        coupling = scene.parts.normal_stress.coupling
+        if coupling is None:
+            text = "normal stress that follows a rule of its own has no one effective friction"
+            return Outcome(Status.NOT_APPLICABLE, message=text)
+        found = {trigger: _found(trigger, scene, accuracy, meter) for trigger in TRIGGERS}
+        values: dict[str, float] = {}
+        for outcome in found.values():
+            values |= {n: float(v) for n, v in outcome.values.items() if n in self.variables}
+        values |= _stresses(scene, *coupling, values)
+        told = [
+            f"{trigger.of}: {outcome.message or outcome.status.label}"
+            for trigger, outcome in found.items()
+            if outcome.status is not Status.OK or outcome.message
+        ]
+        ends = [outcome.status for outcome in found.values()]
+        failed = [end for end in ends if not end.is_answer]
+        lacking = [found[trigger].status for trigger in (_FALL, _PULL)]
+        lacking = [end for end in lacking if end is not Status.OK]
+        return Outcome(next(iter((*failed, *lacking)), Status.OK), values, "; ".join(told))
+
+
+def _found(trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    """A critical step, or the status of what ended the search. Where steady sliding at V_* is
+    unstable, any step of velocity triggers.
+    """
+    if trigger is _FASTER and not settles(_undisturbed(scene)):
+        text = "steady sliding at V_* is unstable already"
+        return Outcome(Status.UNSTABLE_AT_ANY_STEP, message=text)
+    try:
+        return trigger.find(scene, accuracy, meter)
+    except Halt as halt:
+        if halt.status is Status.WORK_BUDGET_SPENT:
+            raise
+        return Outcome(halt.status, message=str(halt))
+
+
+def _undisturbed(scene: Scene) -> Scene:
+    """The slider whose load point goes on at V_*."""
+    return scene.with_(load_velocity_ratio=1.0, displacement_step=0.0, normal_stress_step=0.0)
+
+
+def _stresses(
+    scene: Scene, cot_phi: float, alpha: float, values: Mapping[str, float]
+) -> dict[str, float]:
+    """What the triggers are as changes of stress, and how they compare."""
+    friction = effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
+    pulled = _times(scene.stiffness * (1.0 - friction * cot_phi), _PULL.headline, values)
+    fallen = _times(-friction, _FALL.headline, values)
+    velocity, error = _times(scene.a, _FASTER.headline, values)
+    ratio = velocity / scene.a
+    faster = scene.a * math.log(ratio) if ratio > 0.0 else math.nan, error / ratio
+    numbers = (pulled, fallen, faster, _quotient(fallen, pulled), _quotient(faster, pulled))
+    told = {"effective_friction": friction}
+    for name, (value, its_error) in zip(_STRESSES, numbers, strict=True):
+        told |= {name: value, f"{name}_error": its_error}
+    return told
+
+
+def _times(factor: float, name: str, values: Mapping[str, float]) -> tuple[float, float]:
+    """A number times a factor, and its error."""
+    value, error = values.get(name, math.nan), values.get(f"{name}_error", math.nan)
+    return factor * value, abs(factor) * error
+
+
+def _quotient(above: tuple[float, float], below: tuple[float, float]) -> tuple[float, float]:
+    """A quotient and its error, which those of both add up to."""
+    (value, error), (divisor, its_error) = above, below
+    if not divisor:
+        return math.nan, math.nan
+    ratio = value / divisor
+    return ratio, (error + abs(ratio) * its_error) / abs(divisor)

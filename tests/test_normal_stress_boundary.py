@@ -1,0 +1,345 @@
+"""Critical steps of normal stress: closed forms, limits, the three triggers as changes of stress,
+motions on either side, both engines, bad input.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import agreement
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.boundaries.swing import friction_acts_alone, neutral, orbits_may_close, swing
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import critical_step
+from rsfstudy.measures.critical_step import KINDS, CriticalStep
+from rsfstudy.measures.triggers import Triggers
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider import closed_forms, steady
+from rsfstudy.slider.equations import log_rate_at
+from rsfstudy.status import Status
+
+STEP, VALUE = "normal_stress_step", "critical_normal_stress_step"
+FALL, RISE = CriticalStep(of=STEP, direction="down"), CriticalStep(of=STEP)
+IMPOSED = {"normal_stress": "imposed"}
+
+
+def found(scene: Scene, measure: CriticalStep = FALL, accuracy: Accuracy | None = None):
+    """Value, error estimate and outcome; the search must succeed."""
+    outcome = measure(scene, accuracy or Accuracy())
+    assert outcome.status is Status.OK, outcome
+    return outcome.values[VALUE], outcome.values[f"{VALUE}_error"], outcome
+
+
+# ---- closed forms -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.56])
+@pytest.mark.parametrize(
+    ("law", "ratio"),
+    [("slip", 0.4), ("slip", 1.0), ("slip", 2.0), (0.5, 0.4), (0.5, 1.0), ("slowness", 0.5)],
+)
+def test_closed_forms(law, ratio, alpha):
+    """Load point held, norm so high that it hardly counts: within the error estimate, and what the
+    norm leaves of neighbours of the threshold, exp(-(b/a - 1) |h'(u*)| x/(q k^)) at ln V = x.
+    """
+    exponent = {"slip": 0.0, "slowness": 1.0}.get(law, law)
+    kind = {"law": "family", "law_exponent": law} if law == 0.5 else {"law": law}
+    scene = Scene(
+        **kind, **IMPOSED, alpha=alpha, stiffness_ratio=ratio, b_over_a=1.8, instability_norm=1e12
+    )
+    value, error, _outcome = found(scene)
+    numbers = (scene.mu_star, scene.a, scene.b_over_a, alpha)
+    exact = closed_forms.normal_stress_step(*numbers, exponent, ratio)
+    pull = ratio / (1.0 + exact)
+    forgetting = (scene.b_over_a - 1.0) * (1.0 - exponent * pull) * scene.log_norm_rate / pull
+    assert abs(value - exact) <= error + 5.0 * abs(exact) * math.exp(-forgetting)
+    if not exponent:
+        form = closed_forms.FORMS["normal_stress_step"].value
+        assert form(*numbers, ratio) == exact
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.5])
+def test_coulomb_stress_is_exact_for_the_slip_law_without_alpha(ratio):
+    """mu_* |dsigma| = a k/k_cr sigma_*, which is what a displacement step takes, K d."""
+    scene = Scene(**IMPOSED, alpha=0.0, stiffness_ratio=ratio, instability_norm=1e12)
+    value, error, _outcome = found(scene)
+    assert -scene.mu_star * value == pytest.approx(scene.a * ratio, abs=error + 1e-9 * scene.a)
+
+
+def test_an_extreme_law():
+    """Perrin, Rice and Zheng: its threshold is asinh(q k^)."""
+    scene = Scene(
+        law="perrin_rice_zheng", **IMPOSED, alpha=0.4, stiffness_ratio=2.0, instability_norm=1e12
+    )
+    value, error, _outcome = found(scene)
+    q = 1.0 / (1.0 + value)
+    start = closed_forms.after_fall(scene.mu_star, scene.a, scene.b_over_a, 0.4, q)
+    assert start == pytest.approx(math.asinh(2.0 * q), abs=(error + 1e-7 * abs(value)) / scene.a)
+
+
+def test_the_closed_form_takes_the_first_of_several_roots():
+    """Falls so large that critical stiffness falls below that of the spring are stable again by
+    the slowness law, where no norm is in the way; some stiffnesses leave none.
+    """
+    numbers = (0.76, 0.0145, 2.0, 0.0, 1.0)
+    first = closed_forms.normal_stress_step(*numbers, 0.9)
+    assert -0.06 < first < -0.05
+    last = 1.0 / 1.1105
+    assert closed_forms.after_fall(*numbers[:4], 1.0 / last) < closed_forms.threshold(
+        1.0, 0.9 / last
+    )
+    assert math.isnan(closed_forms.normal_stress_step(*numbers, 1.0))
+
+
+def test_what_is_left_where_the_law_never_lets_go():
+    """Slowness law, stiff spring: the fall whose jump alone reaches the norm."""
+    scene = Scene(law="slowness", **IMPOSED, stiffness_ratio=3.0, instability_norm=0.01)
+    value, _error, outcome = found(scene)
+    stepped = scene.with_(normal_stress_step=value)
+    assert log_rate_at(stepped, 0.0, 0.0) == pytest.approx(scene.log_norm_rate, rel=1e-8)
+    assert "jump" in outcome.message
+    assert outcome.values["slip_rate_after_step"] == pytest.approx(
+        math.exp(scene.log_norm_rate), rel=1e-6
+    )
+
+
+def test_the_first_order_is_a_coulomb_stress():
+    """mu' = mu_* - alpha (1 - a/b), also where driving is inclined: to the second order in k^."""
+    ratio = 0.02
+    for fields in ({**IMPOSED, "law": "slowness"}, {"phi": 55.0}):
+        scene = Scene(alpha=0.5, stiffness_ratio=ratio, **fields)
+        found = Triggers()(scene, Accuracy(1e-4))
+        assert found.status is Status.OK
+        assert found.values["coulomb_ratio"] == pytest.approx(1.0, abs=0.05 * ratio)
+        friction = closed_forms.effective_friction(scene.mu_star, scene.b_over_a, 0.5)
+        assert found.values["effective_friction"] == friction == pytest.approx(0.51)
+    forms, numbers = closed_forms.FORMS, (0.76, 0.0145, 2.0, 0.5)
+    first = forms["coulomb_normal_stress_step"].value(*numbers, 1e-4)
+    for exponent in (0.0, 0.3, 1.0):
+        whole = forms["normal_stress_step_of_the_family"].value(*numbers, exponent, 1e-4)
+        assert whole == pytest.approx(first, rel=1e-4)
+
+
+# ---- all triggers at once -----------------------------------------------------------------------
+
+
+def test_triggers_are_the_critical_steps_and_their_stresses():
+    """The numbers of each search, and what they are as changes of stress."""
+    scene = Scene(law="slowness", alpha=0.4, phi=60.0, stiffness_ratio=1.2)
+    outcome = Triggers()(scene, Accuracy(1e-5))
+    for measure in (FALL, CriticalStep(of="displacement_step"), CriticalStep()):
+        alone = measure(scene, Accuracy(1e-5)).values
+        for end in ("", "_error", "_stable", "_unstable"):
+            name = f"{measure.headline}{end}"
+            assert outcome.values[name] == alone[name]
+    values = outcome.values
+    friction = values["effective_friction"]
+    coulomb = -friction * values[VALUE]
+    assert values["coulomb_stress_of_normal_stress"] == pytest.approx(coulomb, rel=1e-15)
+    pulled = scene.stiffness * values["critical_displacement"]
+    pulled -= friction * pulled / math.tan(math.radians(60.0))
+    assert values["coulomb_stress_of_displacement"] == pytest.approx(pulled, rel=1e-12)
+    assert values["coulomb_ratio"] == pytest.approx(coulomb / pulled, rel=1e-12)
+    direct = scene.a * math.log(values["critical_velocity_ratio"])
+    assert values["direct_stress_of_velocity"] == pytest.approx(direct, rel=1e-12)
+    assert values["direct_ratio"] == pytest.approx(direct / pulled, rel=1e-12)
+    tight = Triggers()(scene, Accuracy(1e-8)).values
+    for name in ("coulomb_ratio", "direct_ratio", "coulomb_stress_of_displacement"):
+        assert abs(values[name] - tight[name]) <= values[f"{name}_error"]
+
+
+def test_a_trigger_without_a_number_is_left_out_and_told():
+    soft = Triggers()(Scene(**IMPOSED, stiffness_ratio=0.5), Accuracy(1e-4))
+    assert soft.status is Status.OK
+    assert "load_velocity_ratio: steady sliding at V_* is unstable" in soft.message
+    assert math.isnan(soft.values["direct_ratio"])
+    heavy = {"inertia": True, "instability_norm": 1.0, "law": "slowness"}
+    far = Triggers()(Scene(**heavy, alpha=0.56, phi=50.0, stiffness_ratio=1.3), Accuracy(1e-3))
+    assert far.status is Status.NORM_UNREACHABLE
+    with pytest.raises(InvalidValue, match="changed by the loading"):
+        Triggers()(Scene(normal_stress="constant"), Accuracy())
+
+
+# ---- every kind of scene ------------------------------------------------------------------------
+
+STRESSES = [IMPOSED | {"alpha": 0.0}, IMPOSED | {"alpha": 0.56}, {"alpha": 0.4, "phi": 55.0}]
+DYNAMICS = [{}, {"radiation_damping": 1e-6}, {"inertia": True, "instability_norm": 0.3}]
+
+
+@settings(max_examples=10)
+@given(
+    law=st.sampled_from(["slip", "slowness", "family", "perrin_rice_zheng", "composite"]),
+    stress=st.sampled_from(STRESSES),
+    dynamics=st.sampled_from(DYNAMICS),
+    ratio=st.floats(0.2, 1.8),
+    b_over_a=st.floats(1.3, 4.0),
+    moves=st.booleans(),
+)
+def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
+    """A number that motions confirm at another tolerance, or an answer that says why not."""
+    load = {"load_velocity_ratio": 1.0} if moves and ratio > 1.05 else {}
+    scene = Scene(law=law, b_over_a=b_over_a, stiffness_ratio=ratio, **stress, **dynamics, **load)
+    outcome = FALL(scene, Accuracy(1e-5))
+    assert outcome.status in (Status.OK, Status.NORM_UNREACHABLE), outcome
+    if outcome.status is not Status.OK:
+        return
+    value, error = outcome.values[VALUE], outcome.values[f"{VALUE}_error"]
+    stable, unstable = (outcome.values[f"{VALUE}_{side}"] for side in ("stable", "unstable"))
+    assert -1.0 < value < 0.0 < error < 1e-3 * abs(value)
+    assert unstable <= value <= stable < 0.0
+    if "jump" in outcome.message:
+        return
+    for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
+        stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
+        assert swing(stepped, Accuracy(1e-6), Meter(200_000)).reached is reached
+
+
+@pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
+def test_paths_and_motions_agree(dynamics, monkeypatch):
+    """What is shot for, and what a survey by motions alone closes in on."""
+    scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
+    value, error, _outcome = found(scene)
+    for shot in ("_from_touching_path", "_from_touching_cycle"):
+        monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
+    forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
+    assert abs(value - forward) <= error + its_error
+
+
+def test_a_fluid_is_surveyed():
+    """Two more unknowns: by motions, and more stable the more pores open."""
+    fault = Scene(**IMPOSED, a=0.01, b_over_a=1.5, stiffness_ratio=0.6, alpha=0.2)
+    drained = found(fault, accuracy=Accuracy(1e-3))[0]
+    dilatant = fault.with_(fluid="dilatant", dilatancy=0.002, drainage=1.0)
+    assert found(dilatant.with_(stiffness=fault.stiffness), accuracy=Accuracy(1e-3))[0] < drained
+
+
+@pytest.mark.parametrize(
+    ("fields", "published"),
+    [
+        # sliding at the new normal stress comes to be unstable at k_cr = 1.3, and next to that
+        ({"law": "slip", "alpha": 0.0}, 0.16747205),
+        # the first peak, before that
+        ({"law": "slowness", "alpha": 0.56}, 0.29498411),
+    ],
+)
+def test_rises_under_a_load_point_that_moves(fields, published):
+    """They take stress away at first, and stability with it; held, a rise never triggers."""
+    scene = Scene(**IMPOSED, **fields, stiffness_ratio=1.3, load_velocity_ratio=1.0)
+    value, error, _outcome = found(scene, RISE, Accuracy(1e-6))
+    assert value == pytest.approx(published, abs=error + 1e-8)
+    held = RISE(scene.with_(load_velocity_ratio=0.0, alpha=0.0), Accuracy(1e-4))
+    assert held.status is Status.STABLE_FOR_ALL_STEPS
+
+
+def test_where_a_rise_makes_sliding_neutral_the_error_says_so():
+    """The boundary is where orbits all but close, 1e-7 from there: loose motions cannot tell how
+    far.
+    """
+    scene = Scene(**IMPOSED, alpha=0.56, stiffness_ratio=1.3, load_velocity_ratio=1.0)
+    value, error, _outcome = found(scene, RISE, Accuracy(1e-5))
+    tight, its_error, _outcome = found(scene, RISE)
+    assert abs(value - tight) <= error + its_error
+    assert error < 1e-4
+
+
+def test_a_rise_may_take_more_from_the_state_than_it_gives_to_friction():
+    """alpha ln s beyond mu_* (1 - 1/s): slip rate jumps up, to the norm where s is 3.5."""
+    value, _error, outcome = found(Scene(**IMPOSED, alpha=0.56, stiffness_ratio=3.0), RISE)
+    assert 2.0 < value < 3.0
+    assert outcome.values["slip_rate_after_step"] > 1.0
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("stress", STRESSES[1:], ids=str)
+def test_both_engines_agree_within_their_errors(law, stress):
+    scene = Scene(law=law, inertia=True, stiffness_ratio=1.25, **stress)
+    one = agreement.compared(FALL, scene, Accuracy(1e-6))
+    assert one.same_end, one.what
+    assert not one.worst > 1.0, one.what
+
+
+# ---- what is said of steady sliding after the step ----------------------------------------------
+
+
+def test_normal_stress_that_is_imposed_is_constant_between_steps():
+    """Whatever alpha: friction acts alone, orbits may close, and critical stiffness is in
+    proportion to normal stress.
+    """
+    scene = Scene(**IMPOSED, alpha=0.5, load_velocity_ratio=2.0)
+    assert friction_acts_alone(scene)
+    assert orbits_may_close(scene)
+    assert not friction_acts_alone(Scene(alpha=0.5))
+    stepped = scene.with_(normal_stress_step=0.25, stiffness_ratio=1.25)
+    after = steady.critical_stiffness(stepped, stepped.log_load_rate)
+    assert after == pytest.approx(1.25 * scene.critical_stiffness, rel=1e-9)
+    law = {"law": "perrin_rice_zheng"}
+    assert neutral(stepped.with_(**law), 1e-6)
+    assert not neutral(scene.with_(**law, normal_stress_step=0.25), 1e-6)
+
+
+def test_coulomb_stresses_add_up():
+    """Half by a fall of normal stress, the other half by a displacement: exactly, without alpha."""
+    scene = Scene(**IMPOSED, alpha=0.0, stiffness_ratio=1.2)
+    fallen = found(scene)[0]
+    part = scene.with_(normal_stress_step=0.5 * fallen)
+    pulled = CriticalStep(of="displacement_step")(part, Accuracy())
+    assert pulled.status is Status.OK
+    left = pulled.values["critical_displacement"] * scene.stiffness
+    assert left == pytest.approx(0.5 * scene.mu_star * abs(fallen), rel=1e-4)
+
+
+# ---- bad input, and what users call -------------------------------------------------------------
+
+
+def test_constant_normal_stress_has_no_steps():
+    """Refused before any work, with the value, the rule and the remedy."""
+    meter = Meter(1)
+    with pytest.raises(InvalidValue, match="'constant'.*changed by the loading.*'imposed'"):
+        FALL.find(Scene(normal_stress="constant"), Accuracy(), meter)
+    assert meter.spent == 0
+    with pytest.raises(InvalidValue, match="not for normal stress that the loading changes"):
+        FALL(Scene(**IMPOSED, stress_dependence=0.5), Accuracy())
+
+
+def test_public_call():
+    """The value the scene holds for the step is ignored; a stated load point velocity is not."""
+    scene = Scene(**IMPOSED, alpha=0.3, stiffness_ratio=1.2, normal_stress_step=0.4)
+    dataset = rsfstudy.critical_step(scene, of=STEP, direction="down")
+    assert dataset[VALUE].attrs["scale"] == "sigma_*"
+    assert dataset.attrs["status"] == "ok"
+    still = scene.with_(normal_stress_step=0.0)
+    assert float(dataset[VALUE]) == found(still)[0]
+    moving = found(still.with_(load_velocity_ratio=1.0))[0]
+    assert float(dataset[VALUE]) < moving < 0.0
+
+
+def test_the_survey_ends_where_steady_sliding_does():
+    """A fall of sigma_3 beyond which a load point that moves finds no steady sliding."""
+    stiff = {"stiffness_ratio": 1.3, "radiation_damping": 1e-6, "load_velocity_ratio": 1.0}
+    scene = Scene(law="slowness", alpha=0.56, phi=50.0, **stiff)
+    steps = KINDS[STEP](scene, -1)
+    last = steps.scene_at(steps.largest)
+    assert steady.steady_sliding(last, 0.0) is not None
+    beyond = steps.scene_at(1.001 * steps.largest)
+    assert steady.steady_sliding(beyond, 0.0) is None
+    assert not steps.jumps_to_norm
+
+
+def test_a_search_that_loses_its_way_is_no_error():
+    """Load point velocities between which the cycle that touches the norm comes and goes."""
+    scene = Scene(
+        b_over_a=4.850646610655874,
+        stiffness_ratio=1.7752455184374996,
+        alpha=0.032329397553491325,
+        phi=51.744165699143586,
+    )
+    accuracy = replace(Accuracy(1e-7), budget=40_000)
+    outcome = CriticalStep(direction="down")(scene, accuracy)
+    assert outcome.status in (Status.OK, Status.STABLE_FOR_ALL_STEPS, Status.WORK_BUDGET_SPENT)
