@@ -142,6 +142,7 @@ def test_the_rise_after_a_jump_ends_in_a_peak_whether_or_not_it_is_followed():
         assert found["max_log10_slip_rate"] == pytest.approx(
             0.8985402, abs=found["max_log10_slip_rate_error"]
         )
-        assert found["max_log10_slip_rate_error"] < 3.0 * rtol
+        # three times the difference from a run that follows it, and the slip of a rise
+        assert found["max_log10_slip_rate_error"] < 4.0 * rtol
         down = response(rtol=rtol, displacement_step=-0.3, **fields).values
         assert down["max_log10_slip_rate"] < 0.2

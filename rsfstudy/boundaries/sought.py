@@ -283,8 +283,8 @@ class DisplacementSteps(Steps):
         return size * relative_error
 
     def mass_delays(self, size: float, rtol: float) -> bool:
-        """The slider falls behind on the same path, but for what the load point moves meanwhile, and
-        for half of b times that slip, which the state misses because slip rate is lower.
+        """The slider falls behind on the same path, but for what the load point moves meanwhile,
+        and for half of b times that slip, which the state misses because slip rate is lower.
         """
         scene = self.scene_at(size)
         if not scene.has_mass:
