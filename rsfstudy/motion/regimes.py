@@ -137,7 +137,9 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    stepped = on_slow_manifold(scene, scene.spring_stress_step, resting_of(scene, 0.0, 0.0))
+    psis, begun = resting_of(scene, 0.0, 0.0), scene.parts.loading.beginning
+    psis = (*psis[: len(psis) - len(begun)], *begun)
+    stepped = on_slow_manifold(scene, scene.spring_stress_step, psis)
     return _at_rate(scene, stepped, 0.0) if scene.has_mass else stepped
 
 

@@ -96,6 +96,10 @@ class Scene:
     normal_stress_step : float
         Sudden change of imposed normal stress over sigma_* (not at constant normal stress); that of
         sigma_3 where a driving stress is inclined.
+    oscillation_amplitude, oscillation_period : float
+        Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
+        that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
+        stress; that of sigma_3 where a driving stress is inclined). Zero is none.
     hold_time : float
         Time in D_c/V_* for which the load point is held, before it moves on at
         `load_velocity_ratio`. Zero is no hold.
@@ -199,6 +203,11 @@ class Scene:
         return self.parts.dynamics
 
     @property
+    def pressing(self) -> fluid.Fluid | loading.Loading:
+        """What has the unknowns of which the last takes from normal stress, if any has."""
+        return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
+
+    @property
     def has_mass(self) -> bool:
         """Whether mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
@@ -211,8 +220,10 @@ class Scene:
 
     @property
     def states(self) -> int:
-        """How many states there are: those of the law, and the unknowns of the fluid."""
-        return self.parts.law.states + len(self.parts.fluid.unknowns)
+        """How many states there are: those of the law, and the unknowns of the fluid, or of a
+        loading that goes on changing normal stress.
+        """
+        return self.parts.law.states + len(self.pressing.unknowns)
 
     @property
     def b(self) -> float:
@@ -230,7 +241,16 @@ class Scene:
     @property
     def _is_changed(self) -> bool:
         """Whether friction is another than before the loading."""
-        return self.imposed_normal_stress != 0.0
+        return self.imposed_normal_stress != 0.0 or bool(self.parts.loading.unknowns)
+
+    @property
+    def unforced(self) -> Scene:
+        """The same slider under a load point that moves steadily, where its loading goes on
+        changing normal stress: what steady sliding and its stability are asked of.
+        """
+        if not self.parts.loading.unknowns:
+            return self
+        return self.under(loading.Segment(self.load_velocity))
 
     @cached_property
     def numbers(self) -> Numbers:
@@ -307,7 +327,8 @@ class Scene:
             normal_stress_step=segment.normal_stress,
         )
         scene = self._with_parts(self.parts._replace(loading=step))
-        scene.__dict__.update({name: getattr(self, name) for name in _UNLOADED})
+        kept = _UNLOADED[:1] if self.parts.loading.unknowns else _UNLOADED
+        scene.__dict__.update({name: getattr(self, name) for name in kept})
         return scene
 
     def _with_parts(self, parts: Parts) -> Scene:
@@ -416,5 +437,6 @@ class Scene:
         return tuple(self._layout.own.values())
 
 
-#: What follows from a scene whatever loads it, once it has been asked for.
+#: What follows from a scene whatever loads it, once it has been asked for; the functions, of all
+#: loadings that have no unknowns, or the same.
 _UNLOADED = ("critical_stiffness", "functions")
