@@ -79,7 +79,9 @@ def _against_period(rows: xr.Dataset, axes: Axes, name: str) -> None:
         for law, (_line, fill) in zip(rows["law"].values, _STYLES, strict=False):
             size = 3.0 if fill == "full" else 5.5
             style = {"color": colour, "marker": marker(place), "fillstyle": fill}
-            axes.plot(known, row[name].sel(law=law), linestyle="", markersize=size, **style)
+            text = f"motions, {law} law" if place == 0 else None
+            style |= {"linestyle": "", "markersize": size, "label": text}
+            axes.plot(known, row[name].sel(law=law), **style)
     log_scale(axes, "x")
     axes.set_xlabel(f"Period, {quantity('oscillation_period').symbol}")
     amplitude = written(float(rows["oscillation_amplitude"]))
