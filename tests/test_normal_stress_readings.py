@@ -216,7 +216,7 @@ def test_a_protocol_that_steps_too_soon_is_not_read():
 
 
 def test_a_transient_is_not_asked_of_an_oscillation():
-    with pytest.raises(InvalidValue, match="goes on changing normal stress"):
+    with pytest.raises(InvalidValue, match="changes normal stress all along"):
         NormalStressTransient()(Scene(**IMPOSED, **OSCILLATES), Accuracy())
 
 

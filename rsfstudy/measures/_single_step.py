@@ -7,7 +7,7 @@ from rsfstudy.slider.scene import Scene
 
 
 def check_single_step(scene: Scene) -> None:
-    """Refuse a loading of several segments, and one that goes on changing normal stress."""
+    """Refuse a loading of several segments, and one that changes normal stress all along."""
     check_leaves_alone(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
@@ -17,11 +17,11 @@ def check_single_step(scene: Scene) -> None:
 
 
 def check_leaves_alone(scene: Scene) -> None:
-    """Refuse a loading that goes on changing normal stress: nothing settles or repeats by itself
-    under it.
+    """Refuse a loading that changes normal stress other than at once: nothing settles or repeats by
+    itself under it.
     """
     loading = scene.parts.loading
     if loading.unknowns:
-        rule = "goes on changing normal stress, so that no motion settles or repeats by itself"
-        remedy = "Read its motion by normal_stress_response, or by simulate."
+        rule = "changes normal stress all along, so that no motion settles or repeats by itself"
+        remedy = "Read its motion by simulate, or that of an oscillation by normal_stress_response."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

@@ -152,7 +152,9 @@ def jumped(scene: Scene, point: Point) -> Point:
     Halt
         As `starting` does.
     """
-    after = point._replace(spring=point.spring + scene.spring_stress_step)
+    # a loading may have had unknowns in the segment before
+    psis = point.psis[: scene.states]
+    after = point._replace(spring=point.spring + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
     return _at_rate(scene, after, point.log_rate) if scene.has_mass else after
 

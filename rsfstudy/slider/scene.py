@@ -100,6 +100,10 @@ class Scene:
         Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
         that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
         stress; that of sigma_3 where a driving stress is inclined). Zero is none.
+    normal_stress_ramp, ramp_duration : float
+        Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
+        takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of
+        sigma_3 where a driving stress is inclined). Zero is none.
     hold_time : float
         Time in D_c/V_* for which the load point is held, before it moves on at
         `load_velocity_ratio`. Zero is no hold.
@@ -317,7 +321,10 @@ class Scene:
         history = self.parts.loading.segments
         if len(history) == 1:
             return ((self, history[0].duration),)
-        return tuple((self.under(segment), segment.duration) for segment in history)
+        acting = [self.under(segment) for segment in history]
+        if self.parts.loading.unknowns:
+            acting[0] = self
+        return tuple((scene, s.duration) for scene, s in zip(acting, history, strict=True))
 
     def under(self, segment: loading.Segment) -> Scene:
         """The same slider, loaded by one segment."""

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 
 class Segment(NamedTuple):
@@ -55,6 +58,8 @@ class Loading(Part):
     One that goes on changing normal stress says by which unknowns: the last of them takes from
     imposed normal stress, over sigma_*, as pore pressure does. It states `seepage` and `seeped` as
     a fluid does (see `fluid`), all unknowns being 0 in steady sliding, and what they begin with.
+    They are those of its first segment; what that imposes is beside them, and is what the last one
+    does. Others are without unknowns.
     """
 
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
@@ -108,6 +113,14 @@ def last_velocity() -> Any:
         remedy="0 holds the load point.",
         scale="V_*",
     )
+
+
+def refuse_fluid(scene: Scene, name: str, value: float) -> None:
+    """Refuse a field of a loading that has unknowns beside a fluid that has some too."""
+    fluid = scene.parts.fluid
+    if fluid.unknowns:
+        rule = f"has no meaning for fluid={fluid.name!r}, whose pore pressure changes normal stress"
+        raise InvalidValue(name, value, rule, remedy="Leave one of them out.")
 
 
 PARTS = found_in(__name__, __path__)

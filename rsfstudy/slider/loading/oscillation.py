@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import Loading, Segment, last_velocity
+from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.slots import LARGEST_SLOWNESS
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 OWN = 0
-#: Exponents beyond this occur in trial steps only: slip that no load moves stops at 10^-290 V_*.
-LARGEST_EXPONENT = 680.0
 
 
 def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -38,7 +37,7 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
         omega D_c/V_* at OWN, and A behind it.
     """
     ahead, relief = states
-    turn = p[OWN] * share * math.exp(min(-log_rate, LARGEST_EXPONENT))
+    turn = p[OWN] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
     over, relative = ahead / p[OWN + 1], relief / p[OWN + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
@@ -95,14 +94,7 @@ class Oscillation(Loading):
             raise InvalidValue(
                 "oscillation_amplitude", amplitude, "must be less than 1", remedy=remedy
             )
-        if scene.parts.fluid.unknowns:
-            fluid = scene.parts.fluid.name
-            raise InvalidValue(
-                "oscillation_amplitude",
-                amplitude,
-                f"has no meaning for fluid={fluid!r}, whose pore pressure changes normal stress",
-                remedy="Leave one of them out.",
-            )
+        refuse_fluid(scene, "oscillation_amplitude", amplitude)
         free = 2.0 * math.pi * scene.inertial_time
         if period < free and not scene.has_mass:
             raise InvalidValue(
