@@ -1,4 +1,6 @@
-"""Ramps of imposed normal stress: exact, a step where they are short, and nothing once over."""
+"""Ramps of imposed normal stress: exact, a step where they are short, and nothing once over; and
+ramps of load point velocity, in stairs.
+"""
 
 import math
 
@@ -135,3 +137,55 @@ def test_what_is_not_asked_of_it():
         LimitCycle()(Scene(**IMPOSED, **RAMP), Accuracy())
     outcome = NormalStressResponse()(Scene(**IMPOSED, **RAMP), Accuracy())
     assert outcome.status is Status.NO_STEP
+
+
+# ---- load point velocity -------------------------------------------------------------------------
+
+PLAIN = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}
+
+
+@pytest.mark.parametrize("change", [-0.8, 4.0])
+def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change):
+    """By LSODA in time, up to the end of the ramp and beyond it."""
+    scene = Scene(**PLAIN, velocity_ramp=change, velocity_ramp_duration=4.0)
+    a, b = scene.a, scene.b
+
+    def rates(time, state):
+        v = math.exp((state[0] - state[1]) / a)
+        load = 1.0 + change * min(time / 4.0, 1.0)
+        return scene.stiffness * (load - v), b * (math.exp(-state[1] / b) - v)
+
+    options = {"method": "LSODA", "rtol": 1e-11, "atol": 1e-14}
+    ramp = solve_ivp(rates, (0.0, 4.0), (0.0, 0.0), **options)
+    known = solve_ivp(rates, (4.0, 5.0), ramp.y[:, -1], **options).y[0, -1]
+    off = []
+    for stairs in (64, 128):
+        which = scene.with_(velocity_ramp_stairs=stairs)
+        *_earlier, end = follow(which, Accuracy(1e-9), Meter(10**6), until=5.0)
+        off.append(end.point.spring - known)
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
+    assert abs(off[1]) < 1e-4 * scene.a
+
+
+def test_the_load_point_is_where_it_should_be():
+    scene = Scene(**PLAIN, velocity_ramp=-1.0, velocity_ramp_duration=4.0, velocity_ramp_stairs=3)
+    moved = 0.0
+    for segment in scene.parts.loading.segments[:-1]:
+        moved += segment.load_velocity * segment.duration
+    assert moved == pytest.approx(2.0, rel=1e-15)
+    assert scene.load_velocity == 0.0
+    assert Scene(**PLAIN, velocity_ramp=0.0) == Scene(**PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"velocity_ramp": -1.5}, "must be -1 or greater. -1 ends with a load point at rest"),
+        ({"velocity_ramp": 1.0, "velocity_ramp_duration": 0.0}, "must be greater than 0"),
+        ({"velocity_ramp": 1.0, "velocity_ramp_stairs": 1.5}, "must be a whole number"),
+        ({"velocity_ramp_stairs": 5.0}, "no meaning for step.*state velocity_ramp too"),
+    ],
+)
+def test_what_is_no_ramp_of_velocity(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**PLAIN, **fields)

@@ -110,6 +110,9 @@ class Scene:
     velocity_steps, velocity_ratio, displacement_between_steps : float
         How many steps of load point velocity there are, from V_* to `velocity_ratio` V_* and back
         in turn, and how far in D_c it moves from one to the next (10; 20). Zero is no step.
+    velocity_ramp, velocity_ramp_duration, velocity_ramp_stairs : float
+        Change of load point velocity over V_* at a steady rate, time in D_c/V_* that it takes, and
+        number of stairs that stand for it (10; 64). Zero is none.
     inertia : bool
         Whether the slider has mass.
     radiation_damping : float
