@@ -34,7 +34,7 @@ LARGEST_EXPONENT = 700.0
 
 #: Fields of a scene that decide whether the effects of a law go with it.
 OF_EFFECTS = (
-    *("stress_dependence", "normal_stress", "fluid"),
+    *("stress_dependence", "normal_stress", "fluid", "normal_stress_step"),
     *("regularised", "dynamics", "inertia", "radiation_damping"),
 )
 
