@@ -87,12 +87,26 @@ _SERIES = (
 
 class _Record(NamedTuple):
     """One period of a motion: events spread evenly over it, the last a period after the first; and
-    spring stress and imposed normal stress there.
+    spring stress and imposed normal stress at all but that, without the trend by which spring
+    stress does not come back, which would be taken for overtones.
     """
 
     events: Sequence[Event]
     spring: np.ndarray
     imposed: np.ndarray
+    trend: float
+
+    @property
+    def drift(self) -> float:
+        """What the trend would have made of the response, over that."""
+        amplitude = 2.0 * abs(_harmonics(self.spring)[1]) / len(self.spring)
+        return float(abs(self.trend) / (math.pi * amplitude))
+
+    @property
+    def overtones(self) -> np.ndarray:
+        """Spring stress at the overtones of the period, over that at the period."""
+        harmonics = _harmonics(self.spring)
+        return np.asarray(harmonics[2:] / harmonics[1])
 
     @property
     def response(self) -> complex:
@@ -174,11 +188,13 @@ class NormalStressResponse(Measure):
         _first, again = self._follow(scene, period, periods, accuracy.refined(), meter)
         values, finer = _read(last, linear), _read(again, linear)
         moved = abs(last.response / first.response - 1.0)
-        unseen = abs(_coarse(last) / last.response - 1.0) + moved
+        unseen = abs(_coarse(last) / last.response - 1.0) + moved + last.drift
         hidden = {
             "gain": unseen * values["gain"],
             "phase_lead": math.degrees(unseen),
-            "distortion": unseen * values["distortion"],
+            # what is left of overtones adds up as noise does, and seldom cancels
+            "distortion": 5.0 * float(np.linalg.norm(last.overtones - again.overtones))
+            + last.drift,
             "departure_from_linear": unseen * abs(last.response / linear),
         }
         errors = {
@@ -229,9 +245,10 @@ class NormalStressResponse(Measure):
             time, slip = time + end.time, slip + end.slip
             events.append(end._replace(time=time, slip=slip))
             start = end.point
-        points = [event.point for event in events[:-1]]
-        spring = np.array([point.spring for point in points])
-        return _Record(events, spring, np.array([-point.psis[-1] for point in points]))
+        springs, reliefs = zip(*((e.point.spring, e.point.psis[-1]) for e in events), strict=True)
+        trend = springs[-1] - springs[0]
+        spring = np.array(springs[:-1]) - trend * np.arange(self.samples) / self.samples
+        return _Record(events, spring, -np.array(reliefs[:-1]), trend)
 
 
 def _harmonics(values: np.ndarray) -> np.ndarray:
@@ -249,12 +266,11 @@ def _degrees(response: complex) -> float:
 
 def _read(record: _Record, linear: complex) -> dict[str, float]:
     """What is read off a record."""
-    strengths = np.abs(_harmonics(record.spring))
     response = record.response
     return {
         "gain": abs(response),
         "phase_lead": _degrees(response),
-        "distortion": float(np.linalg.norm(strengths[2:]) / strengths[1]),
+        "distortion": float(np.linalg.norm(record.overtones)),
         "departure_from_linear": abs(response / linear - 1.0),
     }
 
