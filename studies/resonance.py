@@ -14,7 +14,7 @@ base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0)
 a, b = base.a, base.b
 #: Period of resonance as k falls to k_cr, 2 pi over sqrt((b - a)/a), and others over it.
 RESONANT = 2.0 * math.pi * math.sqrt(a / (b - a))
-PERIODS = [factor * RESONANT for factor in (0.4, 0.75, 1.0, 1.5)]
+PERIODS = [factor * RESONANT for factor in (0.75, 1.0, 1.5)]
 RATIOS = [1.2, 1.5, 4.0]
 SMALL, LARGE = 1e-4, 1e-2
 AMPLITUDES = [SMALL, 3e-4, 1e-3, 3e-3, LARGE, 5e-2]
@@ -136,9 +136,9 @@ study = Study(
         ),
     ],
     claims=[
-        *(is_linear("slip", ratio, period) for ratio in RATIOS for period in PERIODS[1:4]),
+        *(is_linear("slip", ratio, period) for ratio in RATIOS for period in PERIODS),
         *(is_linear("slowness", ratio, RESONANT) for ratio in RATIOS),
-        *(resounds(law, period) for law in LAWS for period in (PERIODS[1], PERIODS[3])),
+        *(resounds(law, period) for law in LAWS for period in (PERIODS[0], PERIODS[-1])),
         holds("slip", RATIOS[0], 3e-3, still=False),
         holds("slowness", RATIOS[0], LARGE, still=False),
         *(holds(law, RATIOS[-1], LARGE) for law in LAWS),

@@ -26,7 +26,7 @@ DIMENSIONS = ("law", "stiffness_ratio", "oscillation_period", "oscillation_ampli
 HEIGHT = 50.0
 
 #: Points of the lines, and by which factor they go on beyond the dots.
-_POINTS, _BEYOND = 300, 1.3
+_POINTS, _BEYOND = 300, 2.0
 #: Of laws: lines, and how markers are filled.
 _STYLES = (("-", "full"), ("--", "none"))
 
