@@ -97,6 +97,8 @@ LEFT_TO_COMPILED = (
     "coverage",
     "dilatant_cycles",
     "dilatant_steps",
+    "normal_stress_steps",
+    "resonance",
     "slide_hold_slide",
     "stress_drop",
     "two_states",

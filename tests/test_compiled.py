@@ -94,7 +94,7 @@ STRESSES, FLUIDS = list(normal_stress.PARTS.values()), list(fluid.PARTS.values()
 OURS = [
     {
         **fields_of(law, "law"),
-        **fields_of(STRESSES[number % 2], "normal_stress"),
+        **fields_of(STRESSES[(number + number // 3) % len(STRESSES)], "normal_stress"),
         **fields_of(FLUIDS[number // 2 % 2], "fluid"),
         **fields_of(acting, "dynamics"),
     }

@@ -124,7 +124,10 @@ def test_work_grows_with_the_number_of_segments():
         ({"velocity_ratio": 2.0}, "no meaning for step.*state velocity_steps too"),
         ({"hold_time": 1.0, "displacement_step": 1.0}, "no meaning for slide_hold_slide"),
         ({"hold_time": 1.0, "velocity_steps": 1}, "velocity_steps = 1: has no meaning"),
-        ({"loading": "slide_hold_slide"}, "called for by hold_time, velocity_steps"),
+        (
+            {"loading": "slide_hold_slide"},
+            "called for by oscillation_amplitude, .*hold_time, velocity_ramp, velocity_steps",
+        ),
     ],
 )
 def test_fields_that_make_no_protocol(fields, complaint):

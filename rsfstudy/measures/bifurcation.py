@@ -15,6 +15,7 @@ from rsfstudy.boundaries.cycles import LN10, Cycle
 from rsfstudy.boundaries.periods import Course, Orbit, ReturnMap, course
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, more_events, without_period
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.stepping import Meter
@@ -138,6 +139,7 @@ class Bifurcation(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the events, and close the cycle of one event at two accuracies."""
+        check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.parts.loading.is_a_step:

@@ -25,6 +25,7 @@ from rsfstudy.boundaries.cycles import LN10, Cycle, cycles, recorded
 from rsfstudy.boundaries.periods import Course, ReturnMap, course
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.recording import OBSERVED, along_path
 from rsfstudy.motion.regimes import on_slow_manifold
@@ -108,6 +109,7 @@ class LimitCycle(Measure):
         """Follow events until one repeats, then go round once more with smaller tolerances: for the
         error, and to record the orbit.
         """
+        check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.parts.loading.is_a_step:

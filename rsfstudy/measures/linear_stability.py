@@ -79,6 +79,7 @@ class LinearStability(Measure):
         """The critical stiffness, and the root of the growth in stiffness; their difference is the
         error.
         """
+        scene = scene.unforced
         load = scene.log_load_rate
         if load == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")

@@ -11,6 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
@@ -76,6 +77,7 @@ class StepResponse(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and once more with smaller tolerances for the error of its peaks."""
+        check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.parts.loading.is_a_step:

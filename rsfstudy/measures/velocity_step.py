@@ -11,6 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
@@ -160,6 +161,7 @@ class VelocityStep(Measure):
         """Follow the motion twice, the second time told where 1/e is left; and both once more with
         smaller tolerances for the errors.
         """
+        check_leaves_alone(scene)
         step = self._step(scene)
         if isinstance(step, Outcome):
             return step

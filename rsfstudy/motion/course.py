@@ -77,7 +77,8 @@ def follow(
             start = starting(acting)
         elif number:
             start = jumped(acting, start)
-        asked = watches if number == len(segments) - 1 else _without_settling(watches)
+        goes_on = number == len(segments) - 1 and not acting.parts.loading.unknowns
+        asked = watches if goes_on else _without_settling(watches)
         origin = origin._replace(spring=start.spring)
         end = min(origin.time + duration, until)
         lasts = end - origin.time if clock else math.inf

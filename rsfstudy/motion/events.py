@@ -6,7 +6,8 @@ Who measures a motion asks to be told of
     rise(of, to), fall(of, to)  its crossing of a level, on the way up or down
     settling(part)              how far the slider is from steady sliding has become less than a
                                 part of the farthest so far (told at the end of each step while so,
-                                in the segment of loading that goes on for ever)
+                                in the segment of loading that goes on for ever, and not
+                                where that goes on changing normal stress)
 
 and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`, and the
 friction coefficient that is read, ``reading`` (see `readings`); extrema are told of ``log_rate``,

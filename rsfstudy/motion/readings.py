@@ -30,7 +30,7 @@ def watched(scene: Scene) -> tuple[str, float]:
     and what it is above it: spring stress itself where nothing changes normal stress.
     """
     parts = scene.parts
-    if parts.normal_stress.normal_stress is None and not parts.fluid.unknowns:
+    if parts.normal_stress.normal_stress is None and not scene.pressing.unknowns:
         return "spring", scene.mu_star
     return "reading", 0.0
 

@@ -65,12 +65,14 @@ class Recording:
 
     def seen(self, scene: Scene, until: Event | None = None) -> np.ndarray:
         """The quantities of `OBSERVED`, the number of the regime and the states freed of stress, in
-        columns; up to an event.
+        columns; up to an event. Of states, those that there are in every segment of loading.
         """
-        table = np.concatenate(self._rows or [np.empty((0, STATES + scene.states))])
+        rows = self._rows or [np.empty((0, STATES + scene.states))]
+        columns = min(part.shape[1] for part in rows)
+        table = np.concatenate([part[:, :columns] for part in rows])
         if until is not None:
             last = row(until.time, until.slip, until.point, self.number(until.regime))
-            table = np.vstack([table[table[:, 0] < until.time], last])
+            table = np.vstack([table[table[:, 0] < until.time], last[:columns]])
         table[:, 2] /= math.log(10.0)
         table[:, 3:5] += scene.mu_star
         return table

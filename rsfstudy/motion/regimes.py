@@ -137,7 +137,9 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    stepped = on_slow_manifold(scene, scene.spring_stress_step, resting_of(scene, 0.0, 0.0))
+    psis, begun = resting_of(scene, 0.0, 0.0), scene.parts.loading.beginning
+    psis = (*psis[: len(psis) - len(begun)], *begun)
+    stepped = on_slow_manifold(scene, scene.spring_stress_step, psis)
     return _at_rate(scene, stepped, 0.0) if scene.has_mass else stepped
 
 
@@ -150,7 +152,9 @@ def jumped(scene: Scene, point: Point) -> Point:
     Halt
         As `starting` does.
     """
-    after = point._replace(spring=point.spring + scene.spring_stress_step)
+    # a loading may have had unknowns in the segment before
+    psis = point.psis[: scene.states]
+    after = point._replace(spring=point.spring + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
     return _at_rate(scene, after, point.log_rate) if scene.has_mass else after
 

@@ -2,10 +2,10 @@
 
 A slider is five choices, each one file of `laws`, `normal_stress`, `fluid`, `dynamics` and
 `loading`; a `scene` says which. `friction` puts law and normal stress into one relation between
-stress, slip rate and state (`saturated` does where a fluid has unknowns); `forms` makes equations
-of motion of it; `assembly` fills both with the functions of a scene's parts, and `equations` gives
-what an integrator takes. `steady` asks the same relation for steady sliding and its stability.
-`closed_forms` are what others have published.
+stress, slip rate and state (`saturated` does where a fluid, or the loading, has unknowns); `forms`
+makes equations of motion of it; `assembly` fills both with the functions of a scene's parts, and
+`equations` gives what an integrator takes. `steady` asks the same relation for steady sliding and
+its stability. `closed_forms` are what others have published.
 
 Where the equations of the paper are:
 

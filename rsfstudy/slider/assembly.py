@@ -51,10 +51,10 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> Functions:
     """The functions of a scene by their names in `slots`, with other dynamics than its own where
     some are given.
     """
-    law, stress, fluid, own = _with_numbers(scene)
+    law, stress, pressing, own = _with_numbers(scene)
     acting = own if dynamics is None else dynamics
     begin, starts = FIRST_OWN, []
-    for part in (law, stress, fluid, own):
+    for part in (law, stress, pressing, own):
         starts.append(begin)
         begin += len(part.numbers(scene))
     return _assembled(
@@ -67,7 +67,7 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> Functions:
             starts[0],
         ),
         (stress.normal_stress, stress.state_effect, starts[1]),
-        (len(fluid.unknowns), *(getattr(fluid, name) for name in _OF_FLUID), starts[2]),
+        (len(pressing.unknowns), *(getattr(pressing, name) for name in _OF_FLUID), starts[2]),
         (*(getattr(acting, name) for name in _OF_DYNAMICS), starts[3]),
     )
 
@@ -79,7 +79,7 @@ _OF_DYNAMICS = ("balance", "growth", "rupture_rate", "rupture_point")
 
 def _with_numbers(scene: Scene) -> tuple[Any, Any, Any, Any]:
     parts = scene.parts
-    return parts.law, parts.normal_stress, parts.fluid, parts.dynamics
+    return parts.law, parts.normal_stress, scene.pressing, parts.dynamics
 
 
 @cache
@@ -152,7 +152,9 @@ def _both(effect: Function, other: Function) -> Function:
 def _of_fluid(
     known: Mapping[str, Any], of_law: int, count: int, seepage: Any, seeped: Any, own: int
 ) -> dict[str, Any]:
-    """What a fluid puts in the place of functions of law and stress, of which it makes use."""
+    """What a fluid, or a loading that goes on changing normal stress, puts in the place of
+    functions of law and stress, of which it makes use.
+    """
     filled = {
         **known,
         "STATES": of_law + count,

@@ -116,7 +116,7 @@ def _states(scene: Scene) -> tuple[str, ...]:
     """Names of the states."""
     count = scene.parts.law.states
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
-    return (*of_law, *(unknown.name for unknown in scene.parts.fluid.unknowns))
+    return (*of_law, *(unknown.name for unknown in scene.pressing.unknowns))
 
 
 def in_rupture(scene: Scene) -> Equations:

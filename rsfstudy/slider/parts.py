@@ -118,6 +118,7 @@ RULES: Mapping[str, Callable[[float], bool]] = {
     "must be greater than 0": lambda value: value > 0.0,
     "must be 0 or greater": lambda value: value >= 0.0,
     "must be greater than -1": lambda value: value > -1.0,
+    "must be -1 or greater": lambda value: value >= -1.0,
     "must lie between 0 and 1": lambda value: 0.0 <= value <= 1.0,
 }
 

@@ -1,8 +1,9 @@
-"""Forms of the friction relation and of the states for a fault whose pores hold a fluid.
+"""Forms of the friction relation and of the states for a fault whose pores hold a fluid, or whose
+normal stress a loading goes on changing.
 
 Pore pressure P, over sigma_*, takes from normal stress: s = sigma/sigma_* - P is what friction and
 the effects of stress on the state know of it. P stands last among the states, behind those of the
-law, which alone are part of Theta.
+law, which alone are part of Theta. What a loading imposes is the same with a P of its own.
 """
 
 from __future__ import annotations

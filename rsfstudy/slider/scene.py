@@ -98,12 +98,23 @@ class Scene(Shown):
     normal_stress_step : float
         Sudden change of imposed normal stress over sigma_* (not at constant normal stress); that of
         sigma_3 where a driving stress is inclined.
+    oscillation_amplitude, oscillation_period : float
+        Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
+        that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
+        stress; that of sigma_3 where a driving stress is inclined). Zero is none.
+    normal_stress_ramp, ramp_duration : float
+        Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
+        takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of
+        sigma_3 where a driving stress is inclined). Zero is none.
     hold_time : float
         Time in D_c/V_* for which the load point is held, before it moves on at
         `load_velocity_ratio`. Zero is no hold.
     velocity_steps, velocity_ratio, displacement_between_steps : float
         How many steps of load point velocity there are, from V_* to `velocity_ratio` V_* and back
         in turn, and how far in D_c it moves from one to the next (10; 20). Zero is no step.
+    velocity_ramp, velocity_ramp_duration, velocity_ramp_stairs : float
+        Change of load point velocity over V_* at a steady rate, time in D_c/V_* that it takes, and
+        number of stairs that stand for it (10; 64). Zero is none.
     inertia : bool
         Whether the slider has mass.
     radiation_damping : float
@@ -200,6 +211,11 @@ class Scene(Shown):
         return self.parts.dynamics
 
     @property
+    def pressing(self) -> fluid.Fluid | loading.Loading:
+        """What has the unknowns of which the last takes from normal stress, if any has."""
+        return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
+
+    @property
     def has_mass(self) -> bool:
         """Whether mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
@@ -212,8 +228,10 @@ class Scene(Shown):
 
     @property
     def states(self) -> int:
-        """How many states there are: those of the law, and the unknowns of the fluid."""
-        return self.parts.law.states + len(self.parts.fluid.unknowns)
+        """How many states there are: those of the law, and the unknowns of the fluid, or of a
+        loading that goes on changing normal stress.
+        """
+        return self.parts.law.states + len(self.pressing.unknowns)
 
     @property
     def b(self) -> float:
@@ -231,7 +249,16 @@ class Scene(Shown):
     @property
     def _is_changed(self) -> bool:
         """Whether friction is another than before the loading."""
-        return self.imposed_normal_stress != 0.0
+        return self.imposed_normal_stress != 0.0 or bool(self.parts.loading.unknowns)
+
+    @property
+    def unforced(self) -> Scene:
+        """The same slider under a load point that moves steadily, where its loading goes on
+        changing normal stress: what steady sliding and its stability are asked of.
+        """
+        if not self.parts.loading.unknowns:
+            return self
+        return self.under(loading.Segment(self.load_velocity))
 
     @cached_property
     def numbers(self) -> Numbers:
@@ -298,7 +325,10 @@ class Scene(Shown):
         history = self.parts.loading.segments
         if len(history) == 1:
             return ((self, history[0].duration),)
-        return tuple((self.under(segment), segment.duration) for segment in history)
+        acting = [self.under(segment) for segment in history]
+        if self.parts.loading.unknowns:
+            acting[0] = self
+        return tuple((scene, s.duration) for scene, s in zip(acting, history, strict=True))
 
     def under(self, segment: loading.Segment) -> Scene:
         """The same slider, loaded by one segment."""
@@ -308,7 +338,8 @@ class Scene(Shown):
             normal_stress_step=segment.normal_stress,
         )
         scene = self._with_parts(self.parts._replace(loading=step))
-        scene.__dict__.update({name: getattr(self, name) for name in _UNLOADED})
+        kept = _UNLOADED[:1] if self.parts.loading.unknowns else _UNLOADED
+        scene.__dict__.update({name: getattr(self, name) for name in kept})
         return scene
 
     def _with_parts(self, parts: Parts) -> Scene:
@@ -417,5 +448,6 @@ class Scene(Shown):
         return tuple(self._layout.own.values())
 
 
-#: What follows from a scene whatever loads it, once it has been asked for.
+#: What follows from a scene whatever loads it, once it has been asked for; the functions, of all
+#: loadings that have no unknowns, or the same.
 _UNLOADED = ("critical_stiffness", "functions")

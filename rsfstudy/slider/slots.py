@@ -20,6 +20,8 @@ FIRST_OWN = 9
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
 #: ln(V/V_*) = 276 (`slip_rate_unbounded`).
 LARGEST_EXPONENT = 300.0
+#: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
+LARGEST_SLOWNESS = 680.0
 #: Normal stress ratios outside of these only occur in trial steps; clamps keep them finite.
 SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
 

@@ -15,6 +15,13 @@ Pore pressure P, the last state where there is a fluid, takes -dstrength/dP from
 the 1 of a state of the law, and porosity nothing; P moves the shift too, so that E_s dshift/dP is
 part of its column of M.
 
+Normal stress that something outside changes by -dP acts on friction and on the shift alone: with
+the slopes F and S_P of strength and shift with respect to P, friction changes by
+
+    -[F - S_P 1.(p - M)^-1 E_s] dP / [D - S 1.(p - M)^-1 E_s]
+
+beside G(p) du.
+
 Spring, waves and mass balance it where K (1 + w**2 p**2) + eta V p + G(p) = 0, w being
 V T/(2 pi D_c). The critical stiffness is the K at which p is imaginary. Nothing here depends on
 which parts the scene has.
@@ -187,6 +194,7 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
     Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694, for one state variable without
     mass: ``(b - a) sigma_ss / (D_c [1 - cot(phi) (mu_ss - alpha)])``.
     """
+    scene = scene.unforced
     steady = steady_sliding(scene, log_rate)
     if steady is None:
         return math.nan
@@ -203,6 +211,7 @@ def critical_stiffnesses(scene: Scene, log_rate: float) -> list[float]:
     """Every stiffness at which small changes of steady sliding come to grow or to decay, or more of
     them grow, from the smallest up: several states may have more than one.
     """
+    scene = scene.unforced
     steady = steady_sliding(scene, log_rate)
     return [] if steady is None else _crossings(_around(scene, steady), _ROUNDING * scene.a)
 
@@ -357,10 +366,54 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
     ValueError
         Where there is no steady sliding.
     """
+    scene = scene.unforced
     steady = steady_sliding(scene, log_rate)
     if steady is None:
         raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
     return _rates(_around(scene, steady), scene.stiffness)
+
+
+def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -> complex:
+    """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
+    scene whose loading goes on changing that.
+
+    At constant shear stress and with the laws that rest at Theta = -b ln(V/V_*) it is ``K [mu + (mu
+    - alpha) p]/[a p**2 + (K - b + a) p + K]``, with p = i omega D_c/V and stress over sigma, which
+    has its resonance at omega D_c/V = sqrt((b - a)/a) as K falls to its critical value.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_rate : float
+        ln(V/V_*).
+    frequency : float
+        omega D_c/V_*.
+
+    Raises
+    ------
+    ValueError
+        Where there is no steady sliding.
+    """
+    still = scene.unforced
+    steady = steady_sliding(still, log_rate)
+    if steady is None:
+        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
+    psis = (*steady.psis, *(0.0 for _unknown in scene.pressing.unknowns))
+    by_pressure, p = scene.functions["strength_of_pressure"], scene.numbers_of_friction
+    gained, shifted = by_pressure(steady.friction, psis, p)
+    _by_rate, by_shift, by_state = slopes_of_law(still, steady)
+    denominator, adjugate = resolvent(by_state)
+    forced = [gained * x for x in denominator]
+    for power, matrix in enumerate(adjugate):
+        forced[power] -= shifted * math.fsum(_dot(row, by_shift) for row in matrix)
+    around, stiffness = _around(still, steady), scene.stiffness
+    spring = [stiffness, around.damping, stiffness * around.norm**2]
+    at = 1j * frequency * math.exp(-log_rate)
+    left, above, below, balance = (
+        complex(np.polyval(polynomial[::-1], at))
+        for polynomial in (forced, around.above, around.below, spring)
+    )
+    return stiffness * left / (balance * below + at * above)
 
 
 def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:

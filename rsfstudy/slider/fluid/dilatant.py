@@ -13,13 +13,12 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_threshold
 from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.slots import LARGEST_SLOWNESS
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 OWN = 0
-#: Exponents beyond this occur in trial steps only: slip that no load moves stops at 10^-290 V_*.
-LARGEST_EXPONENT = 680.0
 
 
 def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -45,7 +44,7 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     """
     porosity, pressure = states
     opening = share * (p[OWN] * log_rate - porosity)
-    time = share * math.exp(min(-log_rate, LARGEST_EXPONENT))
+    time = share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
     return opening, -p[OWN + 1] * time * pressure - opening
 
 

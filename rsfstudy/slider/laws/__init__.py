@@ -34,7 +34,7 @@ LARGEST_EXPONENT = 700.0
 
 #: Fields of a scene that decide whether the effects of a law go with it.
 OF_EFFECTS = (
-    *("stress_dependence", "normal_stress", "fluid"),
+    *("stress_dependence", "normal_stress", "fluid", "normal_stress_step"),
     *("regularised", "dynamics", "inertia", "radiation_damping"),
 )
 
@@ -135,9 +135,10 @@ class LawOfStates(Part):
         reverse, where that matters.
         """
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
+        loading, pressing = scene.parts.loading, scene.pressing
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
-        if not unknown and scene.parts.loading.imposes:
+        if not unknown and loading.imposes:
             unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
             raise InvalidValue(
@@ -146,7 +147,8 @@ class LawOfStates(Part):
                 f"is known for normal stress in proportion to shear stress, not for {unknown}",
                 remedy="Leave it out, or state `coupling` where the proportion is constant.",
             )
-        one_way = fluid if fluid.unknowns else None if scene.dynamics.reverses else scene.dynamics
+        reverses = scene.dynamics.reverses
+        one_way = pressing if pressing.unknowns else None if reverses else scene.dynamics
         if self.regularised and one_way:
             raise InvalidValue(
                 "regularised",

@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Part, found_in, number
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 
 class Segment(NamedTuple):
@@ -49,7 +53,27 @@ class Segment(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
-    """Base of the loading histories."""
+    """Base of the loading histories.
+
+    One that goes on changing normal stress says by which unknowns: the last of them takes from
+    imposed normal stress, over sigma_*, as pore pressure does. It states `seepage` and `seeped` as
+    a fluid does (see `fluid`), all unknowns being 0 in steady sliding, and what they begin with.
+    They are those of its first segment; what that imposes is beside them, and is what the last one
+    does. Others are without unknowns.
+    """
+
+    unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    seepage: ClassVar[Function | None] = None
+    seeped: ClassVar[Function | None] = None
+
+    @classmethod
+    def functions(cls) -> tuple[str, ...]:
+        return ("seepage", "seeped") if cls.unknowns else ()
+
+    @property
+    def beginning(self) -> Numbers:
+        """What its unknowns are at first."""
+        return ()
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -64,14 +88,14 @@ class Loading(Part):
     @property
     def is_a_step(self) -> bool:
         """Whether it changes anything about steady sliding at V_*."""
-        return any(
+        return bool(self.unknowns) or any(
             s.load_velocity != 1.0 or s.displacement or s.normal_stress for s in self.segments
         )
 
     @property
     def imposes(self) -> bool:
         """Whether it changes normal stress."""
-        return any(segment.normal_stress for segment in self.segments)
+        return bool(self.unknowns) or any(segment.normal_stress for segment in self.segments)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
@@ -94,6 +118,14 @@ def last_velocity() -> Any:
         remedy="0 holds the load point.",
         scale="V_*",
     )
+
+
+def refuse_fluid(scene: Scene, name: str, value: float) -> None:
+    """Refuse a field of a loading that has unknowns beside a fluid that has some too."""
+    fluid = scene.parts.fluid
+    if fluid.unknowns:
+        rule = f"has no meaning for fluid={fluid.name!r}, whose pore pressure changes normal stress"
+        raise InvalidValue(name, value, rule, remedy="Leave one of them out.")
 
 
 PARTS = found_in(__name__, __path__)

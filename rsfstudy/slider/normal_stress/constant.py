@@ -20,7 +20,7 @@ class Constant(NormalStress):
     name = "constant"
     coupling = (0.0, 0.0)
 
-    @reads("normal_stress_step")
+    @reads("normal_stress_step", "oscillation_amplitude", "normal_stress_ramp")
     def check(self, scene: Scene) -> None:
         """Nothing that changes it."""
         if scene.parts.loading.imposes:

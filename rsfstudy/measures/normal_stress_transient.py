@@ -1,0 +1,278 @@
+"""A step of normal stress under a load point that moves on, as Linker and Dieterich read it off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._single_step import check_leaves_alone
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event
+from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of
+from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Part of the record, at its end, over which friction must stay, and within which part of what it
+#: is at `fit_from`.
+_LAST, _STAYS = 0.1, 0.01
+#: ln(V/V_*) within which slip rate must be again where reading begins: the spring has then taken up
+#: what strength changed by.
+_TAKEN_UP = math.log(2.0)
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_BY_CHANCE = 0.01
+#: By how much the errors of two runs, at single instants of a stiff machine, differ by chance.
+_AT_INSTANTS = 3.0
+
+_READ = (
+    Quantity("apparent_alpha", r"$\alpha$", "1", "normal stress effect on the state, as read off"),
+    Quantity(
+        "apparent_slip_distance",
+        "$D_c$",
+        "1",
+        "slip over which the transient of friction falls to 1/e, as read off",
+        "D_c",
+    ),
+    Quantity(
+        "evolution_left",
+        r"$\Delta\mu(D_c)/\Delta\mu(0)$",
+        "1",
+        "part of the direct change that is left of the transient after a slip of D_c",
+    ),
+)
+_OTHERS = (
+    Quantity(
+        "direct_change",
+        r"$\Delta\mu(0)$",
+        "1",
+        "change of friction at once, less the direct effect of slip rate",
+    ),
+    Quantity("settled", "", "1", "whether friction has settled at the end of the record"),
+    Quantity(
+        "closed_form_departure",
+        "",
+        "1",
+        "largest departure of friction, where it is read, from that of a stiff slider",
+    ),
+    FRICTION,
+    LOAD_POINT,
+)
+_SERIES = (
+    "time",
+    "load_point_displacement",
+    "slip",
+    "friction_coefficient",
+    "normal_stress_ratio",
+    "log10_slip_rate",
+)
+
+
+class _Record(NamedTuple):
+    """What a motion tells of a step: the instant after it, what was recorded, and friction against
+    slip.
+    """
+
+    begin: Event
+    rows: np.ndarray
+    friction: CubicHermiteSpline
+
+    @property
+    def after(self) -> float:
+        """Friction at the end of the record."""
+        return float(friction_of(self.rows[-1:])[0])
+
+    def with_half_of_its_points(self) -> _Record:
+        """The same, with friction from every other point."""
+        x, known = self.friction.x[::2], self.friction
+        return self._replace(friction=CubicHermiteSpline(x, known(x), known.derivative()(x)))
+
+    def left(self, slip: float) -> float:
+        """What is left of the transient after so much slip."""
+        return float(self.friction(slip)) - self.after
+
+
+@dataclass(frozen=True)
+class NormalStressTransient(Measure):
+    """What friction does after a step of imposed normal stress by a ratio r, while the load point
+    moves on at V_*.
+
+    An exponential through what is left of the transient at two slips gives its slip distance, and
+    followed back to the step its size, which over -ln r is alpha. A rigid slider whose state
+    evolves by the slip law shows -alpha ln r exp(-slip/D_c), and one by the slowness law b ln{1 +
+    [r^(-alpha/b) - 1] exp(-slip/D_c)}: what is read off it is alpha by the slip law alone.
+
+    Parameters
+    ----------
+    fit_from, fit_to : float
+        Slips since the step at which the exponential is read, in D_c: the spring must have taken up
+        the change of strength before the first, where slip rate is V_* again to a factor of two.
+    record : float
+        Load point displacement that is recorded, in D_c; friction at its end counts as steady.
+    phases : int
+        Points of the record that are kept along `phase`.
+
+    References
+    ----------
+    Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940.
+    """
+
+    fit_from: float = 0.5
+    fit_to: float = 1.5
+    record: float = 30.0
+    phases: int = 300
+    name: ClassVar[str] = "normal_stress_transient"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.fit_from < self.fit_to:
+            rule = "must be greater than 0 and less than fit_to"
+            raise InvalidValue("fit_from", self.fit_from, rule)
+        if not self.fit_to + 1.0 <= self.record < math.inf:
+            rule = "must exceed fit_to by 1 D_c at least, and be finite"
+            raise InvalidValue("record", self.record, rule)
+        if self.phases < 2:
+            raise InvalidValue("phases", self.phases, "must be at least 2")
+
+    @property
+    def headline(self) -> str:
+        return "apparent_alpha"
+
+    @property
+    def variables(self) -> Mapping[str, tuple[str, ...]]:
+        read = [about.name for about in _READ]
+        scalars = (*read, *(f"{name}_error" for name in read))
+        others = ("direct_change", "settled", "closed_form_departure")
+        return dict.fromkeys((*scalars, *others), ()) | dict.fromkeys(_SERIES, ("phase",))
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return (*_READ, *_OTHERS)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"phase": np.linspace(0.0, 1.0, self.phases)}
+
+    @property
+    def typical_work(self) -> int:
+        return 4_000
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Follow the motion, and once more with smaller tolerances for the errors."""
+        check_leaves_alone(scene)
+        step = scene.parts.loading.segments[0]
+        if not step.normal_stress:
+            return Outcome(Status.NO_STEP, message="normal stress does not change at once")
+        why = self._speaks_against(scene)
+        if why:
+            return Outcome(Status.NOT_APPLICABLE, message=why)
+        record = self._follow(scene, accuracy, meter)
+        again = self._follow(scene, accuracy.refined(), meter)
+        shown = self._shown(scene, record)
+        values, finer = self._read(scene, record), self._read(scene, again)
+        if not values or not finer:
+            span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
+            why = f"from {span} friction does not decay, or is still that of loading or unloading"
+            return Outcome(Status.NOT_APPLICABLE, shown, why)
+        sparse = self._read(scene, record.with_half_of_its_points()) or values
+        errors = {
+            f"{name}_error": abs(value - sparse[name])
+            + _AT_INSTANTS * error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
+            for name, value in values.items()
+        }
+        return Outcome(Status.OK, {**values, **errors, **shown})
+
+    def _speaks_against(self, scene: Scene) -> str:
+        """Why there is nothing to read; empty where there is."""
+        step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
+        if step.load_velocity != 1.0 or step.displacement:
+            return "the load point does not move on at V_* as before"
+        if coupling is None or coupling[0] or scene.pressing.unknowns:
+            return "effective normal stress follows shear stress or pore pressure"
+        if step.duration < self.record:
+            return "normal stress does not stay so for all of the record"
+        return ""
+
+    def _follow(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> _Record:
+        recording = Recording()
+        begin, *_others = follow(
+            scene, accuracy, meter, clock=True, recording=recording, until=self.record
+        )
+        rows = recording.seen(scene)
+        slip = rows[:, OBSERVED.index("slip")]
+        onward = np.append(True, np.diff(np.maximum.accumulate(slip)) > 0.0)
+        kept = rows[onward]
+        rate = 10.0 ** kept[:, OBSERVED.index("log10_slip_rate")]
+        ratio = kept[:, OBSERVED.index("normal_stress_ratio")]
+        # spring stress rises by K (V_0/V - 1) per unit slip
+        slope = scene.stiffness * (scene.load_velocity / rate - 1.0) / ratio
+        spline = CubicHermiteSpline(slip[onward], friction_of(kept), slope)
+        return _Record(begin, rows, spline)
+
+    def _read(self, scene: Scene, record: _Record) -> dict[str, float]:
+        """What is read off; nothing where no exponential goes through what is left, or the spring
+        has not taken up the change of strength.
+        """
+        first, last = record.left(self.fit_from), record.left(self.fit_to)
+        slip, rate = (OBSERVED.index(name) for name in ("slip", "log10_slip_rate"))
+        faster = np.interp(self.fit_from, record.rows[:, slip], record.rows[:, rate])
+        if abs(faster) * math.log(10.0) > _TAKEN_UP or not first or not 0.0 < last / first < 1.0:
+            return {}
+        distance = (self.fit_to - self.fit_from) / math.log(first / last)
+        size = first * math.exp(self.fit_from / distance)
+        ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
+        direct = _direct(scene, record)
+        return {
+            "apparent_alpha": -size / math.log(ratio),
+            "apparent_slip_distance": distance,
+            "evolution_left": record.left(1.0) / direct if direct else math.nan,
+        }
+
+    def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:
+        """What friction did at once, whether it has settled, how far it departs from that of a
+        stiff slider, and the record itself.
+        """
+        rows, friction = record.rows, friction_of(record.rows)
+        late = rows[:, 0] >= (1.0 - _LAST) * self.record
+        path = along_path(rows, self.phases)
+        path_rows = np.column_stack([path[name] for name in OBSERVED])
+        return {
+            "direct_change": _direct(scene, record),
+            "settled": float(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from))),
+            "closed_form_departure": self._departure(scene, record),
+            "time": path["time"],
+            "load_point_displacement": path["time"],
+            "slip": path["slip"],
+            "friction_coefficient": friction_of(path_rows),
+            "normal_stress_ratio": path["normal_stress_ratio"],
+            "log10_slip_rate": path["log10_slip_rate"],
+        }
+
+    def _departure(self, scene: Scene, record: _Record) -> float:
+        """Largest departure of friction, from `fit_from` on, from what a stiff slider shows after
+        so much slip, ``b stress_left(-(alpha/b) ln r, slip)``; NaN where there is no such form.
+        """
+        law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
+        if law.stress_left is None or law.feels_stress or coupling is None:
+            return math.nan
+        slip = record.rows[:, OBSERVED.index("slip")]
+        read = slip >= self.fit_from
+        ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
+        away = -coupling[1] / scene.b * math.log(ratio)
+        left = np.array([law.stress_left(away, at) for at in slip[read].tolist()])
+        seen = friction_of(record.rows[read]) - scene.mu_star
+        return float(np.abs(seen - scene.b * left).max())
+
+
+def _direct(scene: Scene, record: _Record) -> float:
+    """Change of friction at once, less the direct effect of slip rate."""
+    point = record.begin.point
+    return point.coefficient - scene.mu_star - scene.a * point.log_rate

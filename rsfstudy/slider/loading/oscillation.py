@@ -1,0 +1,119 @@
+"""Oscillating normal stress: what the rig, a tide or a passing wave imposes, for ever."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
+from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.slots import LARGEST_SLOWNESS
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+
+
+def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
+    and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
+
+    What numerical errors make of the amplitude decays in a period: to both is added ``(omega/2) [1
+    - (y**2 + P**2)/A**2]`` times y or P, which vanishes along the exact solution.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    states : tuple of float
+        y and P.
+    share : float
+        What the changes are multiplied by (see `fluid.dilatant.seepage`).
+    p : tuple of float
+        omega D_c/V_* at OWN, and A behind it.
+    """
+    ahead, relief = states
+    turn = p[OWN] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    over, relative = ahead / p[OWN + 1], relief / p[OWN + 1]
+    missing = 0.5 * (1.0 - over * over - relative * relative)
+    return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
+
+
+def seeped(log_rate: float, p: Numbers) -> Numbers:
+    """No oscillation in steady sliding."""
+    return 0.0, 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Oscillation(Loading):
+    """Imposed normal stress ``sigma_* [1 + A sin(2 pi t/T_o)]`` from steady sliding on, and load
+    point velocity (V_* unless stated).
+    """
+
+    oscillation_amplitude: float = number(
+        0.0,
+        r"$A$",
+        "1",
+        "amplitude of an oscillation of imposed normal stress",
+        rule="must be 0 or greater",
+        remedy="0 is no oscillation.",
+        scale="sigma_*",
+    )
+    oscillation_period: float = number(
+        10.0,
+        r"$T_o V_*/D_c$",
+        "1",
+        "period of the oscillation of imposed normal stress",
+        rule="must be greater than 0",
+        scale="D_c/V_*",
+    )
+    load_velocity_ratio: float | None = last_velocity()
+
+    name = "oscillation"
+    called_by = "oscillation_amplitude"
+    unknowns = (
+        Quantity("oscillation_ahead", "$y$", "1", "oscillation a quarter ahead", "sigma_*"),
+        Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
+    )
+    seepage = staticmethod(seepage)
+    seeped = staticmethod(seeped)
+
+    @reads("oscillation_amplitude", "oscillation_period", "fluid", "inertia", "period",
+           "reference_rate")  # fmt: skip
+    def check(self, scene: Scene) -> None:
+        """Normal stress that stays positive, slow enough where there is no mass, and is not that of
+        a fluid too.
+        """
+        amplitude, period = self.oscillation_amplitude, self.oscillation_period
+        if amplitude >= 1.0:
+            remedy = "Normal stress stays positive: it oscillates by less than all of it."
+            raise InvalidValue(
+                "oscillation_amplitude", amplitude, "must be less than 1", remedy=remedy
+            )
+        refuse_fluid(scene, "oscillation_amplitude", amplitude)
+        free = 2.0 * math.pi * scene.inertial_time
+        if period < free and not scene.has_mass:
+            raise InvalidValue(
+                "oscillation_period",
+                period,
+                f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters",
+                remedy="Set inertia=True, or give a longer one.",
+            )
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """One, for ever."""
+        return (Segment(1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio),)
+
+    @property
+    def beginning(self) -> Numbers:
+        """y = A, and imposed normal stress as in steady sliding."""
+        return self.oscillation_amplitude, 0.0
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """omega D_c/V_*, and A."""
+        return 2.0 * math.pi / self.oscillation_period, self.oscillation_amplitude

@@ -1,0 +1,96 @@
+"""A ramp of normal stress: imposed normal stress changes at a steady rate, and then stays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
+from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.slots import LARGEST_SLOWNESS
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+OWN = 0
+
+
+def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+    """Change of P per unit slip in D_c, times a share: at a steady rate in time, by which it goes
+    to 0 from all that normal stress is yet to change by.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    states : tuple of float
+        P.
+    share : float
+        What the change is multiplied by (see `fluid.dilatant.seepage`).
+    p : tuple of float
+        Rate of imposed normal stress in sigma_* V_*/D_c, at OWN.
+    """
+    return (-p[OWN] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS)),)
+
+
+def seeped(log_rate: float, p: Numbers) -> Numbers:
+    """Nothing is left to change in steady sliding."""
+    return (0.0,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(Loading):
+    """Change of imposed normal stress from steady sliding on, how long it takes, and load point
+    velocity (V_* unless stated).
+    """
+
+    normal_stress_ramp: float = number(
+        0.0,
+        r"$\Delta\sigma/\sigma_*$",
+        "1",
+        "change of imposed normal stress at a steady rate",
+        rule="must be greater than -1",
+        remedy="Normal stress stays positive: a fall is by less than all of it.",
+        scale="sigma_*",
+    )
+    ramp_duration: float = number(
+        1.0,
+        r"$t_r V_*/D_c$",
+        "1",
+        "time for which imposed normal stress changes",
+        rule="must be greater than 0",
+        remedy="A sudden change is normal_stress_step.",
+        scale="D_c/V_*",
+    )
+    load_velocity_ratio: float | None = last_velocity()
+
+    name = "ramp"
+    called_by = "normal_stress_ramp"
+    unknowns = (
+        Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
+    )
+    seepage = staticmethod(seepage)
+    seeped = staticmethod(seeped)
+
+    @reads("fluid")
+    def check(self, scene: Scene) -> None:
+        """No fluid that changes normal stress too."""
+        refuse_fluid(scene, "normal_stress_ramp", self.normal_stress_ramp)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The ramp, and what follows it."""
+        velocity = 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
+        last = Segment(velocity, normal_stress=self.normal_stress_ramp)
+        return last._replace(duration=self.ramp_duration), last
+
+    @property
+    def beginning(self) -> Numbers:
+        """All of the change is yet to come."""
+        return (self.normal_stress_ramp,)
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """Its rate."""
+        return (self.normal_stress_ramp / self.ramp_duration,)

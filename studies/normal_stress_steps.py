@@ -1,0 +1,130 @@
+"""Steps of normal stress: alpha and D_c as Linker and Dieterich's test gives them."""
+
+import math
+
+from scipy.integrate import quad
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.scene import Scene
+
+#: Stiffness over critical stiffness, compliant to stiff.
+RATIOS = [10.0, 20.0, 50.0, 100.0]
+STEPS = [-0.2, -0.05, 0.05, 0.2]
+STIFF = RATIOS[-1]
+LAWS = ("slip", "slowness")
+
+base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0, load_velocity_ratio=1.0)
+a, b, mu, alpha = base.a, base.b, base.mu_star, base.alpha
+MEASURE = NormalStressTransient(record=20.0)
+FORM = "closed form at constant slip rate, and its first order in a/K"
+
+
+def left(law: str, step: float, ratio: float, slip: float) -> float:
+    """What is left of the transient of friction after so much slip, to first order in a/K.
+
+    With r = 1 + step, a rigid slider shows -alpha ln r exp(-slip) by the slip law, and b ln(1 + y)
+    with y = [r^(-alpha/b) - 1] exp(-slip) by the slowness law. While the spring takes up the change
+    of strength, ln V goes from x to 0 over a slip of about a r/K, and the state evolves otherwise
+    than at V_*; and slip is not as fast as the load point while friction changes.
+    """
+    r = 1.0 + step
+    short = r / (ratio * (b - a))
+    x = (mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a
+    if law == "slip":
+        size = -alpha * math.log(r)
+        late = -a * b * short * quad(lambda y: y / math.expm1(-y) if y else -1.0, x, 0.0)[0]
+        return float((size + late + short * size * (a - b * slip)) * math.exp(-slip))
+    y = math.expm1(-alpha / b * math.log(r))
+    slower = b * short * y * math.log((math.exp(slip) + y) / (1.0 + y))
+    now = math.exp(-slip) * (y - a * short * x - slower)
+    rigid = math.exp(-slip) * y
+    return b * math.log1p(now) + a * b * short * rigid / (1.0 + rigid)
+
+
+def reads(law: str, step: float, ratio: float = math.inf) -> tuple[float, float]:
+    """alpha and D_c that the measure reads off that."""
+    first, last = (left(law, step, ratio, slip) for slip in (MEASURE.fit_from, MEASURE.fit_to))
+    distance = (MEASURE.fit_to - MEASURE.fit_from) / math.log(first / last)
+    return -first * math.exp(MEASURE.fit_from / distance) / math.log(1.0 + step), distance
+
+
+def follows(law: str, step: float) -> Claim:
+    """R5: a stiff slider."""
+    read, rigid = reads(law, step, STIFF)[0], reads(law, step)[0]
+    return Claim(
+        id="R5",
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFF:g} k_cr: alpha as read off is "
+        f"that of a rigid slider, {rigid:.4f}, but for O(a/K)",
+        source=FORM,
+        variable="apparent_alpha",
+        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFF},
+        published=read,
+        tolerance=0.2 * abs(read - rigid) + 1e-3 * alpha,
+        reason="second order in a/K: a fifth of the first; and 1e-3 of alpha",
+    )
+
+
+def falls_over(law: str, step: float) -> Claim:
+    """R6: the slip distance on a stiff machine."""
+    read, rigid = reads(law, step, STIFF)[1], reads(law, step)[1]
+    return Claim(
+        id="R6",
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFF:g} k_cr: D_c as read off is "
+        f"that of a rigid slider, {rigid:.4f} D_c, but for O(a/K)",
+        source=FORM,
+        variable="apparent_slip_distance",
+        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFF},
+        published=read,
+        tolerance=0.5 * b / (STIFF * (b - a)),
+        reason="second order: half of the b/K that the terms of first order are made of",
+    )
+
+
+def is_direct(law: str, step: float) -> Claim:
+    """R7: at once."""
+    return Claim(
+        id="R7",
+        statement=f"{law} law, step of {step:+g} sigma_*: the state loses alpha ln r at once",
+        source="Linker and Dieterich (1992): dTheta = -alpha dsigma/sigma",
+        variable="direct_change",
+        where={"law": law, "normal_stress_step": step, "stiffness_ratio": RATIOS[0]},
+        published=-alpha * math.log(1.0 + step),
+        tolerance=1e-13,
+        reason="an identity: rounding, over a",
+    )
+
+
+study = Study(
+    name="normal_stress_steps",
+    title="Steps of normal stress as an experimenter reads them, b/a = 2",
+    summary=(
+        "Imposed normal stress steps while the load point moves on at V_*, and friction is "
+        "recorded over 20 D_c. An exponential through the transient, followed back to the step, "
+        "gives alpha and D_c. With the slip law both are right on a stiff machine. With the "
+        "slowness law alpha is read too small from steps up and too large from steps down, however "
+        "stiff the machine. On a compliant machine slip has passed before the spring has taken up "
+        "the change of strength, and what is read says as much of the machine as of the fault."
+    ),
+    base=base,
+    axes=[
+        Axis("law", LAWS),
+        Axis("normal_stress_step", STEPS),
+        Axis("stiffness_ratio", RATIOS),
+    ],
+    measure=MEASURE,
+    accuracy=Accuracy(rtol=1e-5),
+    claims=[
+        *(follows(law, step) for law in LAWS for step in STEPS),
+        *(falls_over(law, step) for law in LAWS for step in STEPS),
+        *(is_direct(law, step) for law in LAWS for step in (STEPS[0], STEPS[-1])),
+    ],
+    plot="normal_stress_steps",
+    references=[
+        "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940",
+        "Hong and Marone (2005), Geochem. Geophys. Geosyst. 6, Q03012",
+    ],
+)

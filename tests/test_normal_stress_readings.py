@@ -1,0 +1,247 @@
+"""What is read off a motion under oscillating normal stress, and after a step of it: linear theory
+and how it is approached, closed forms, then errors and engines.
+"""
+
+import cmath
+import math
+
+import pytest
+
+from rsfstudy import Scene, protocol
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.slider.steady import response_to_normal_stress
+from rsfstudy.status import Status
+
+LAWS = ("slip", "slowness")
+IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
+INCLINED = {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0}
+PERIOD = 7.0
+OSCILLATES = {"oscillation_amplitude": 1e-3, "oscillation_period": PERIOD, "stiffness_ratio": 1.5}
+#: A slider whose mass acts in steady sliding: V T/(2 pi D_c) is 0.05.
+HEAVY = {"inertia": True, "period": 1.0, "reference_rate": 0.1 * math.pi, "instability_norm": 50.0}
+
+
+def read(measure, scene: Scene, rtol: float = 1e-7, engine: str = COMPILED) -> dict:
+    outcome = measure(scene, Accuracy(rtol, engine=engine))
+    assert outcome.status is Status.OK, outcome
+    return outcome.values
+
+
+def response(scene: Scene, amplitude: float) -> complex:
+    found = read(NormalStressResponse(), scene.with_(oscillation_amplitude=amplitude), 1e-8)
+    assert found["settled"] == 1.0
+    return cmath.rect(found["gain"], math.radians(found["phase_lead"]))
+
+
+# ---- linear theory -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("velocity", [1.0, 3.0])
+@pytest.mark.parametrize("law", LAWS)
+def test_linear_theory_is_the_formula(law, velocity):
+    """``K [mu + (mu - alpha) z]/[a z**2 + (K - b + a) z + K]``."""
+    scene = Scene(law=law, **IMPOSED, **OSCILLATES, load_velocity_ratio=velocity)
+    a, b, stiffness, rate = scene.a, scene.b, scene.stiffness, math.log(velocity)
+    mu, z = scene.mu_star + (a - b) * rate, 2j * math.pi / PERIOD / velocity
+    form = stiffness * (mu + (mu - 0.3) * z) / (a * z * z + (stiffness - b + a) * z + stiffness)
+    ours = response_to_normal_stress(scene, rate, 2.0 * math.pi / PERIOD)
+    assert ours == pytest.approx(form, rel=1e-11)
+
+
+def test_waves_and_mass_resist():
+    """``eta V z`` and ``K w**2 z**2`` beside K; and a rigid slider has no spring to tell."""
+    z = 2j * math.pi / PERIOD
+    plain, waves, heavy = (
+        Scene(law="slip", **IMPOSED, **OSCILLATES, **more)
+        for more in ({}, {"radiation_damping": 0.01}, HEAVY)
+    )
+    base = response_to_normal_stress(plain, 0.0, abs(z))
+    stiffness = plain.stiffness
+    above = stiffness * (plain.mu_star + (plain.mu_star - 0.3) * z)
+    for scene, more in ((waves, 0.01 * z), (heavy, stiffness * 0.05**2 * z * z)):
+        expected = above / (above / base + more * (1.0 + z))
+        ours = response_to_normal_stress(scene, 0.0, abs(z))
+        assert ours == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"law": "slip", **IMPOSED},
+        {"law": "slowness", **INCLINED},
+        {"law": "slowness", **INCLINED, "radiation_damping": 1e-3},
+        {"law": "slowness", **INCLINED, "load_velocity_ratio": 2.0},
+        {"law": "slowness", **IMPOSED, **HEAVY},
+    ],
+    ids=["imposed", "inclined", "waves", "faster", "mass"],
+)
+def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
+    """What is left at two amplitudes falls by four; without that, they agree to the accuracy."""
+    scene = Scene(**{**OSCILLATES, **fields})
+    linear = response_to_normal_stress(scene, scene.log_load_rate, 2.0 * math.pi / PERIOD)
+    large, small = (response(scene, amplitude) / linear - 1.0 for amplitude in (1e-3, 5e-4))
+    assert abs(large / small) == pytest.approx(4.0, rel=0.1)
+    assert abs(4.0 * small - large) / 3.0 < 0.02 * abs(large) + 2e-6
+
+
+def test_what_is_shown_is_one_period():
+    """Time, load point, slip and normal stress of it; gain is that of what is shown."""
+    scene = Scene(law="slip", **IMPOSED, **OSCILLATES)
+    found = read(NormalStressResponse(samples=16), scene)
+    assert found["time"][-1] == pytest.approx(PERIOD, rel=1e-12)
+    assert found["load_point_displacement"][-1] == pytest.approx(PERIOD, rel=1e-12)
+    assert found["slip"][-1] == pytest.approx(PERIOD, rel=1e-9)
+    for name in ("friction_coefficient", "normal_stress_ratio", "log10_slip_rate"):
+        assert found[name][-1] == pytest.approx(found[name][0], abs=1e-8)
+    sigma = found["normal_stress_ratio"]
+    tau = found["friction_coefficient"] * sigma
+    waves = [cmath.exp(-2j * math.pi * n / 16) for n in range(16)]
+    ratio = sum(tau[:-1] * waves) / sum(sigma[:-1] * waves)
+    assert abs(ratio) == pytest.approx(found["gain"], rel=1e-7)
+    assert math.degrees(cmath.phase(ratio)) == pytest.approx(found["phase_lead"], abs=1e-5)
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 2e-2])
+@pytest.mark.parametrize("fields", [{"law": "slowness", **IMPOSED}, {"law": "slip", **IMPOSED}])
+def test_errors_of_a_response_cover_and_engines_agree(fields, amplitude):
+    scene = Scene(**fields, **{**OSCILLATES, "oscillation_amplitude": amplitude})
+    scene, measure = scene.with_(stiffness_ratio=3.0), NormalStressResponse(samples=32)
+    exact, rough = read(measure, scene, 1e-9), read(measure, scene, 1e-4)
+    other = read(measure, scene, 1e-4, ENGINES[0])
+    for name in ("gain", "phase_lead", "distortion", "departure_from_linear"):
+        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
+        assert other[name] == pytest.approx(rough[name], rel=1e-7, abs=1e-9), name
+
+
+@pytest.mark.parametrize("period", [0.6, 5.0])
+def test_errors_cover_where_the_response_is_as_small_as_the_tolerance_lets_it(period):
+    """What is left of a transient is no overtone, and no lead."""
+    scene = Scene(law="slip", **IMPOSED, stiffness_ratio=3.8, oscillation_amplitude=2e-4)
+    scene, measure = scene.with_(oscillation_period=period), NormalStressResponse(samples=32)
+    exact = read(measure, scene, 1e-9)
+    for rtol in (1e-3, 1e-4, 1e-5):
+        rough = read(measure, scene, rtol)
+        for name in ("gain", "phase_lead", "distortion", "departure_from_linear"):
+            assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], (name, rtol)
+
+
+@pytest.mark.parametrize(
+    ("fields", "status"),
+    [
+        ({"oscillation_amplitude": 0.0}, Status.NO_STEP),
+        ({"load_velocity_ratio": 0.0}, Status.NO_STEADY_STATE),
+        ({"stiffness_ratio": 0.9}, Status.NOT_APPLICABLE),
+        ({"law": "slip", "stiffness_ratio": 1.1, "oscillation_amplitude": 0.1},
+         Status.SLIP_RATE_UNBOUNDED),
+    ],
+)  # fmt: skip
+def test_where_there_is_no_response(fields, status):
+    scene = Scene(**IMPOSED, **OSCILLATES).with_(**fields)
+    assert NormalStressResponse()(scene, Accuracy(1e-4)).status is status
+
+
+# ---- after a step --------------------------------------------------------------------------------
+
+STEP = {"normal_stress_step": 0.1, "load_velocity_ratio": 1.0}
+
+
+@pytest.mark.parametrize("step", [-0.1, 0.1])
+@pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
+def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
+    """The departure from the closed form falls in proportion to 1/K; at once, the state has lost
+    alpha ln r.
+    """
+    departures = []
+    for ratio in (60.0, 600.0):
+        scene = Scene(law=law, **IMPOSED, **{**STEP, "normal_stress_step": step})
+        measure = NormalStressTransient(record=4.0, phases=2)
+        found = read(measure, scene.with_(stiffness_ratio=ratio), 1e-5)
+        departures.append(found["closed_form_departure"])
+        assert found["direct_change"] == pytest.approx(-0.3 * math.log1p(step), rel=1e-12)
+    assert departures[1] < 0.1 * departures[0] * 1.3
+    assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
+
+
+@pytest.mark.parametrize(("law", "true"), [("slip", True), ("slowness", False)])
+def test_alpha_is_read_right_by_the_slip_law_alone(law, true):
+    """As K grows, by extrapolation of what first order leaves; the slowness law's is that of its
+    closed form, which is no exponential.
+    """
+    scene = Scene(law=law, **IMPOSED, **STEP)
+    soft, stiff = (
+        read(NormalStressTransient(record=12.0, phases=2), scene.with_(stiffness_ratio=k), 1e-6)
+        for k in (150.0, 300.0)
+    )
+    b, r = scene.b, 1.1
+    left = [b * math.log1p((r ** (-0.3 / b) - 1.0) * math.exp(-slip)) for slip in (0.5, 1.5)]
+    distance = 1.0 if true else 1.0 / math.log(left[0] / left[1])
+    alpha = 0.3 if true else -left[0] * math.exp(0.5 / distance) / math.log(r)
+    for name, expected in (("apparent_alpha", alpha), ("apparent_slip_distance", distance)):
+        assert 2.0 * stiff[name] - soft[name] == pytest.approx(expected, rel=2e-3), name
+    if true:
+        share = 2.0 * stiff["evolution_left"] - soft["evolution_left"]
+        assert share == pytest.approx(math.exp(-1.0), rel=2e-3)
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+def test_errors_of_a_transient_cover_and_engines_agree(inertia):
+    scene = Scene(law="slowness", **IMPOSED, **STEP, stiffness_ratio=20.0, inertia=inertia)
+    measure = NormalStressTransient(phases=20)
+    exact, rough = read(measure, scene, 1e-9), read(measure, scene, 1e-4)
+    other = read(measure, scene, 1e-4, ENGINES[0])
+    for name in ("apparent_alpha", "apparent_slip_distance", "evolution_left"):
+        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
+        assert other[name] == pytest.approx(rough[name], rel=1e-6), name
+    assert rough["settled"] == 1.0
+    assert rough["load_point_displacement"][-1] == pytest.approx(30.0, rel=1e-9)
+    assert rough["normal_stress_ratio"] == pytest.approx(1.1, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fields", "status", "message"),
+    [
+        ({"normal_stress_step": 0.0}, Status.NO_STEP, "does not change"),
+        ({"load_velocity_ratio": 0.0}, Status.NOT_APPLICABLE, "does not move on at V_"),
+        ({"displacement_step": 0.1}, Status.NOT_APPLICABLE, "does not move on at V_"),
+        (INCLINED, Status.NOT_APPLICABLE, "follows shear stress"),
+        ({"fluid": "dilatant"}, Status.NOT_APPLICABLE, "follows shear stress or pore pressure"),
+        ({"stiffness_ratio": 2.0}, Status.NOT_APPLICABLE, "loading or unloading"),
+    ],
+)
+def test_where_there_is_no_transient_to_read(fields, status, message):
+    scene = Scene(**IMPOSED, **STEP, stiffness_ratio=20.0).with_(**fields)
+    outcome = NormalStressTransient()(scene, Accuracy(1e-4))
+    assert (outcome.status, message in outcome.message) == (status, True)
+    assert "apparent_alpha" not in outcome.values
+
+
+def test_a_protocol_that_steps_too_soon_is_not_read():
+    rows = [{"velocity": 1.0, "normal_stress": 1.1, "duration": 5.0}, {"velocity": 1.0}]
+    scene = Scene(**IMPOSED, stiffness_ratio=20.0, loading=protocol(rows))
+    outcome = NormalStressTransient()(scene, Accuracy(1e-4))
+    assert outcome.status is Status.NOT_APPLICABLE
+    assert read(NormalStressTransient(record=4.0), scene, 1e-4)["apparent_alpha"] > 0.0
+
+
+def test_a_transient_is_not_asked_of_an_oscillation():
+    with pytest.raises(InvalidValue, match="changes normal stress all along"):
+        NormalStressTransient()(Scene(**IMPOSED, **OSCILLATES), Accuracy())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: NormalStressResponse(samples=9), "must be an even number, at least 8"),
+        (lambda: NormalStressTransient(fit_from=0.0), "fit_from.*greater than 0 and less"),
+        (lambda: NormalStressTransient(fit_from=2.0), "fit_from.*less than fit_to"),
+        (lambda: NormalStressTransient(record=2.0), "record.*exceed fit_to by 1 D_c"),
+        (lambda: NormalStressTransient(phases=1), "phases.*at least 2"),
+    ],
+)
+def test_measures_that_read_nothing(wrong, message):
+    with pytest.raises(InvalidValue, match=message):
+        wrong()

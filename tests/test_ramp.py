@@ -1,0 +1,191 @@
+"""Ramps of imposed normal stress: exact, a step where they are short, and nothing once over; and
+ramps of load point velocity, in stairs.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rsfstudy import Scene, simulate
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.events import Kind, maximum, settling
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.steady import growth_rates
+from rsfstudy.status import Status
+
+IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}
+SLIDERS = {
+    "inclined, waves": {**IMPOSED, "normal_stress": "variable", "radiation_damping": 1e-3},
+    "imposed, mass": {**IMPOSED, "inertia": True},
+}
+RAMP = {"normal_stress_ramp": 0.1, "ramp_duration": 4.0}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_normal_stress_rises_at_a_steady_rate_and_stays(slider, engine):
+    scene = Scene(**SLIDERS[slider], **RAMP)
+    motion = simulate(scene, duration=12.0, engine=engine)
+    imposed = 1.0 + 0.1 * np.clip(motion.time / 4.0, 0.0, 1.0)
+    cotangent = 1.0 / math.tan(math.radians(60.0)) if "inclined" in slider else 0.0
+    expected = imposed + cotangent * (motion.frictional_stress - scene.mu_star)
+    assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-12)
+    assert (motion.time == 4.0).any()
+    assert float(motion.time[-1]) == pytest.approx(12.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("change", [-0.1, 0.1])
+def test_by_a_second_formulation(change):
+    """LSODA in time, with the rate and Linker and Dieterich's effect written out."""
+    scene = Scene(**IMPOSED, **{**RAMP, "normal_stress_ramp": change}, load_velocity_ratio=1.5)
+    a, b, mu = scene.a, scene.b, scene.mu_star
+
+    def rates(time, state):
+        f, theta = state
+        ratio = 1.0 + change * time / 4.0
+        v = math.exp(((mu + f) / ratio - mu - theta) / a)
+        evolution = b * (math.exp(-theta / b) - v)
+        return scene.stiffness * (1.5 - v), evolution - 0.3 * change / 4.0 / ratio
+
+    known = solve_ivp(rates, (0.0, 4.0), (0.0, 0.0), method="LSODA", rtol=1e-11, atol=1e-14)
+    *_earlier, end = follow(scene, Accuracy(1e-8), Meter(10**5), until=4.0)
+    assert end.point.spring == pytest.approx(known.y[0, -1], abs=1e-8)
+    assert end.point.state == pytest.approx(known.y[1, -1], abs=1e-8)
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_a_short_ramp_is_a_step(slider):
+    """Each is half as far off as one twice as long."""
+    stepped = Scene(**SLIDERS[slider], normal_stress_step=0.1, load_velocity_ratio=1.0)
+    ends = [
+        _end(Scene(**SLIDERS[slider], normal_stress_ramp=0.1, ramp_duration=x))
+        for x in (2e-4, 1e-4)
+    ]
+    away = [end - _end(stepped) for end in ends]
+    assert 0.0 < abs(away[0]) < 1e-4
+    assert away[0] / away[1] == pytest.approx(2.0, rel=0.05)
+
+
+def _end(scene: Scene) -> float:
+    *_earlier, end = follow(scene, Accuracy(1e-9), Meter(10**6), until=1.0)
+    return end.point.spring
+
+
+def test_once_over_it_leaves_no_unknown():
+    scene = Scene(**IMPOSED, **RAMP)
+    (during, lasts), (after, goes_on) = scene.segments
+    assert (during.states, after.states) == (2, 1)
+    assert (lasts, goes_on) == (4.0, math.inf)
+    assert (
+        after.numbers == Scene(**IMPOSED, normal_stress_step=0.1, load_velocity_ratio=1.0).numbers
+    )
+    none = scene.with_(normal_stress_ramp=0.0)
+    assert none == Scene(**IMPOSED)
+    assert none.numbers == Scene(**IMPOSED).numbers
+
+
+def test_steady_sliding_and_its_stability_are_those_before_it():
+    still = Scene(**IMPOSED, load_velocity_ratio=2.0)
+    scene = still.with_(**RAMP)
+    assert scene.stiffness == still.stiffness
+    rate = still.log_load_rate
+    assert growth_rates(scene, rate) == pytest.approx(growth_rates(still, rate), rel=1e-12)
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_engines_tell_the_same_events_and_that_it_settles(slider):
+    rows = []
+    for engine in ENGINES:
+        watches = [maximum("log_rate"), maximum("reading"), settling(1e-3, ends=True)]
+        accuracy = Accuracy(1e-8, engine=engine)
+        rows.append(list(follow(Scene(**SLIDERS[slider], **RAMP), accuracy,
+                                Meter(10**5, engine=engine), watches, clock=True)))  # fmt: skip
+    assert [e.kind for e in rows[0]] == [e.kind for e in rows[1]]
+    assert rows[0][-1].kind is Kind.SETTLED
+    for one, other in zip(rows[0][:-1], rows[1][:-1], strict=True):
+        assert other.time == pytest.approx(one.time, rel=1e-6)
+        assert other.point.spring == pytest.approx(one.point.spring, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"normal_stress_ramp": -1.0}, "must be greater than -1. Normal stress stays positive"),
+        ({**RAMP, "ramp_duration": 0.0}, "must be greater than 0. A sudden change is normal_st"),
+        ({**RAMP, "normal_stress": "constant"}, "is changed by the loading"),
+        ({**RAMP, "fluid": "dilatant"}, "no meaning for fluid='dilatant'"),
+        ({**RAMP, "stress_dependence": 0.5}, "not for normal stress that the loading changes"),
+        ({**RAMP, "regularised": True}, "regularised = True: has no meaning for ramp"),
+        ({"ramp_duration": 5.0}, "no meaning for step.*state normal_stress_ramp too"),
+        ({**RAMP, "normal_stress_step": 0.1}, "no meaning for ramp"),
+    ],
+)
+def test_what_is_wrong(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**fields)
+
+
+def test_what_is_not_asked_of_it():
+    with pytest.raises(InvalidValue, match="ramp': changes normal stress all along"):
+        LimitCycle()(Scene(**IMPOSED, **RAMP), Accuracy())
+    outcome = NormalStressResponse()(Scene(**IMPOSED, **RAMP), Accuracy())
+    assert outcome.status is Status.NO_STEP
+
+
+# ---- load point velocity -------------------------------------------------------------------------
+
+PLAIN = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}
+
+
+@pytest.mark.parametrize("change", [-0.8, 4.0])
+def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change):
+    """By LSODA in time, up to the end of the ramp and beyond it."""
+    scene = Scene(**PLAIN, velocity_ramp=change, velocity_ramp_duration=4.0)
+    a, b = scene.a, scene.b
+
+    def rates(time, state):
+        v = math.exp((state[0] - state[1]) / a)
+        load = 1.0 + change * min(time / 4.0, 1.0)
+        return scene.stiffness * (load - v), b * (math.exp(-state[1] / b) - v)
+
+    options = {"method": "LSODA", "rtol": 1e-11, "atol": 1e-14}
+    ramp = solve_ivp(rates, (0.0, 4.0), (0.0, 0.0), **options)
+    known = solve_ivp(rates, (4.0, 5.0), ramp.y[:, -1], **options).y[0, -1]
+    off = []
+    for stairs in (64, 128):
+        which = scene.with_(velocity_ramp_stairs=stairs)
+        *_earlier, end = follow(which, Accuracy(1e-9), Meter(10**6), until=5.0)
+        off.append(end.point.spring - known)
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
+    assert abs(off[1]) < 1e-4 * scene.a
+
+
+def test_the_load_point_is_where_it_should_be():
+    scene = Scene(**PLAIN, velocity_ramp=-1.0, velocity_ramp_duration=4.0, velocity_ramp_stairs=3)
+    moved = 0.0
+    for segment in scene.parts.loading.segments[:-1]:
+        moved += segment.load_velocity * segment.duration
+    assert moved == pytest.approx(2.0, rel=1e-15)
+    assert scene.load_velocity == 0.0
+    assert Scene(**PLAIN, velocity_ramp=0.0) == Scene(**PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"velocity_ramp": -1.5}, "must be -1 or greater. -1 ends with a load point at rest"),
+        ({"velocity_ramp": 1.0, "velocity_ramp_duration": 0.0}, "must be greater than 0"),
+        ({"velocity_ramp": 1.0, "velocity_ramp_stairs": 1.5}, "must be a whole number"),
+        ({"velocity_ramp_stairs": 5.0}, "no meaning for step.*state velocity_ramp too"),
+    ],
+)
+def test_what_is_no_ramp_of_velocity(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        Scene(**PLAIN, **fields)
