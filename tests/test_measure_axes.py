@@ -2,6 +2,7 @@
 kept, found again, selected, claimed, written and reproduced in the same way.
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -63,8 +64,11 @@ def scaled(*axes: Axis, **fields) -> Study:
 def test_each_cell_is_measured_as_the_axis_says():
     """Upward steps trigger instability here, downward ones never do."""
     found = run(BOTH).isel(b_over_a=0)
-    for direction in ("up", "down"):
-        step = rsfstudy.critical_step(BOTH.scene(0), of="displacement_step", direction=direction)
+    for direction, told in (("up", nullcontext()), ("down", pytest.warns(NoAnswer))):
+        with told:
+            step = rsfstudy.critical_step(
+                BOTH.scene(0), of="displacement_step", direction=direction
+            )
         ours = found.sel(direction=direction)
         assert Status(int(ours.status)).label == step.attrs["status"]
         for name in step.data_vars:
