@@ -16,7 +16,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare.claims import Claim
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.files import contents, restore
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure, Outcome
