@@ -18,7 +18,10 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import toms748
 
-from rsfstudy.boundaries.sought import DisplacementSteps, NormalStressSteps, RateSteps, Steps
+from rsfstudy.boundaries.displacement_steps import DisplacementSteps
+from rsfstudy.boundaries.normal_stress_steps import NormalStressSteps
+from rsfstudy.boundaries.rate_steps import RateSteps
+from rsfstudy.boundaries.sought import Steps
 from rsfstudy.boundaries.swing import (
     Swing,
     neutral,

@@ -1,0 +1,171 @@
+"""Steps that change the critical path itself: the size whose path comes from the state before the
+step is found by shooting.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from scipy.optimize import brentq
+
+from rsfstudy.boundaries.sought import Steps
+from rsfstudy.boundaries.touching import cycle_misfit, rate_step_misfit
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.scene import Scene
+
+#: Local tolerance of the first root.
+LOOSE = 1e-5
+#: Distance in log size over which the slope of the misfit is taken.
+_NEAR = 3e-3
+_MOST_CORRECTIONS = 8
+#: Longest stride, and end, of the search for a sign change in logit(size/largest).
+_LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
+#: Strides without a critical path on either side after which shooting is given up.
+_GIVE_UP = 3
+
+
+class ShotSteps(Steps):
+    """Steps after which the critical path is another for each size, so that the right one is shot
+    for: those that change what friction balances, or what moves the spring.
+    """
+
+    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Shoot: find the step whose critical path comes from the state before it.
+
+        A loose root and its slope come first; from there the tighter tolerances take one to three
+        paths each. With several states there are no such paths.
+        """
+        if self.scene.states > 1:
+            return None
+        loose = self._loose_root(meter)
+        if loose is None:
+            return None
+        return _refined(
+            *loose,
+            tolerances,
+            lambda size, tolerance: rate_step_misfit(self.scene_at(size), tolerance, meter),
+        )
+
+    def sizes_of_cycle(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+        """Find the step whose limit cycle touches the norm, from one orbit each: the smallest after
+        which that orbit stops shrinking.
+        """
+
+        def misfit(log_size: float, tolerance: float = LOOSE) -> float:
+            higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
+            return math.nan if higher is None else higher
+
+        stride = math.log(1.5)
+        smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
+        before = misfit(smaller)
+        while larger <= math.log(self.largest):
+            now = misfit(larger)
+            if before < 0.0 <= now:
+                found = _root(misfit, smaller, larger)
+                return found and _refined(
+                    *found, tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
+                )
+            smaller, larger, before = larger, larger + stride, now
+        return None
+
+    def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
+        """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
+        there.
+        """
+
+        def misfit(log_size: float) -> float:
+            scene = self.scene_at(math.exp(log_size))
+            state = rate_step_misfit(scene, LOOSE, meter)
+            return self._verdict(scene, meter) if state is None else state
+
+        bracket = self._bracket(misfit)
+        return None if bracket is None else _root(misfit, *bracket)
+
+    def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
+        """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
+        guess.
+
+        A misfit of NaN (no critical path) has no sign. The search runs in logit(size/largest),
+        which resolves both ends of the range.
+        """
+
+        def log_size(position: float) -> float:
+            return math.log(self.largest) - math.log1p(math.exp(-position))
+
+        def position(size: float) -> float:
+            share = min(max(size, self.smallest) / self.largest, 0.5)
+            return math.log(share / (1.0 - share))
+
+        lowest, highest = position(self.smallest), _HIGHEST
+        left = right = position(self._guess())
+        at_left = at_right = misfit(log_size(left))
+        stride, missing = 0.2, 0
+        while (left > lowest or right < highest) and missing < _GIVE_UP:
+            if right < highest:
+                further = min(right + stride, highest)
+                value = misfit(log_size(further))
+                if at_right * value <= 0.0:
+                    return log_size(right), log_size(further)
+                right, at_right = further, value
+            if left > lowest:
+                further = max(left - stride, lowest)
+                value = misfit(log_size(further))
+                if at_left * value <= 0.0:
+                    return log_size(further), log_size(left)
+                left, at_left = further, value
+            missing = missing + 1 if math.isnan(at_left) and math.isnan(at_right) else 0
+            stride = min(1.5 * stride, _LONGEST_STRIDE)
+        return None
+
+    def _guess(self) -> float:
+        """A size to search from."""
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def _verdict(self, scene: Scene, meter: Meter) -> float:
+        """Sign of the misfit where there is no critical path: positive where the step is stable,
+        NaN where that cannot be told.
+        """
+        return math.nan
+
+
+def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, float] | None:
+    """Log size at which a misfit vanishes, and its slope there; None where it has no value on the
+    way.
+    """
+    try:
+        root = float(brentq(misfit, *bracket, xtol=1e-4))
+    except ValueError:  # of NaN
+        return None
+    return root, (misfit(root + _NEAR) - misfit(root - _NEAR)) / (2.0 * _NEAR)
+
+
+def _refined(
+    log_size: float,
+    slope: float,
+    tolerances: Sequence[float],
+    misfit: Callable[[float, float], float | None],
+) -> list[float] | None:
+    """Sizes at which a misfit vanishes, by each local tolerance, from a loose root and its slope,
+    by the secant method; None where it leads nowhere.
+    """
+    if not math.isfinite(slope) or slope == 0.0:
+        return None
+    sizes = []
+    for tolerance in tolerances:
+        before: tuple[float, float] | None = None
+        for _ in range(_MOST_CORRECTIONS):
+            # the error of V_0 itself is that of its logarithm times V_0
+            value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
+            if value is None or not math.isfinite(value):
+                return None
+            if before is not None and value != before[1]:
+                slope = (value - before[1]) / (log_size - before[0])
+            before = log_size, value
+            log_size -= value / slope
+            if min(abs(value), abs(value / slope)) < 30.0 * tolerance:
+                break
+        else:
+            return None
+        sizes.append(math.exp(log_size))
+    return sizes
