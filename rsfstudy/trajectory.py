@@ -31,7 +31,7 @@ from rsfstudy.vocabulary import quantity
 _USUAL, _BEYOND = 50.0, 20.0
 _UNSTEPPED = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
-    "displacement_step, hold_time, velocity_steps or loading in the scene."
+    "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
@@ -90,7 +90,7 @@ def simulate(
     if not 0.0 < duration < math.inf:
         raise InvalidValue("duration", duration, "must be positive and finite")
     check_engine(engine)
-    if not scene.parts.loading.is_a_step:
+    if not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
     recording = Recording(list(_REGIMES))

@@ -10,7 +10,7 @@ from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
-from rsfstudy.motion.regimes import check_start, mass_acts, on_slow_manifold
+from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
@@ -188,8 +188,8 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     A motion that starts slowing down comes from its peak; there it is followed against time,
     instead of around an orbit that may lead down to 1e-40 V_* and lose all digits on the way.
     """
-    check_start(scene)
-    equations, start = without_mass(scene, clock=False), (scene.spring_stress_step, 0.0)
+    begin = starting(scene)
+    equations, start = without_mass(scene, clock=False), (begin.spring, begin.psi)
     rising, norm = equations.at(start).growth > 0.0, scene.log_norm_rate
     watches = (_TOP, minimum("log_rate"), rise("log_rate", norm))
     for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):

@@ -180,7 +180,9 @@ def plain(field: str, value: Any) -> Any:
     the user's own by its name.
     """
     value = named(field, value)
-    value = value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, np.ndarray) and value.ndim:
+        raise InvalidValue(field, value.tolist(), "must be one number, flag or text")
+    value = value.item() if isinstance(value, np.generic | np.ndarray) else value
     if not isinstance(value, int) or isinstance(value, bool):
         return value
     return float(value) if abs(value) < 2**1023 else math.inf

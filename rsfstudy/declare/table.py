@@ -128,7 +128,7 @@ class Table:
     def _at_odds(self, block: Block, first: Sequence[int]) -> list[int]:
         """The cells that a part refuses: of each part, the first."""
         found = []
-        for part in {type(part): part for part in block.head.parts}.values():
+        for part in {type(part): part for part in block.head.every_part}.values():
             read = part.checked_by()
             names = tuple(n for n in block.names if read is None or n in read)
             axes = sorted({self._places[name] for name in names})
@@ -205,7 +205,7 @@ def _goes_together(
 ) -> bool:
     try:
         (scene,) = head.varied(names, [values])
-        for part in scene.parts:
+        for part in scene.every_part:
             if type(part) is kind:
                 part.check(scene)
     except InvalidValue:

@@ -142,7 +142,7 @@ class Bifurcation(Measure):
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        if not scene.parts.loading.is_a_step:
+        if not scene.is_disturbed:
             scene = scene.under(Segment(1.0, NUDGE))
         came = course(scene, accuracy, meter, self.transient + self.events, to_its_end=True)
         if came is None:

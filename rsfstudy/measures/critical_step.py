@@ -130,6 +130,10 @@ class CriticalStep(Measure):
         no such path, or mass acts, from motions followed forward.
         """
         check_single_step(scene)
+        if scene.begins_elsewhere:
+            rule = "is no steady sliding, from which critical steps start"
+            remedy = "Ask whether the step of a scene triggers by the measure triggered."
+            raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1
         steps = KINDS[self.of](scene, sign)
         if steps.largest <= steps.smallest:

@@ -112,7 +112,7 @@ class LimitCycle(Measure):
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        if not scene.parts.loading.is_a_step:
+        if not scene.is_disturbed:
             # steady sliding left alone never leaves its steady state, stable or not
             scene = scene.under(Segment(1.0, NUDGE))
         if scene.states > 1:

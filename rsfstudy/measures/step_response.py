@@ -80,7 +80,7 @@ class StepResponse(Measure):
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
-        if not scene.parts.loading.is_a_step:
+        if not scene.is_disturbed:
             return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
         peaks, rows = self._follow(scene, accuracy, meter)
         again, _rows = self._follow(scene, accuracy.refined(), meter)
@@ -130,4 +130,4 @@ def _left_out(scene: Scene, accuracy: Accuracy) -> float:
 
 def _jumps(scene: Scene) -> bool:
     """Whether slip rate rises from V_* to another one against mass."""
-    return scene.has_mass and scene.spring_stress_step > 0.0
+    return scene.has_mass and (scene.begins_elsewhere or scene.spring_stress_step > 0.0)

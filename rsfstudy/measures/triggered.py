@@ -45,7 +45,7 @@ class Triggered(Measure):
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        if not scene.parts.loading.is_a_step:
+        if not scene.is_disturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
         answer, again = (swing(scene, asked, meter).reached for asked in accuracies)

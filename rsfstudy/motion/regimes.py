@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
+from scipy.optimize import newton
+
 from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import Limits
@@ -21,6 +23,7 @@ from rsfstudy.slider.equations import (
     without_mass,
 )
 from rsfstudy.slider.forms import Point
+from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -128,8 +131,9 @@ def fast_state(point: Point) -> Numbers:
 
 
 def starting(scene: Scene) -> Point:
-    """Steady sliding at V_* the instant after the step of a scene, which moves the spring and
-    imposed normal stress: with mass, slip rate follows within the inertial time.
+    """The beginning of a motion the instant after the step of a scene, which moves the spring and
+    imposed normal stress: with mass, slip rate follows within the inertial time. Before it the
+    slider slides steadily at V_*, or as its stated stress and state have it.
 
     Raises
     ------
@@ -137,10 +141,30 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    psis, begun = resting_of(scene, 0.0, 0.0), scene.parts.loading.beginning
+    psis, log_rate = resting_of(scene, 0.0, 0.0), 0.0
+    if scene.begins_elsewhere:
+        psis, log_rate = _stated(scene, psis)
+    begun = scene.parts.loading.beginning
     psis = (*psis[: len(psis) - len(begun)], *begun)
-    stepped = on_slow_manifold(scene, scene.spring_stress_step, psis)
-    return _at_rate(scene, stepped, 0.0) if scene.has_mass else stepped
+    stepped = on_slow_manifold(scene, scene.initial_stress + scene.spring_stress_step, psis)
+    return _at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
+
+
+def _stated(scene: Scene, resting: Numbers) -> tuple[Numbers, float]:
+    """States freed of stress, and ln(V/V_*), of the stress and state that a scene begins with: Psi
+    is sought with which the state variable is the one stated.
+    """
+    before = scene.under(Segment(1.0))
+    others = resting[1 : before.states]
+
+    def begun(psi: float) -> Point:
+        return on_slow_manifold(before, scene.initial_stress, (psi, *others))
+
+    def missing(psi: float) -> float:
+        return scene.initial_state - begun(psi).state
+
+    psi = float(newton(missing, scene.initial_state, tol=1e-15))
+    return (psi, *resting[1:]), begun(psi).log_rate
 
 
 def jumped(scene: Scene, point: Point) -> Point:
@@ -191,10 +215,11 @@ def error_of_slow_manifold(scene: Scene) -> float:
 
 
 def check_start(scene: Scene, start: Point | None = None) -> None:
-    """Refuse a displacement step that leaves no friction of forward slip to integrate; it starts
-    from steady sliding at V_*, or leads to a point.
+    """Refuse a displacement step that leaves no friction of forward slip to integrate; it is that
+    of the beginning, or leads to a point.
     """
-    spring = scene.spring_stress_step if start is None else start.spring
+    begins = scene.initial_stress + scene.spring_stress_step
+    spring = begins if start is None else start.spring
     lost = spring <= scene.parts.normal_stress.weakest(scene)
     if lost or (start and normal_stress_at(scene, spring, start.psis) <= handover.LOST):
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")

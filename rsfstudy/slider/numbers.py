@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Part, number
+from rsfstudy.slider.parts import Part, number, reads
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 _POSITIVE = "must be greater than 0"
 
@@ -37,7 +40,29 @@ class Slider(Part):
         5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
     )
 
+    initial_stress: float = number(
+        0.0,
+        r"$(\tau_0-\tau_*)/\sigma_*$",
+        "1",
+        "shear stress at the beginning, above that of steady sliding at V_star",
+        scale="sigma_*",
+    )
+    initial_state: float = number(
+        0.0, r"$\Theta_0$", "1", "state variable at the beginning; 0 in steady sliding at V_star"
+    )
+
     name = "slider"
+
+    @reads("initial_stress", "initial_state", "mu_star")
+    def check(self, scene: Scene) -> None:
+        """Stress and a state to begin with."""
+        if self.initial_stress <= -self.mu_star:
+            rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
+            raise InvalidValue("initial_stress", self.initial_stress, rule)
+        if self.initial_state and scene.parts.law.states > 1:
+            rule = f"has no meaning for {scene.parts.law.name}, whose states share it"
+            remedy = "Leave it out, and come to it by a protocol."
+            raise InvalidValue("initial_state", self.initial_state, rule, remedy=remedy)
 
 
 #: The fields of which one sets the spring.

@@ -127,6 +127,9 @@ class Scene(Shown):
         V_*/D_c in 1/s.
     instability_norm : float
         A motion counts as unstable once V T/(2 pi D_c) reaches this norm.
+    initial_stress, initial_state : float
+        Shear stress over sigma_* above that of steady sliding at V_*, and state variable Theta,
+        with which the slider begins, before the first step. Zero: it slides steadily at V_*.
 
     Attributes
     ----------
@@ -148,6 +151,8 @@ class Scene(Shown):
         period: float
         reference_rate: float
         instability_norm: float
+        initial_stress: float
+        initial_state: float
 
         def __getattr__(self, name: str) -> Any: ...
 
@@ -181,7 +186,7 @@ class Scene(Shown):
 
     def _check(self) -> None:
         """The law last: it may ask what all of friction makes of steady sliding."""
-        for part in reversed(self.parts):
+        for part in reversed(self.every_part):
             part.check(self)
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
@@ -202,6 +207,11 @@ class Scene(Shown):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Scene, **{**self.as_dict(), **self._layout.own}), ()
+
+    @property
+    def every_part(self) -> tuple[Part, ...]:
+        """The law, the numbers that every slider has, and the other parts."""
+        return self.parts.law, self._slider, *self.parts[1:]
 
     # ---- what follows from the parameters -------------------------------------------------------
 
@@ -313,6 +323,16 @@ class Scene(Shown):
     def imposed_normal_stress(self) -> float:
         """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
         return self.parts.loading.segments[-1].normal_stress
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether it does anything but slide on steadily at V_*."""
+        return self.begins_elsewhere or self.parts.loading.is_a_step
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether it begins with other stress or state than those of steady sliding at V_*."""
+        return bool(self.initial_stress or self.initial_state)
 
     @property
     def spring_stress_step(self) -> float:

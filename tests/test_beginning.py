@@ -1,0 +1,147 @@
+"""Motions that begin with a stated stress and state instead of steady sliding at V_*."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from running import run
+from scipy.integrate import solve_ivp
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.regimes import starting
+
+DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
+
+
+@given(
+    stress=st.floats(-0.3, 0.3),
+    state=st.floats(-0.2, 0.2),
+    normal_stress=st.sampled_from(["constant", "imposed", "variable"]),
+    dependence=st.sampled_from([0.0, 2.0]),
+    dynamics=st.sampled_from(DYNAMICS),
+)
+def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics):
+    """With that spring stress and state variable, and the slip rate that friction then has; to
+    rounding, over a for the slip rate.
+    """
+    scene = Scene(
+        normal_stress=normal_stress,
+        stress_dependence=dependence,
+        initial_stress=stress,
+        initial_state=state,
+        **dynamics,
+    )
+    begin = starting(scene)
+    assert begin.spring == stress
+    assert begin.state == pytest.approx(state, abs=1e-13)
+    friction = scene.mu_star + scene.a * begin.log_rate + state
+    assert begin.coefficient == pytest.approx(friction, abs=1e-12)
+
+
+def test_stress_is_what_a_displacement_step_of_it_leaves():
+    """Where stress takes nothing from the state, which is that of steady sliding after both."""
+    scene = Scene(normal_stress="constant", load_velocity_ratio=2.0, stiffness_ratio=1.5)
+    stated = scene.with_(initial_stress=scene.stiffness * 0.7)
+    stepped = scene.with_(displacement_step=0.7)
+    assert starting(stated) == starting(stepped)
+
+
+def test_steps_come_on_top():
+    """With mass, slip rate at the instant of a step is that of the stated stress and state."""
+    scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)
+    begin = starting(scene)
+    after = starting(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
+    assert after.log_rate == pytest.approx(begin.log_rate, abs=1e-12)
+    assert after.spring == scene.stiffness * 0.5
+    assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)
+
+
+@pytest.mark.parametrize("engine", [SCIPY, COMPILED])
+def test_the_motion_is_that_of_time(engine):
+    """Healed contact under a moving load point, by LSODA in time: unknowns tau and ln V."""
+    scene = Scene(
+        law="slowness",
+        normal_stress="constant",
+        stiffness_ratio=1.3,
+        initial_stress=-0.02,
+        initial_state=0.08,
+    )
+    a, b, stiffness = scene.a, scene.b, scene.stiffness
+
+    def rates(_time: float, state: np.ndarray) -> list[float]:
+        stress, x = state
+        theta = stress - a * x
+        loading = stiffness * (1.0 - math.exp(x))
+        healing = b * (math.exp(-theta / b) - math.exp(x))
+        return [loading, (loading - healing) / a]
+
+    begin = [-0.02, (-0.02 - 0.08) / a]
+    times = np.linspace(1.0, 60.0, 20)
+    truth = solve_ivp(rates, (0.0, 60.0), begin, "LSODA", times, rtol=1e-11, atol=1e-12)
+    motion = rsfstudy.simulate(scene, duration=60.0, rtol=1e-9, engine=engine)
+    # between samples a line is drawn
+    seen = np.interp(times, motion.time, motion.shear_stress) - scene.mu_star
+    assert np.abs(seen - truth.y[0]).max() < 1e-5
+    assert float(motion.log10_slip_rate[-1]) == pytest.approx(
+        truth.y[1][-1] / math.log(10.0), abs=1e-7
+    )
+
+
+def test_the_limit_cycle_is_the_same_from_wherever_it_is_come_to():
+    scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
+    usual, healed = (
+        rsfstudy.limit_cycle(start, engine=COMPILED)
+        for start in (scene, scene.with_(initial_state=0.03, initial_stress=0.01))
+    )
+    errors = usual.recurrence_interval_error + healed.recurrence_interval_error
+    assert abs(usual.recurrence_interval - healed.recurrence_interval) <= errors
+
+
+def test_it_may_be_an_axis():
+    """A slider that is stressed enough goes unstable by itself, under a load point at rest."""
+    found = run(
+        Study(
+            name="stressed",
+            title="Stress at the beginning",
+            base=Scene(stiffness_ratio=0.5, load_velocity_ratio=0.0, normal_stress="constant"),
+            axes=[Axis("initial_stress", [0.003, 0.01])],
+            measure=Triggered(),
+        )
+    )
+    assert found.unstable.values.tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: Scene(initial_stress=-0.8), "must exceed -mu_star = -0.76"),
+        (lambda: Scene(law="two_slip_states", initial_state=0.1), "whose states share it"),
+        (
+            lambda: rsfstudy.critical_step(Scene(initial_state=0.1, stiffness_ratio=2.0)),
+            "from which critical steps start.*triggered",
+        ),
+        (
+            lambda: run(
+                Study(
+                    name="lattice",
+                    title="Stress at the beginning",
+                    base=Scene(),
+                    axes=[Axis("initial_stress", [0.0, -0.9])],
+                    measure=Triggered(),
+                )
+            ),
+            "must exceed -mu_star",
+        ),
+    ],
+)
+def test_what_is_wrong(wrong, message):
+    with pytest.raises(InvalidValue, match=message):
+        wrong()
