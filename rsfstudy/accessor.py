@@ -79,7 +79,7 @@ class Accessor:
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
         return restore.from_declaration(declared)
 
-    def to_si(self, **scales: float) -> xr.Dataset:
+    def to_si(self, **scales: Any) -> xr.Dataset:
         """The dataset in SI units.
 
         Parameters
@@ -97,10 +97,11 @@ class Accessor:
         from rsfstudy import api
 
         self._must_be_of_a_study()
+        self._must_be_whole("claims are held against")
         return api.check(self._dataset)
 
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
-        """The figure of the dataset.
+        """The figure of the results of a study, or the picture of a motion.
 
         Parameters
         ----------
@@ -111,8 +112,13 @@ class Accessor:
         from rsfstudy import api
         from rsfstudy.plots._motion import picture
 
-        draw = api.plot if self._is_study else picture
-        return draw(self._dataset, *what, **how)
+        if self._is_study:
+            self._must_be_whole("figures show")
+            return api.plot(self._dataset, *what, **how)
+        if "load_point_displacement" not in self._dataset:
+            text = "only motions have a picture: draw its variables, as in"
+            raise DataError(f"{text} cycle.plot.scatter('log10_slip_rate', 'shear_stress')")
+        return picture(self._dataset, *what, **how)
 
     def failures(self) -> pd.DataFrame:
         """The cells that failed or gave no number.
@@ -149,6 +155,18 @@ class Accessor:
     def _must_be_ours(self) -> None:
         if not {"scene", "declaration"} & set(self._dataset.attrs):
             raise DataError(_FOREIGN)
+
+    def _must_be_whole(self, what: str) -> None:
+        """Refuse results of which cells were selected, or that are in other units."""
+        from rsfstudy.files import contents
+        from rsfstudy.rig.scales import SCALES
+
+        axes = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
+        selected = [name for name in axes if name not in self._dataset["status"].dims]
+        if selected or SCALES in self._dataset.attrs:
+            which = f"{', '.join(selected)} selected" if selected else "other units"
+            text = f"{what} all results of a study in its own units, and these are with {which}"
+            raise DataError(f"{text}. Ask the dataset as it was opened.")
 
     def _must_be_of_a_study(self) -> None:
         if not self._is_study:

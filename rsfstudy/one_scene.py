@@ -17,6 +17,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
+from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
@@ -105,9 +106,9 @@ def limit_cycle(
 def to_si(
     dataset: xr.Dataset,
     *,
-    normal_stress: float,
-    slip_distance: float,
-    reference_rate: float | None = None,
+    normal_stress: Any,
+    slip_distance: Any,
+    reference_rate: Any = None,
 ) -> xr.Dataset:
     """A dataset in SI units, all of it: stress in Pa, slip in m, time in s, slip rates in m/s.
 
@@ -121,17 +122,18 @@ def to_si(
     dataset : xarray.Dataset
         Results, or a trajectory: variables whose attribute ``scale`` says what they are measured
         in.
-    normal_stress : float
-        sigma_* in Pa.
-    slip_distance : float
-        D_c in m.
-    reference_rate : float, optional
-        V_*/D_c in 1/s; by default that of the dataset, where it holds one.
+    normal_stress : quantity
+        sigma_*: a number in Pa, or a text with units ("5 MPa").
+    slip_distance : quantity
+        D_c, in m ("10 um").
+    reference_rate : quantity, optional
+        V_*/D_c, in 1/s; by default that of the dataset, where it holds one.
 
     Raises
     ------
     InvalidValue
-        For scales that are not positive, or a dataset that does not say its `reference_rate`.
+        For scales that are no quantities or not positive, or a dataset that does not say its
+        `reference_rate`.
     DataError
         For a dataset that is in other units already, or not of rsfstudy.
     """
@@ -141,7 +143,14 @@ def to_si(
                 "reference_rate", None, "is not one number in the dataset", remedy="State it."
             )
         reference_rate = float(dataset["reference_rate"])
-    return scaled(dataset, scales(normal_stress, slip_distance, reference_rate))
+    return scaled(
+        dataset,
+        scales(
+            in_si("normal_stress", normal_stress, "Pa"),
+            in_si("slip_distance", slip_distance, "m"),
+            in_si("reference_rate", reference_rate, "1/s"),
+        ),
+    )
 
 
 def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:

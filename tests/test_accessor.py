@@ -88,7 +88,7 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     for ask in (lambda: step.rsf.study, step.rsf.check):
         with pytest.raises(DataError, match="is of one scene"):
             ask()
-    with pytest.raises(DataError, match="no motion"):
+    with pytest.raises(DataError, match="only motions have a picture"):
         step.rsf.plot()
 
 
@@ -130,6 +130,22 @@ def test_failures_name_the_cells_without_a_number(results):
     assert set(failures.status) == {"unstable_at_any_step"}
     assert len(results.isel(law=0, stiffness_ratio=0).rsf.failures()) == 1
     assert results.isel(law=0, stiffness_ratio=1).rsf.failures().empty
+
+
+def test_only_whole_results_in_their_own_units_are_checked_and_drawn(results):
+    for ask in ("check", "plot"):
+        with pytest.raises(DataError, match="these are with law selected"):
+            getattr(results.sel(law="slip").rsf, ask)()
+        with pytest.raises(DataError, match="these are with other units"):
+            getattr(results.rsf.to_si(**SI).rsf, ask)()
+
+
+def test_units_of_scales_may_be_written(results):
+    written = results.rsf.to_si(normal_stress="100 MPa", slip_distance="10 um")
+    xr.testing.assert_allclose(written, results.rsf.to_si(**SI))
+    assert written.attrs["scales"].startswith("sigma_* = 1e+08 Pa, D_c = 1e-05 m")
+    beside = written.critical_velocity.attrs["ancillary_variables"].split()
+    assert set(beside) <= set(written.variables)
 
 
 def test_results_are_checked_drawn_and_converted(results):

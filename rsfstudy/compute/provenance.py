@@ -118,7 +118,9 @@ def _git() -> str:
     try:
         if Path(ask("rev-parse", "--show-toplevel")) != _PACKAGE.parent:
             return "none"
-        state = "with uncommitted changes" if ask("status", "--porcelain") else "clean"
+        # what runs leave in the checkout changes nothing
+        changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
+        state = "with uncommitted changes" if changed else "clean"
         return f"{ask('rev-parse', 'HEAD')} {state}"
     except (OSError, subprocess.SubprocessError):
         return "none"

@@ -17,6 +17,9 @@ _RATIOS = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_norma
 _LOGARITHM = re.compile(r"(\w+_)?log10_slip_rate")
 _WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
+#: Attribute of a dataset in other units that tells their scales.
+SCALES = "scales"
+
 
 class Scale(NamedTuple):
     """What 1 is in some units."""
@@ -61,7 +64,8 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
 
     What says its ``scale`` is multiplied by it and says its units instead; its name no longer calls
     it a ratio: ``critical_velocity``, ``load_velocity``, ``effective_normal_stress``. Beside the
-    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are.
+    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are. The attribute
+    ``scales`` tells what was 1.
 
     Raises
     ------
@@ -82,7 +86,12 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     for name in logarithms:
         result = result.assign(_slip_rate(dataset, name, by["V_*"]))
     new = {str(name): _renamed(str(name)) for name in measured}
-    return result.rename({old: name for old, name in new.items() if name != old})
+    result = result.rename({old: name for old, name in new.items() if name != old})
+    for variable in result.variables.values():
+        beside = str(variable.attrs.get("ancillary_variables", "")).split()
+        if beside:
+            variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in beside)
+    return result.assign_attrs({SCALES: ", ".join(f"{n} = {s[0]:g} {s[1]}" for n, s in by.items())})
 
 
 def _renamed(name: str) -> str:
