@@ -18,7 +18,7 @@ from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.rig.scales import scaled, scales
 from rsfstudy.rig.units import in_si
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
@@ -155,6 +155,7 @@ def to_si(
 
 def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice."""
+    check_scene(scene)
     check_engine(accuracy.engine)
     outcome = measure(scene, accuracy)
     if outcome.status is not Status.OK:

@@ -7,6 +7,7 @@ import json
 import math
 import warnings
 from collections.abc import Mapping
+from numbers import Real
 from typing import Never
 
 import numpy as np
@@ -23,7 +24,7 @@ from rsfstudy.motion.stepping import Halt, Meter, more_work
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.protocol import Protocol
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
@@ -86,9 +87,11 @@ def simulate(
     if nameless:
         remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
         raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
+    check_scene(scene)
     duration = _as_stated(scene) if duration is None else duration
-    if not 0.0 < duration < math.inf:
-        raise InvalidValue("duration", duration, "must be positive and finite")
+    if not isinstance(duration, Real) or not 0.0 < duration < math.inf:
+        remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
+        raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     check_engine(engine)
     if not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)

@@ -122,3 +122,16 @@ def test_meaningless_durations_are_refused(duration):
 def test_a_duration_without_its_name_is_refused():
     with pytest.raises(InvalidValue, match=r"simulate = 10: .*Write duration=10, in D_c/V_\*"):
         rsfstudy.simulate(Scene(), 10)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: rsfstudy.simulate("limit_cycles"), "is no scene.*rsfstudy.run computes studies"),
+        (lambda: rsfstudy.critical_step({"law": "slip"}), "is no scene"),
+        (lambda: rsfstudy.simulate(Scene(), duration="10 s"), "D_c/V_.*rig.dimensionless"),
+    ],
+)
+def test_what_it_cannot_follow(ask, message):
+    with pytest.raises(InvalidValue, match=message):
+        ask()

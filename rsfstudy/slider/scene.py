@@ -471,3 +471,10 @@ class Scene(Shown):
 #: What follows from a scene whatever loads it, once it has been asked for; the functions, of all
 #: loadings that have no unknowns, or the same.
 _UNLOADED = ("critical_stiffness", "functions")
+
+
+def check_scene(value: object) -> None:
+    """Refuse what is no scene."""
+    if not isinstance(value, Scene):
+        remedy = "Make one, rsfstudy.Scene(...); rsfstudy.run computes studies."
+        raise InvalidValue("scene", value, "is no scene", remedy=remedy)
