@@ -7,7 +7,6 @@ import json
 import math
 import warnings
 from collections.abc import Mapping
-from numbers import Real
 from typing import Never
 
 import numpy as np
@@ -89,7 +88,7 @@ def simulate(
         raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     check_scene(scene)
     duration = _as_stated(scene) if duration is None else duration
-    if not isinstance(duration, Real) or not 0.0 < duration < math.inf:
+    if not _is_positive(duration):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     check_engine(engine)
@@ -155,9 +154,14 @@ def _about(about: Quantity) -> dict[str, str]:
 def _as_stated(scene: Scene) -> float:
     """Time that the loading of a scene takes."""
     loading = scene.parts.loading
-    if len(loading.segments) == 1:
-        return _USUAL
     stated = math.fsum(s.duration for s in loading.segments if s.duration < math.inf)
     if isinstance(loading, Protocol) and loading.lasts > stated:
         return loading.lasts
+    if len(loading.segments) == 1:
+        return _USUAL
     return stated + (_BEYOND / scene.load_velocity if scene.load_velocity else _USUAL)
+
+
+def _is_positive(value: object) -> bool:
+    """Whether it is a number that can be a duration."""
+    return isinstance(value, int | float | np.number) and bool(0.0 < value < math.inf)

@@ -53,6 +53,9 @@ _CAREFUL = 1e-8
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _BY_CHANCE = 0.005
 
+#: Widest bracket, over the size, that confirms a boundary.
+_WIDEST = 0.02
+
 #: Sizes of smaller steps that are looked at where stability may come and go between them.
 _SIZES_BETWEEN = 24
 
@@ -176,18 +179,17 @@ class CriticalStep(Measure):
         """
         width = boundary.relative_error if boundary.by_motions else 3.0 * boundary.relative_error
         width = max(width, accuracy.rtol)
-        while width < 0.02:
+        while width < _WIDEST:
             inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
-            below = swing(steps.scene_at(inner), accuracy, meter)
-            above = swing(steps.scene_at(outer), accuracy, meter)
-            if above.reached and not below.reached:
+            below, above = (_swung(steps, size, accuracy, meter) for size in (inner, outer))
+            if below and above and above.reached and not below.reached:
                 relative = width if boundary.by_motions else boundary.relative_error
                 error = steps.error(boundary.size, relative)
                 values = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
                 return Outcome(Status.OK, values)
-            if boundary.of_cycle and below.reached and below.excess > _AT_ONCE:
+            if boundary.of_cycle and below and below.reached and below.excess > _AT_ONCE:
                 break
             width *= 10.0
         return Outcome(
@@ -249,23 +251,30 @@ class CriticalStep(Measure):
         self, steps: Steps, bracket: tuple[float, float], accuracy: Accuracy, meter: Meter
     ) -> Outcome:
         """Boundary between a stable and an unstable log size, where the excess of the swings
-        changes sign.
+        changes sign; the middle of what is left where a motion in between cannot go on.
         """
+        stable, unstable = bracket
+
+        def excess(log_size: float) -> float:
+            nonlocal stable, unstable
+            found = swing(steps.scene_at(math.exp(log_size)), accuracy, meter)
+            if found.reached:
+                unstable = min(unstable, log_size)
+            else:
+                stable = max(stable, log_size)
+            return found.excess
+
         try:
-            log_size = toms748(
-                lambda p: swing(steps.scene_at(math.exp(p)), accuracy, meter).excess,
-                *bracket,
-                xtol=0.5 * accuracy.rtol,
-                rtol=1e-15,
-            )
+            log_size = toms748(excess, *bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
         except Halt as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
-            return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
+            if unstable - stable > _WIDEST:
+                return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
+            log_size = 0.5 * (stable + unstable)
         # the swings that found it would confirm their own errors: the verdicts come from others
-        size = math.exp(log_size)
-        error = accuracy.rtol + steps.blur(size, accuracy.rtol)
-        boundary = Boundary(size, error, by_motions=True)
+        width = max(accuracy.rtol, unstable - stable)
+        boundary = Boundary(math.exp(log_size), width, by_motions=True)
         return self._verified(steps, boundary, accuracy.refined(), meter)
 
     def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
@@ -289,6 +298,16 @@ class CriticalStep(Measure):
             self._values(steps, stable=steps.value(largest)),
             f"stable for every step up to {steps.value(largest):.6g}{why}",
         )
+
+
+def _swung(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> Swing | None:
+    """How the motion after a step of this size goes; None where it cannot go on."""
+    try:
+        return swing(steps.scene_at(size), accuracy, meter)
+    except Halt as halt:
+        if halt.status is Status.WORK_BUDGET_SPENT:
+            raise
+        return None
 
 
 def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:

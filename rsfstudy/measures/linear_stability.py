@@ -141,6 +141,8 @@ def _explicit(scene: Scene) -> float:
     """The published formula, for scenes it speaks of; NaN for others."""
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.resting or law.feels_stress or scene.parts.fluid.effects
+    if scene.imposed_normal_stress:
+        return math.nan
     if coupling is None or others:
         return math.nan
     return closed_forms.critical_stiffness(

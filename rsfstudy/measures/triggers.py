@@ -116,10 +116,10 @@ class Triggers(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """One critical step after the other."""
+        why = _without_effective_friction(scene)
         coupling = scene.parts.normal_stress.coupling
-        if coupling is None:
-            text = "normal stress that follows a rule of its own has no one effective friction"
-            return Outcome(Status.NOT_APPLICABLE, message=text)
+        if why or coupling is None:
+            return Outcome(Status.NOT_APPLICABLE, message=f"{why} has no one effective friction")
         found = {trigger: _found(trigger, scene, accuracy, meter) for trigger in TRIGGERS}
         values: dict[str, float] = {}
         for outcome in found.values():
@@ -135,6 +135,16 @@ class Triggers(Measure):
         lacking = [found[trigger].status for trigger in (_FALL, _PULL)]
         lacking = [end for end in lacking if end is not Status.OK]
         return Outcome(next(iter((*failed, *lacking)), Status.OK), values, "; ".join(told))
+
+
+def _without_effective_friction(scene: Scene) -> str:
+    """What has no one effective friction mu' in a scene; nothing where it is known."""
+    law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
+    if stress.coupling is None or stress.normal_stress is None:
+        return f"{stress.name} normal stress"
+    if law.resting is not None and law.states == 1:
+        return f"{law.name}, a law with a slip rate of its own,"
+    return f"a fault that is {fluid.name}" if fluid.unknowns else ""
 
 
 def _found(trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:

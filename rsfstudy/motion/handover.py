@@ -15,6 +15,8 @@ from rsfstudy.slider.slots import LARGEST_EXPONENT
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
 LOST, LOCKED = 1e-9, 1e6
+#: Normal stress that stands for none, in logarithms.
+LEAST_STRESS = 1e-300
 #: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
 UNBOUNDED = 120.0 * math.log(10.0)
 #: How a motion goes on, or why it cannot.
@@ -117,3 +119,12 @@ def fate(log_rate: float, normal_stress: float, load_velocity: float) -> int:
     if log_rate >= UNBOUNDED:
         return IS_UNBOUNDED
     return GOES_ON
+
+
+def room_left(log_rate: float, normal_stress: float, load_velocity: float) -> float:
+    """How far ln V and the logarithm of normal stress are from where a motion ends: positive where
+    it goes on.
+    """
+    stress = math.log(max(normal_stress, LEAST_STRESS))
+    room = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_rate)
+    return min(room, log_rate - SLOWEST) if load_velocity == 0.0 else room

@@ -254,13 +254,20 @@ def _rupture(both: Regimes, moving: Iterator[Step]) -> Generator[Step, None, Poi
 
 
 def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
-    """Pass steps on until the motion cannot go on."""
+    """Pass steps on until the motion cannot go on, the last up to there."""
+
+    def room(point: Point) -> float:
+        return handover.room_left(point.log_rate, point.normal_stress, scene.load_velocity)
+
     for step in moving:
         point = step.after
         end = handover.fate(point.log_rate, point.normal_stress, scene.load_velocity)
-        if end != handover.GOES_ON:
-            raise halted(end, point.normal_stress)
-        yield step
+        if end == handover.GOES_ON:
+            yield step
+            continue
+        if room(step.before) > 0.0:
+            yield step.until(step.locate(room))
+        raise halted(end, point.normal_stress)
 
 
 def halted(end: int, normal_stress: float) -> Halt:

@@ -11,6 +11,7 @@ from rsfstudy.motion.compiled.calls import evaluate
 from rsfstudy.motion.compiled.happenings import (
     EXCESS,
     PASSED,
+    ROOM,
     excess,
     located,
     passed_at_end,
@@ -40,7 +41,7 @@ from rsfstudy.motion.compiled.table import (
     SLOW,
     SPRING,
 )
-from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed
+from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed, room_left
 from rsfstudy.motion.recording import SAMPLES
 from rsfstudy.slider.slots import LOAD_VELOCITY
 
@@ -122,7 +123,7 @@ def through_regime(now, place, last, watches, told, rows, limits, p):
         if now.ends_by_fate:
             now.stress = place.after[RATIO]
             now.fate = fate(place.after[LOG_RATE], now.stress, p[LOAD_VELOCITY])
-            if now.fate != GOES_ON:
+            if now.fate != GOES_ON and not cut_at_the_end(now, place, watches, limits, p):
                 return HALTED
         leaves, over = cut_short(now, place, watches, limits, p)
         if now.begins:
@@ -144,11 +145,24 @@ def through_regime(now, place, last, watches, told, rows, limits, p):
             now.started = passed_at_end(now, place, limits)
             copy(place.after, last)
             return CHANGES
+        if now.ends_by_fate and now.fate != GOES_ON:
+            return HALTED
         move_on(now, place)
         if urgent == 2 or is_full(now, watches, told, rows):
             for i in range(unknowns):
                 place.y[unknowns + i] = place.stages[0, i]
             return HANDS_OVER
+
+
+def cut_at_the_end(now, place, watches, limits, p):
+    """Let the step end where the motion cannot go on; whether it began before that."""
+    before, after = place.before, place.after
+    at_begin = room_left(before[LOG_RATE], before[RATIO], p[LOAD_VELOCITY])
+    at_end = room_left(after[LOG_RATE], after[RATIO], p[LOAD_VELOCITY])
+    if at_begin <= 0.0:
+        return False
+    cut(now, place, located(ROOM, at_begin, at_end, now, place, watches, limits, p), p)
+    return True
 
 
 def cut_short(now, place, watches, limits, p):

@@ -39,13 +39,14 @@ from rsfstudy.motion.compiled.table import (
     UNREST,
     WAITS,
 )
-from rsfstudy.motion.handover import weight_of_mass
+from rsfstudy.motion.handover import room_left, weight_of_mass
 from rsfstudy.motion.recording import SAMPLES, STATES
 from rsfstudy.slider.slots import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, SIZE, STIFFNESS
 
-#: What is read off a step beside the watches: how far the regime is from being left, and time.
+#: What is read off a step beside the watches: how far the regime is from being left, time, and how
+#: far the motion is from its end.
 #: Not whole numbers, of each of which the compiler would make a case of its own.
-EXCESS, PASSED = -1.0, -2.0
+EXCESS, PASSED, ROOM = -1.0, -2.0, -3.0
 _MOST_ITERATIONS = 100
 
 
@@ -82,13 +83,15 @@ def happens(watch, before, after, direction):
 
 
 def reading(what, clock, now, room, watches, limits, p):
-    """The quantity of a watch, `EXCESS` or `PASSED`, at a clock within the step."""
+    """The quantity of a watch, `EXCESS`, `PASSED` or `ROOM`, at a clock within the step."""
     if what == PASSED:
         unknowns_at(now, room, clock, p)
         return now.started + elapsed(now, clock, room.within, limits) - now.lasts
     point_within(now, room, clock, p)
     if what == EXCESS:
         return excess(now, room.between, limits)
+    if what == ROOM:
+        return room_left(room.between[LOG_RATE], room.between[RATIO], p[LOAD_VELOCITY])
     return quantity(watches[int(what)], room.between, p)
 
 

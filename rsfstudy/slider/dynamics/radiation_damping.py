@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 OWN = 0
 _MOST_ITERATIONS = 200
 _SETTLED = 1e-15
+#: How far strength may be off where Newton's steps have become small, over its size: on the floor
+#: of normal stress, which only trial steps meet, slopes are so steep that they are small anywhere.
+_BALANCED = 1e-6
 #: ln V beyond which only trial steps look for a balance: radiation would be 10^300 eta.
 _FASTEST = 690.0
 
@@ -70,10 +73,11 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
         else:
             high = x
         change = missing / (a + slope * damping * math.exp(x))
-        if abs(change) <= _SETTLED * (1.0 + abs(x)):
+        balanced = abs(missing) <= _BALANCED * (1.0 + abs(psi) + a * abs(x))
+        if balanced and abs(change) <= _SETTLED * (1.0 + abs(x)):
             return x, friction, shift
         # where normal stress is nearly lost, slopes are so steep that Newton's steps lead nowhere
-        slow = abs(change) > 0.5 * abs(before)
+        slow = abs(change) > 0.5 * abs(before) or abs(change) <= _SETTLED * (1.0 + abs(x))
         before = change
         if slow or not low < x + change <= high:
             before = math.inf

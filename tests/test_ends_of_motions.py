@@ -1,0 +1,117 @@
+"""Motions that cannot go on: what happens before their end is told, and the end is where it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import rsfstudy
+from rsfstudy import Scene, protocol
+from rsfstudy.boundaries.swing import swing
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.triggers import Triggers
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.events import Kind, rise
+from rsfstudy.motion.handover import GOES_ON, fate, room_left
+from rsfstudy.motion.regimes import starting
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.status import Status
+
+ENGINES = (SCIPY, COMPILED)
+
+
+def test_room_is_left_where_a_motion_goes_on():
+    rates, stresses = (-700.0, -10.0, 270.0, 280.0), (-1.0, 1e-12, 1e-9, 1.0, 1e6, 1e7)
+    for load in (0.0, 1.0):
+        for x in rates:
+            for stress in stresses:
+                goes_on = fate(x, stress, load) == GOES_ON
+                assert (room_left(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_runaway_is_followed_to_its_end(engine):
+    """Without mass, slip rate grows without bound within one step: every level before is told."""
+    scene = Scene(stiffness_ratio=0.5, displacement_step=3.0)
+    levels = [rise("log_rate", to) for to in (50.0, 150.0, 250.0)]
+    met, meter = [], Meter(100_000, engine=engine)
+
+    def follow_on() -> None:
+        for event in follow(scene, Accuracy(1e-6, engine=engine), meter, levels):
+            met.extend([event.watch.level] if event.kind is Kind.RISE else [])
+
+    with pytest.raises(Halt, match=r"beyond 10\^120"):
+        follow_on()
+    assert met == [50.0, 150.0, 250.0]
+    motion = rsfstudy.simulate(scene, engine=engine)
+    assert float(motion.log10_slip_rate[-1]) == pytest.approx(120.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_norm_is_met_before_normal_stress_is_lost(engine):
+    """sigma_3 below zero: slip rate grows without bound as normal stress vanishes."""
+    scene = Scene(
+        b_over_a=1.5, stiffness_ratio=1.2, phi=38.0, alpha=0.0, law="slowness",
+        load_velocity_ratio=0.0,
+    )  # fmt: skip
+    for step, reached in ((-0.0271, False), (-0.028, True), (-0.035, True), (-0.05, True)):
+        stepped = scene.with_(normal_stress_step=step)
+        for rtol in (1e-6, 1e-8):
+            found = swing(stepped, Accuracy(rtol, engine=engine), Meter(100_000, engine=engine))
+            assert found.reached is reached, (step, rtol)
+
+
+@pytest.mark.parametrize("rise_by", [0.5, 5.0, 11.0, 30.0, 60.0])
+@pytest.mark.parametrize("damping", [1e-6, 1e-3, 0.1])
+def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
+    """``mu_* + g = s (mu_* + a x - alpha ln s)`` with g = -eta (e^x - 1) and s = 1 + e + c g has
+    one root, which bisection finds: to rounding over a.
+    """
+    scene = Scene(b_over_a=1.5, radiation_damping=damping, normal_stress_step=rise_by)
+    cot_phi, alpha = scene.parts.normal_stress.coupling
+
+    def missing(x: float) -> float:
+        friction = -damping * math.expm1(x)
+        ratio = 1.0 + rise_by + cot_phi * friction
+        if ratio <= 0.0:
+            return -1.0
+        strength = scene.mu_star + scene.a * x - alpha * math.log(ratio)
+        return scene.mu_star + friction - ratio * strength
+
+    # stress falls and strength rises with x, where normal stress is left
+    expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
+    assert starting(scene).log_rate == pytest.approx(expected, abs=1e-9)
+
+
+def test_formulas_speak_of_no_other_normal_stress():
+    """The published critical stiffness is that of sigma_*."""
+    scene = Scene(normal_stress="imposed", load_velocity_ratio=1.0)
+    for step in (0.0, 0.5):
+        found = LinearStability()(scene.with_(normal_stress_step=step), Accuracy(1e-4)).values
+        explicit = found["critical_stiffness_explicit"]
+        assert math.isnan(explicit) is (step != 0.0)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"normal_stress": "constant"},
+        {"normal_stress": "imposed", "fluid": "dilatant"},
+        {"normal_stress": "imposed", "law": "composite"},
+    ],
+)
+def test_where_no_one_effective_friction_is_known(fields):
+    found = Triggers()(Scene(stiffness_ratio=0.5, **fields), Accuracy(1e-4))
+    assert found.status is Status.NOT_APPLICABLE
+    assert "no one effective friction" in found.message
+
+
+def test_one_segment_lasts_as_stated():
+    kind = protocol([{"velocity": 2.0, "duration": 4.2}])
+    motion = rsfstudy.simulate(Scene(loading=kind, stiffness_ratio=2.0))
+    assert np.isclose(float(motion.time[-1]), 4.2, rtol=1e-12)
