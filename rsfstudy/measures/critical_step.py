@@ -273,8 +273,9 @@ class CriticalStep(Measure):
                 return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
             log_size = 0.5 * (stable + unstable)
         # the swings that found it would confirm their own errors: the verdicts come from others
-        width = max(accuracy.rtol, unstable - stable)
-        boundary = Boundary(math.exp(log_size), width, by_motions=True)
+        size = math.exp(log_size)
+        error = max(accuracy.rtol + steps.blur(size, accuracy.rtol), unstable - stable)
+        boundary = Boundary(size, error, by_motions=True)
         return self._verified(steps, boundary, accuracy.refined(), meter)
 
     def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
