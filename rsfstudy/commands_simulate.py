@@ -24,7 +24,7 @@ def simulate(
     settings: tuple[str, ...],
     protocol_file: Path | None,
     duration: str | None,
-    against: str,
+    against: str | None,
     rtol: float,
     budget: int,
     engine: str,
@@ -38,7 +38,7 @@ def simulate(
     scene = _scene(_fields(settings), protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
-    _write(motion, laboratory, output, _ABSCISSAE[against])
+    _write(motion, laboratory, output, _ABSCISSAE[against] if against else None)
     status = Status[motion.attrs["status"].upper()]
     return terminal.OK if status.is_answer else terminal.FAILED
 
@@ -73,7 +73,9 @@ def _duration(text: str, laboratory: Laboratory | None) -> float:
     return stated
 
 
-def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str) -> None:
+def _write(
+    motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str | None
+) -> None:
     """The picture, and the data beside it."""
     from rsfstudy.plots import styled
     from rsfstudy.plots._motion import picture

@@ -320,6 +320,20 @@ def test_the_picture_of_a_motion(laboratory, against):
     assert np.asarray(path.get_xdata()).max() > 2.5
 
 
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"displacement_step": 0.5, "stiffness_ratio": 3.0},
+        {"normal_stress": "imposed", "normal_stress_step": -0.03},
+    ],
+)
+def test_where_the_load_point_is_held_slip_is_the_abscissa(fields):
+    motion = simulate(Scene(**fields), duration=5.0, rtol=1e-4)
+    assert "Slip" in picture(motion).axes[1].get_xlabel()
+    asked = picture(motion, against="load_point_displacement")
+    assert "Load point displacement" in asked.axes[1].get_xlabel()
+
+
 def test_what_is_no_motion_has_no_picture():
     with pytest.raises(DataError, match="it is no motion as simulate gives it"):
         picture(xr.Dataset())
