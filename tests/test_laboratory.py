@@ -1,6 +1,7 @@
 """The units of a rig: every conversion by its dimension, and what is no quantity."""
 
 import math
+import re
 import sys
 
 import numpy as np
@@ -352,6 +353,9 @@ def test_the_command_simulates_a_rig(tmp_path):
     ran = call(*words)
     assert ran.returncode == 0, ran.stderr
     assert (tmp_path / "out" / "test.png").stat().st_size > 10_000
+    told = " ".join(ran.stdout.split())
+    assert "duration 1130 s peak friction 0." in told
+    assert re.search(r"peak slip rate [\d.]+ um/s after [\d.]+ s friction at the end 0\.", told)
     with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
         assert written.load_point_displacement.attrs["units"] == "m"
         assert float(written.time[-1]) == pytest.approx(1130.0)
