@@ -174,6 +174,14 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     return store.read(places.results(name, output))
 
 
+def _opened(dataset: xr.Dataset | str | Path) -> xr.Dataset:
+    """Results, as they are given or as their file holds them."""
+    if not isinstance(dataset, xr.Dataset):
+        return open(dataset)
+    contents.check_of_a_study(dataset, "the dataset")
+    return dataset
+
+
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -209,8 +217,7 @@ def plot(
     """
     from rsfstudy import plots
 
-    results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
-    return plots.figure(results, own, variable=variable, style=style)
+    return plots.figure(_opened(dataset), own, variable=variable, style=style)
 
 
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
@@ -222,7 +229,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
         One row a claim: published value, ours, tolerance and its reason, verdict, and ``moved``
         where the verdict is not the expected one.
     """
-    results = dataset if isinstance(dataset, xr.Dataset) else open(dataset)
+    results = _opened(dataset)
     declared = contents.declaration(results)
     return verdicts(results, list(declared.claims), declared.overrides)
 
@@ -305,7 +312,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     DataError
         Where a file is missing or damaged.
     """
-    return side_by_side(*(d if isinstance(d, xr.Dataset) else open(d) for d in (first, second)))
+    return side_by_side(_opened(first), _opened(second))
 
 
 def cell(

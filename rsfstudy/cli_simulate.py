@@ -47,9 +47,8 @@ def _of_rig(command: Any) -> Any:
 @click.option(
     "--against",
     type=click.Choice(["displacement", "slip", "time"]),
-    default="displacement",
-    show_default=True,
-    help="Abscissa of the picture; displacement is that of the load point.",
+    help="Abscissa of the picture; displacement is that of the load point.  "
+    "[default: displacement, or slip where the load point is held]",
 )
 @_of_rig
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")

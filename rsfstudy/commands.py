@@ -23,7 +23,7 @@ from rsfstudy.console import console, stderr
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
-from rsfstudy.errors import Interrupted, RsfStudyError
+from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore
 from rsfstudy.motion.engines import lacking
 from rsfstudy.terminal import FAILED, OK, Ended
@@ -222,10 +222,19 @@ def _target(output: Path | None, form: str | None, every: bool) -> Path | None:
     """The file that --output names, if it is a figure."""
     ending = "" if output is None else output.suffix[1:].lower()
     if ending not in FIGURES:
+        _check_directory(output)
         return None
     if every or form not in (None, ending):
         raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
     return output
+
+
+def _check_directory(output: Path | None) -> None:
+    """Refuse a directory whose name looks like that of a figure, unless it is there."""
+    if output is not None and output.suffix and not output.is_dir():
+        rule = "ends in no format that figures are written in"
+        remedy = "A directory with such a name must be there already."
+        raise InvalidValue("--output", str(output), rule, choices=FIGURES, remedy=remedy)
 
 
 # ---- arguments ------------------------------------------------------------------------------

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
+from rich.table import Table
 
 from rsfstudy import assignments, terminal
 from rsfstudy.console import console
@@ -16,6 +18,8 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.trajectory import simulate as simulated
 
+#: Units of the rig in what is printed.
+_UNITS = {"length": "um", "time": "s"}
 _AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
 _ABSCISSAE = {"displacement": "load_point_displacement", "slip": "slip", "time": "time"}
 
@@ -24,7 +28,7 @@ def simulate(
     settings: tuple[str, ...],
     protocol_file: Path | None,
     duration: str | None,
-    against: str,
+    against: str | None,
     rtol: float,
     budget: int,
     engine: str,
@@ -38,7 +42,7 @@ def simulate(
     scene = _scene(_fields(settings), protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
-    _write(motion, laboratory, output, _ABSCISSAE[against])
+    _write(motion, laboratory, output, _ABSCISSAE[against] if against else None)
     status = Status[motion.attrs["status"].upper()]
     return terminal.OK if status.is_answer else terminal.FAILED
 
@@ -73,7 +77,9 @@ def _duration(text: str, laboratory: Laboratory | None) -> float:
     return stated
 
 
-def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str) -> None:
+def _write(
+    motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str | None
+) -> None:
     """The picture, and the data beside it."""
     from rsfstudy.plots import styled
     from rsfstudy.plots._motion import picture
@@ -86,8 +92,28 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, output: Path, agai
         (laboratory.in_units(motion) if laboratory else motion).to_netcdf(data)
     except OSError as error:
         raise DataError(f"{output}: cannot be written ({error})") from error
+    _summarise(laboratory.in_units(motion, **_UNITS) if laboratory else motion)
     said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
     console.print(f"{said}\nwrote {output} and {data}")
+
+
+def _summarise(motion: xr.Dataset) -> None:
+    """Print what a reader of the record looks for first."""
+    time, friction = motion["time"], motion["friction_coefficient"]
+    rate, per = motion.get("slip_rate"), "V_*"
+    if rate is None:
+        rate = 10.0 ** motion["log10_slip_rate"]
+    else:
+        per = str(rate.attrs["units"]).replace(" s-1", "/s")
+    unit = time.attrs.get("scale", time.attrs["units"])
+    table = Table("", "", "", box=None, show_header=False)
+    table.add_row("duration", f"{float(time[-1]):.6g} {unit}", "")
+    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
+        peak = int(np.argmax(values.values))
+        at = f"after {float(time[peak]):.6g} {unit}"
+        table.add_row(name, f"{float(values[peak]):.6g} {of}", at)
+    table.add_row("friction at the end", f"{float(friction[-1]):.6g}", "")
+    console.print(table)
 
 
 def _fields(settings: tuple[str, ...]) -> dict[str, Any]:

@@ -176,6 +176,14 @@ def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
     assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
 
 
+@pytest.mark.parametrize("name", ["figure.jpg", "figure.eps"])
+def test_a_figure_in_a_format_that_is_none_is_refused(name, tmp_path):
+    drawn = call("plot", NAME, "--output", tmp_path / name)
+    assert drawn.returncode == 2
+    assert "Choices: png, pdf, svg." in " ".join(drawn.stderr.split())
+    assert not (tmp_path / name).exists()
+
+
 def test_results_that_are_not_there_are_status_1(tmp_path):
     checked = call("check", NAME, "--output", tmp_path)
     assert checked.returncode == 1

@@ -106,6 +106,19 @@ def test_missing_and_damaged_files_are_named(tmp_path):
         store.read(tmp_path / "foreign.nc")
 
 
+def test_a_motion_is_no_results_of_a_study(tmp_path):
+    path, said = tmp_path / "motion.nc", r"one scene \(Motion of .*rsfstudy.picture"
+    motion = rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
+    motion.to_netcdf(path)
+    for ask in (rsfstudy.open, rsfstudy.check, rsfstudy.plot, rsfstudy.rerun):
+        with pytest.raises(DataError, match=f"motion.nc is of {said}"):
+            ask(path)
+    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+        rsfstudy.plot(motion)
+    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+        rsfstudy.compare(motion, motion)
+
+
 def test_an_output_that_is_a_file_is_named(tmp_path):
     (tmp_path / "taken").write_text("")
     with pytest.raises(DataError, match="cannot write.*choose another --output"):

@@ -1,6 +1,7 @@
 """The units of a rig: every conversion by its dimension, and what is no quantity."""
 
 import math
+import re
 import sys
 
 import numpy as np
@@ -323,6 +324,20 @@ def test_the_picture_of_a_motion(laboratory, against):
     assert np.asarray(path.get_xdata()).max() > 2.5
 
 
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"displacement_step": 0.5, "stiffness_ratio": 3.0},
+        {"normal_stress": "imposed", "normal_stress_step": -0.03},
+    ],
+)
+def test_where_the_load_point_is_held_slip_is_the_abscissa(fields):
+    motion = simulate(Scene(**fields), duration=5.0, rtol=1e-4)
+    assert "Slip" in picture(motion).axes[1].get_xlabel()
+    asked = picture(motion, against="load_point_displacement")
+    assert "Load point displacement" in asked.axes[1].get_xlabel()
+
+
 def test_what_is_no_motion_has_no_picture():
     with pytest.raises(DataError, match="it is no motion as simulate gives it"):
         picture(xr.Dataset())
@@ -341,6 +356,9 @@ def test_the_command_simulates_a_rig(tmp_path):
     ran = call(*words)
     assert ran.returncode == 0, ran.stderr
     assert (tmp_path / "out" / "test.png").stat().st_size > 10_000
+    told = " ".join(ran.stdout.split())
+    assert "duration 1130 s peak friction 0." in told
+    assert re.search(r"peak slip rate [\d.]+ um/s after [\d.]+ s friction at the end 0\.", told)
     with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
         assert written.load_point_displacement.attrs["units"] == "m"
         assert float(written.time[-1]) == pytest.approx(1130.0)

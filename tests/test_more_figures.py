@@ -1,12 +1,16 @@
 """Figures of laws, of dilatant cycles and of motions: comparable, and printable as all others."""
 
 import numpy as np
+import pytest
 import test_figures as checks
+import xarray as xr
+from matplotlib.figure import Figure
 from running import named_results
 
 import rsfstudy
 from rsfstudy import Scene, plots
 from rsfstudy.plots import _text
+from rsfstudy.plots._map import contours
 
 
 def test_laws_stand_at_one_height_under_constant_and_variable_normal_stress(tmp_path_factory):
@@ -44,3 +48,14 @@ def test_errors_too_small_to_show_are_left_out():
     assert _text.with_error(1.33333334, 8e-9, 4) == "$1.3333$"
     assert _text.with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
     assert _text.with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"
+
+
+@pytest.mark.parametrize(("points", "drawn"), [(5, 0), (6, 2)])
+def test_lines_of_equal_value_need_points_enough(points, drawn):
+    """Their labels have an outline, so that they can be read on any colour."""
+    at = np.arange(float(points))
+    values = xr.DataArray(at[:, None] + at, coords={"y": at, "x": at}, dims=("y", "x"))
+    axes = Figure().add_subplot()
+    contours(axes, values, [2.0, 4.0])
+    assert len(axes.texts) == drawn
+    assert all(text.get_path_effects() for text in axes.texts)

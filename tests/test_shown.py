@@ -1,5 +1,6 @@
 """Scenes, studies and verdicts as tables of a notebook."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim, verdicts
+from rsfstudy.declare.shown import Verdicts
 from rsfstudy.markup import symbol, table
 from rsfstudy.measures.critical_step import CriticalStep
 
@@ -59,6 +61,14 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
     shown = rows(found._repr_html_())
     assert shown[1] == ["C1", "x < y", "2", "2.05", "0.1: rounded", "reproduced"]
     assert shown[2][5] == "differs, and was expected to be: reproduced"
+    lines = repr(found).splitlines()
+    assert [re.split(r"\s{2,}", line) for line in lines] == [
+        ["id", "claim", "published", "ours", "tolerance", "verdict"],
+        ["C1", "x < y", "2", "2.05", "0.1", "reproduced"],
+        ["C2", "x < y", "3", "2.05", "0.1", "differs, moved"],
+    ]
+    long = found.assign(claim="longer than a line " * 9)
+    assert max(map(len, repr(Verdicts(long)).splitlines())) <= 100
     assert type(found[found.moved]) is pd.DataFrame
     assert found[found.moved]["id"].tolist() == ["C2"]
 

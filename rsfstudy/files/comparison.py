@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from rsfstudy.declare.wording import listed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
 from rsfstudy.status import Status
@@ -105,7 +106,12 @@ def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
         values = dataset[dimension].values
         if dimension not in place:
             if values.size > 1:
-                raise InvalidValue("cell", dict(place), f"leaves {dimension} open")
+                rule = f"leaves {dimension} open"
+                remedy = (
+                    f"Name one value of each axis (--cell is repeated). {dimension} has "
+                    f"{listed(values.tolist(), ', ')}."
+                )
+                raise InvalidValue("cell", dict(place), rule, remedy=remedy)
             index.append(0)
             continue
         number = _on_axis(values, place[dimension])

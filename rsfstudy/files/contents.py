@@ -135,6 +135,22 @@ def check(dataset: xr.Dataset) -> None:
     _check_lattice(dataset)
 
 
+def check_of_a_study(dataset: xr.Dataset, where: str) -> None:
+    """Refuse what was asked of one scene, with what to do with it.
+
+    Raises
+    ------
+    DataError
+        If the dataset is a motion, a limit cycle or a critical step.
+    """
+    if "scene" in dataset.attrs and "declaration" not in dataset.attrs:
+        title = brief(dataset.attrs.get("title", "untitled"))
+        raise DataError(
+            f"{where} is of one scene ({title}), not the results of a study. Open its file with "
+            "xarray.open_dataset; rsfstudy.picture(dataset), or dataset.rsf.plot(), draws a motion."
+        )
+
+
 def declaration(dataset: xr.Dataset) -> Declaration:
     """The declaration of the study that made a dataset.
 

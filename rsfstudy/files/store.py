@@ -82,8 +82,10 @@ class Digests:
         Raises
         ------
         DataError
-            Where it carries none, or a variable or attribute is missing or was changed.
+            Where it carries none, or a variable or attribute is missing or was changed; where it is
+            of one scene.
         """
+        contents.check_of_a_study(dataset, where)
         try:
             carried = dict(json.loads(dataset.attrs[_DIGESTS]))
         except (KeyError, TypeError, ValueError) as error:

@@ -10,11 +10,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.patheffects import withStroke
 
 from rsfstudy.status import Status
 
 #: Hatches of cells without a number, by the order in which their statuses are met.
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
+#: Fewest points of an axis along which lines of equal value are drawn.
+_FEWEST = 6
 _NAMES = {int(status): status.label for status in Status}
 
 
@@ -46,16 +49,17 @@ def colours(
 
 
 def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
-    """Lines of equal value, labelled; x and y are the coordinates of the last and the first
-    dimension.
+    """Lines of equal value, labelled, where there are points enough on both axes; x and y are the
+    coordinates of the last and the first dimension.
     """
     y, x = (values[dimension].values for dimension in values.dims)
-    if min(values.shape) < 2 or not len(levels):
+    if min(values.shape) < _FEWEST or not len(levels):
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
         found = axes.contour(x, y, values, levels, colors="white", linewidths=0.6, linestyles="-")
-    axes.clabel(found, fontsize=6, fmt="%.3g")
+    for text in axes.clabel(found, fontsize=6, fmt="%.3g"):
+        text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 
 
 def statuses(

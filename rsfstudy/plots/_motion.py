@@ -33,6 +33,8 @@ from rsfstudy.slider.steady import steady_excess
 HEIGHT = 48.0
 #: What a motion may be drawn against.
 AGAINST = ("load_point_displacement", "slip", "time")
+#: Change of load point displacement, over slip, below which the load point is held.
+_ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
 #: Units of the rig on axes.
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
@@ -42,7 +44,7 @@ def picture(
     motion: xr.Dataset,
     laboratory: Laboratory | None = None,
     *,
-    against: str = "load_point_displacement",
+    against: str | None = None,
 ) -> Figure:
     """Draw one motion.
 
@@ -52,8 +54,9 @@ def picture(
         As `rsfstudy.simulate` gives it.
     laboratory : Laboratory, optional
         The rig, in whose units the axes are then.
-    against : {"load_point_displacement", "slip", "time"}
-        What friction and slip rate are drawn against.
+    against : {"load_point_displacement", "slip", "time"}, optional
+        What friction and slip rate are drawn against: by default load point displacement, or slip
+        where the load point is held throughout.
 
     Returns
     -------
@@ -67,11 +70,12 @@ def picture(
     InvalidValue
         For another abscissa.
     """
-    if against not in AGAINST:
+    if against not in (None, *AGAINST):
         raise InvalidValue("against", against, "is unknown", choices=AGAINST)
     for name in (*AGAINST, "friction_coefficient", "log10_slip_rate"):
         if name not in motion:
             raise DataError(f"{name} is missing: it is no motion as simulate gives it")
+    against = against or _abscissa(motion)
     shown = motion if laboratory is None else laboratory.in_units(motion, **_UNITS)
     with styled():
         figure = Drawing(figsize=size(2, 2, HEIGHT), layout="constrained")
@@ -92,6 +96,13 @@ def picture(
         make_room(figure, [[upper], [lower, plane]])
         settle(figure)
     return figure
+
+
+def _abscissa(motion: xr.Dataset) -> str:
+    """Load point displacement, or slip where that does not change but for rounding."""
+    pulled, slid = (np.asarray(motion[name]) for name in ("load_point_displacement", "slip"))
+    least = _ROUNDING * max(float(np.ptp(slid)), float(np.abs(pulled).max()))
+    return "load_point_displacement" if np.ptp(pulled) > least else "slip"
 
 
 def _title(motion: xr.Dataset) -> str:

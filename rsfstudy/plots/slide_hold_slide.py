@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from rsfstudy.plots import Panel
 from rsfstudy.plots._axes import log_scale, same_height
 from rsfstudy.plots._style import legend, look, marker
-from rsfstudy.plots._text import pretty, with_error
+from rsfstudy.plots._text import number, pretty, with_error
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import quantity
 
@@ -28,10 +28,13 @@ _RECORDS = 5
 
 
 def panels(dataset: xr.Dataset) -> Sequence[Panel]:
-    """Healing, and relaxation beside it, for each case; records, and the rate of healing."""
+    """Healing, and relaxation beside it, for each case; records, and the rate of healing where
+    holds are long enough for one.
+    """
     cases = range(dataset.sizes["case"])
     both = [_against_time(name, case) for case in cases for name in ("healing", "relaxation")]
-    return [*both, draw_records, draw_rate]
+    fitted = "healing_per_decade" in dataset and bool(dataset["healing_per_decade"].notnull().any())
+    return [*both, draw_records, *([draw_rate] if fitted else [])]
 
 
 def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
@@ -42,9 +45,9 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
 def _against_time(name: str, case: int) -> Panel:
     def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
         """One line a stiffness; as high for all cases."""
-        for number in range(dataset.sizes["stiffness"]):
-            row = dataset.isel(case=case, stiffness=number)
-            style = look(number) | {"marker": marker(number), "markersize": 2.5}
+        for place in range(dataset.sizes["stiffness"]):
+            row = dataset.isel(case=case, stiffness=place)
+            style = look(place) | {"marker": marker(place), "markersize": 2.5}
             axes.plot(row["hold_time"], row[name], label=_stiffness(row), **style)
         same_height(axes, dataset[name])
         log_scale(axes, "x")
@@ -63,11 +66,11 @@ def draw_records(dataset: xr.Dataset, axes: Axes) -> Axes:
         case=min(1, dataset.sizes["case"] - 1), stiffness=dataset.sizes["stiffness"] // 2
     )
     last = dataset.sizes["hold_time"] - 1
-    for number, place in enumerate(np.unique(np.linspace(0, last, _RECORDS).astype(int))):
+    for drawn, place in enumerate(np.unique(np.linspace(0, last, _RECORDS).astype(int))):
         row = rows.isel(hold_time=place)
         change = row["friction_coefficient"] - row["mu_star"]
-        label = rf"$10^{{{np.log10(float(row['hold_time'])):g}}}$"
-        axes.plot(row["load_point_displacement"], change, label=label, **look(number))
+        label = number(float(row["hold_time"]))
+        axes.plot(row["load_point_displacement"], change, label=label, **look(drawn))
     axes.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
     axes.set_xlabel(quantity("load_point_displacement", stated_by(dataset)).axis_label)
     axes.set_ylabel(r"Change of friction, $\mu - \mu_*$")
@@ -78,14 +81,13 @@ def draw_records(dataset: xr.Dataset, axes: Axes) -> Axes:
 
 def draw_rate(dataset: xr.Dataset, axes: Axes) -> Axes:
     """Healing per decade against stiffness, with the standard errors of the fits."""
-    if "healing_per_decade" in dataset:
-        for case in range(dataset.sizes["case"]):
-            row = dataset.isel(case=case)
-            rate, error = row["healing_per_decade"], row["healing_per_decade_stderr"]
-            last = with_error(float(rate[-1]), float(error[-1]), 5)
-            label = f"{_case(row)}: {last}"
-            x = row["stiffness"] / row["a"]
-            axes.errorbar(x, rate, error, marker=marker(case), label=label, **look(case))
+    for case in range(dataset.sizes["case"]):
+        row = dataset.isel(case=case)
+        rate, error = row["healing_per_decade"], row["healing_per_decade_stderr"]
+        last = with_error(float(rate[-1]), float(error[-1]), 5)
+        label = f"{_case(row)}: {last}"
+        x = row["stiffness"] / row["a"]
+        axes.errorbar(x, rate, error, marker=marker(case), label=label, **look(case))
     log_scale(axes, "x")
     axes.set_xlabel(r"Stiffness, $k D_c/(a\,\sigma_*)$")
     axes.set_ylabel(r"Healing per decade, $\beta$")

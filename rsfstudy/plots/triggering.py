@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from rsfstudy.plots import Panel
 from rsfstudy.plots._axes import same_height
@@ -20,7 +21,7 @@ DIMENSIONS = ("law", "case", "stiffness_ratio")
 #: Of a panel, in mm.
 HEIGHT = 58.0
 
-_TITLE = "Lines with filled markers: fall of normal stress"
+_TITLE = "Filled markers: fall of normal stress, case by case"
 _FALL, _PULL, _FASTER = (
     "coulomb_stress_of_normal_stress",
     "coulomb_stress_of_displacement",
@@ -69,10 +70,12 @@ def _stresses(law: int) -> Panel:
         for number, case in enumerate(part["case"].values):
             row = part.sel(case=case)
             axes.plot(stiffness, scale * row[_FALL], label=pretty(case), **_line(number))
-            for variable, (name, style) in _OTHERS.items():
+            for variable, (_name, style) in _OTHERS.items():
                 line = style | {"color": look(number)["color"]}
-                label = "_" if number else name
-                axes.plot(stiffness, scale * row[variable], label=label, **line)
+                axes.plot(stiffness, scale * row[variable], label="_", **line)
+        for variable, (name, style) in _OTHERS.items():
+            if part[variable].notnull().any():
+                _in_grey(axes, name, style)
         axes.set_xlim(left=0.0)
         same_height(axes, scale * dataset[_FALL], scale * dataset[_PULL], log=True)
         axes.set_xlabel(f"Stiffness, {quantity('stiffness_ratio').symbol}")
@@ -94,7 +97,9 @@ def _ratios(law: int) -> Panel:
             row = part.sel(case=case)
             axes.plot(stiffness, row["coulomb_ratio"], label=pretty(case), **_line(number))
             run = _RUN | {"color": look(number)["color"]}
-            axes.plot(stiffness, row["direct_ratio"], label="_" if number else faster, **run)
+            axes.plot(stiffness, row["direct_ratio"], label="_", **run)
+        if part["direct_ratio"].notnull().any():
+            _in_grey(axes, faster, _RUN)
         axes.set_xlim(left=0.0)
         axes.set_xlabel(f"Stiffness, {quantity('stiffness_ratio').symbol}")
         axes.set_ylabel("Stress change over that by\na displacement step")
@@ -103,6 +108,13 @@ def _ratios(law: int) -> Panel:
         return axes
 
     return panel
+
+
+def _in_grey(axes: Axes, name: str, style: dict[str, Any]) -> None:
+    """Name in the legend what is drawn in the colours of all cases; the line is out of sight."""
+    axes.add_artist(
+        Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, color="0.3", **style)
+    )
 
 
 def _line(number: int) -> dict[str, Any]:
