@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
-from rich.table import Table
 
-from rsfstudy import assignments, terminal
+from rsfstudy import assignments, terminal, terminal_numbers
 from rsfstudy.console import console
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.laboratory import Laboratory
@@ -85,6 +83,10 @@ def _write(
     from rsfstudy.plots._motion import picture
 
     data = output.with_suffix(".nc")
+    said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
+    if not motion.sizes["time"]:
+        console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
+        return
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         with styled():
@@ -92,28 +94,8 @@ def _write(
         (laboratory.in_units(motion) if laboratory else motion).to_netcdf(data)
     except OSError as error:
         raise DataError(f"{output}: cannot be written ({error})") from error
-    _summarise(laboratory.in_units(motion, **_UNITS) if laboratory else motion)
-    said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
+    terminal_numbers.record(laboratory.in_units(motion, **_UNITS) if laboratory else motion)
     console.print(f"{said}\nwrote {output} and {data}")
-
-
-def _summarise(motion: xr.Dataset) -> None:
-    """Print what a reader of the record looks for first."""
-    time, friction = motion["time"], motion["friction_coefficient"]
-    rate, per = motion.get("slip_rate"), "V_*"
-    if rate is None:
-        rate = 10.0 ** motion["log10_slip_rate"]
-    else:
-        per = str(rate.attrs["units"]).replace(" s-1", "/s")
-    unit = time.attrs.get("scale", time.attrs["units"])
-    table = Table("", "", "", box=None, show_header=False)
-    table.add_row("duration", f"{float(time[-1]):.6g} {unit}", "")
-    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
-        peak = int(np.argmax(values.values))
-        at = f"after {float(time[peak]):.6g} {unit}"
-        table.add_row(name, f"{float(values[peak]):.6g} {of}", at)
-    table.add_row("friction at the end", f"{float(friction[-1]):.6g}", "")
-    console.print(table)
 
 
 def _fields(settings: tuple[str, ...]) -> dict[str, Any]:

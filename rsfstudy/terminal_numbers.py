@@ -1,4 +1,6 @@
-"""What commands print of numbers: the headline of a results file, and how two files compare."""
+"""What commands print of numbers: the headline of a results file, how two files compare, and the
+peaks of a motion.
+"""
 
 from __future__ import annotations
 
@@ -148,3 +150,24 @@ def _verdict(found: Comparison) -> str:
     wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
     wrong += [f"{len(found.statuses)} cells ended otherwise"] if len(found.statuses) else []
     return "; ".join(wrong) or "nothing differs beyond error estimates"
+
+
+def record(motion: xr.Dataset) -> None:
+    """Print what a reader of a motion looks for first, if it moved at all."""
+    if not motion.sizes["time"]:
+        return
+    time, friction = motion["time"], motion["friction_coefficient"]
+    rate, per = motion.get("slip_rate"), "V_*"
+    if rate is None:
+        rate = 10.0 ** motion["log10_slip_rate"]
+    else:
+        per = str(rate.attrs["units"]).replace(" s-1", "/s")
+    unit = time.attrs.get("scale", time.attrs["units"])
+    table = Table("", "", "", box=None, show_header=False)
+    table.add_row("duration", f"{float(time[-1]):.6g} {unit}", "")
+    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
+        peak = int(np.argmax(values.values))
+        at = f"after {float(time[peak]):.6g} {unit}"
+        table.add_row(name, f"{float(values[peak]):.6g} {of}", at)
+    table.add_row("friction at the end", f"{float(friction[-1]):.6g}", "")
+    console.print(table)

@@ -338,3 +338,12 @@ def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_pa
     assert ran.returncode == 2
     assert "case" in ran.stderr
     assert not (tmp_path / "o").exists()
+
+
+def test_a_motion_that_cannot_begin_is_told(tmp_path):
+    output = tmp_path / "motion.png"
+    ended = call("simulate", "--set", "displacement_step=-200", "--output", output)
+    assert ended.returncode == 0  # an answer
+    assert "normal_stress_lost" in ended.stdout
+    assert "nothing moved" in ended.stdout
+    assert not output.exists()

@@ -75,6 +75,9 @@ def picture(
     for name in (*AGAINST, "friction_coefficient", "log10_slip_rate"):
         if name not in motion:
             raise DataError(f"{name} is missing: it is no motion as simulate gives it")
+    if not motion.sizes["time"]:
+        text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
+        raise DataError(f"nothing moved, and there is nothing to draw. {text}")
     against = against or _abscissa(motion)
     shown = motion if laboratory is None else laboratory.in_units(motion, **_UNITS)
     with styled():
