@@ -29,12 +29,12 @@ class Shown:
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} states no fields")
 
     @property
     def own_parts(self) -> tuple[type[Any], ...]:
         """Those of its parts that are the user's own."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} states no parts")
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
