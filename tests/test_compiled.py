@@ -494,12 +494,12 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     """Any change of a function, or of a number it reads, makes another digest."""
     scene = Scene(law=SlipLaw)
     rate = between_ruptures(scene, clock=False).rate
-    before = building.digest_of(rate)
-    assert building.digest_of(rate) == before
+    before = building.digest_of(None, rate)
+    assert building.digest_of(None, rate) == before
     strength = rate.__globals__["balance"].__globals__["strength"]
     monkeypatch.setitem(strength.__globals__["state_effect"].__globals__, "OWN", 3)
-    assert building.digest_of(rate) != before
-    assert building.digest_of(doubled) != building.digest_of(tripled)
+    assert building.digest_of(None, rate) != before
+    assert building.digest_of(None, doubled) != building.digest_of(None, tripled)
 
 
 def by_module(y, rates, p, result):

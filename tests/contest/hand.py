@@ -10,7 +10,6 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from contest.problem import Problem, arrays, equations, scales, through
-from rsfstudy.motion.compiled.order_eight import _A, _B, _E3, _E5
 
 Found = list[tuple[float, float]]
 
@@ -95,15 +94,15 @@ def unrolled(rate: str) -> str:
         "        length = min(length, span - clock)",
     ]
     for s in range(1, 13):
-        row = _A[s, :s] if s < 12 else _B
+        row = DOP853.A[s, :s] if s < 12 else DOP853.B
         lines += [f"        {n}s = {n} + length*({_sum(row, 'd' + n)})" for n in "uvw"]
         made = rate.replace("u,", "us,").replace("v,", "vs,").replace("w,", "ws,")
         lines.append(f"        du{s}, dv{s}, dw{s} = {made}")
     for n in "uvw":
         lines += [
             f"        scale = tolerance*(s{n} + max(abs({n}), abs({n}s)))",
-            f"        e5{n} = ({_sum(_E5, 'd' + n)})/scale",
-            f"        e3{n} = ({_sum(_E3, 'd' + n)})/scale",
+            f"        e5{n} = ({_sum(DOP853.E5, 'd' + n)})/scale",
+            f"        e3{n} = ({_sum(DOP853.E3, 'd' + n)})/scale",
         ]
     lines += [
         "        fifth, third = e5u*e5u + e5v*e5v + e5w*e5w, e3u*e3u + e3v*e3v + e3w*e3w",

@@ -35,7 +35,13 @@ _OURS = __package__
 _ENTRY = "motion.py"
 #: Modules that are as their version, or that of Python, says.
 _KNOWN_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
-_OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "nogil": True}
+#: Quotients by the numbers of a scene may be products with reciprocals, found once a step; and
+#: products and sums may be rounded together.
+_OPTIONS: Mapping[str, Any] = {
+    "error_model": "numpy",
+    "nogil": True,
+    "fastmath": {"arcp", "contract", "nsz"},
+}
 _POINTERS = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
 #: Changes where what is kept is laid out or named in another way.
 _LAYOUT = 2
@@ -50,11 +56,20 @@ def cache_folder() -> Path:
 
 
 def filled(function: Callable[..., Any], places: Mapping[str, Any]) -> Callable[..., Any]:
-    """A copy of a function of this folder, and of those it reaches, with names for other things."""
+    """A copy of a function of this folder, and of those it reaches, with names for other things.
+
+    What reaches no such name is no copy, so that it is compiled once for all.
+    """
     copies: dict[int, Callable[..., Any]] = {}
 
-    def copy(plain: Any) -> Any:
+    def reaches(plain: Any) -> bool:
         if not isinstance(plain, types.FunctionType) or not plain.__module__.startswith(_OURS):
+            return False
+        names = [name for name in plain.__code__.co_names if name in plain.__globals__]
+        return any(name in places or reaches(plain.__globals__[name]) for name in names)
+
+    def copy(plain: Any) -> Any:
+        if not reaches(plain):
             return plain
         if id(plain) not in copies:
             known, reached = plain.__globals__, {}
@@ -69,10 +84,12 @@ def filled(function: Callable[..., Any], places: Mapping[str, Any]) -> Callable[
     return copy(function)  # type: ignore[no-any-return]
 
 
-def digest_of(*functions: Callable[..., Any]) -> str:
-    """Digest of functions and of all that they reach, of the compiler and of the processor."""
+def digest_of(signature: Any, *functions: Callable[..., Any]) -> str:
+    """Digest of functions of a signature and of all that they reach, of the compiler and of the
+    processor.
+    """
     content = _Content()
-    content.add(functions)
+    content.add((signature, functions))
     processor = llvmlite.binding.get_host_cpu_name(), str(llvmlite.binding.get_host_cpu_features())
     content.add((_LAYOUT, numba.__version__, np.__version__, str(config.CPU_NAME), str(config.OPT)))
     content.add(processor)
@@ -137,7 +154,7 @@ def called_from_python(function: Callable[..., Any], signature: Any) -> Any:
         dispatcher.compile(signature)
         return dispatcher
 
-    return _kept(digest_of(function), compile_for)
+    return _kept(digest_of(signature, function), compile_for)
 
 
 def called_by_address(
@@ -150,7 +167,7 @@ def called_by_address(
         roots = (_reaching(function, entry) for function in ready)
         return [numba.cfunc(_POINTERS, cache=bool(entry), **_OPTIONS)(root) for root in roots]
 
-    pointers = _kept(digest_of(*ready), compile_for)
+    pointers = _kept(digest_of(_POINTERS, *ready), compile_for)
     _ALIVE.append(pointers)
     return tuple(pointer.address for pointer in pointers)
 

@@ -1,6 +1,8 @@
-"""Calls from the compiled motion to the compiled equations of a scene, by their addresses.
+"""Pointers to numbers, and calls from the compiled motion to the compiled equations of a scene, by
+their addresses.
 
 The motion is compiled once, for all equations; the equations once for each combination of parts.
+Arrays would be passed from function to function as ten words each, and counted.
 """
 
 from __future__ import annotations
@@ -9,9 +11,10 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
-_ADDRESS = types.int64
+_POINTER = types.CPointer(types.float64)
 #: ``function(y, rates, p, result)``: all pointers to numbers, of which some are not read.
 _DOUBLES = ir.DoubleType().as_pointer()
 _FUNCTION = ir.FunctionType(ir.VoidType(), [_DOUBLES] * 4)
@@ -19,15 +22,41 @@ _FUNCTION = ir.FunctionType(ir.VoidType(), [_DOUBLES] * 4)
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _called(_context: Any, function: Any, y: Any, rates: Any, p: Any, result: Any) -> Any:
-    def code(_target: Any, builder: Any, _signature: Any, addresses: Any) -> Any:
-        function, *arguments = addresses
-        pointers = [builder.inttoptr(address, _DOUBLES) for address in arguments]
+    def code(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        function, *pointers = arguments
         builder.call(builder.inttoptr(function, _FUNCTION.as_pointer()), pointers)
-        return _target.get_dummy_value()
+        return target.get_dummy_value()
 
-    return types.void(*[_ADDRESS] * 5), code
+    return types.void(types.int64, *[_POINTER] * 4), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _first(_context: Any, array: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return cgutils.create_struct_proxy(signature.args[0])(context, builder, arguments[0]).data
+
+    return _POINTER(array), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _moved(_context: Any, pointer: Any, numbers: Any) -> Any:
+    def code(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        pointer, numbers = arguments
+        return builder.gep(pointer, [numbers])
+
+    return _POINTER(_POINTER, types.int64), code
 
 
 def evaluate(function, y, rates, p, result):
     """Have a function of the equations fill `result`."""
-    _called(function, y.ctypes.data, rates.ctypes.data, p.ctypes.data, result.ctypes.data)
+    _called(function, y, rates, p, result)
+
+
+def first_of(array):
+    """A pointer to the first number of an array, which its caller keeps alive."""
+    return _first(array)
+
+
+def moved(pointer, numbers):
+    """A pointer so many numbers further on."""
+    return _moved(pointer, numbers)

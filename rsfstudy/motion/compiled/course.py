@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.compiled.calls import evaluate
+from rsfstudy.motion.compiled.calls import evaluate, first_of, moved
 from rsfstudy.motion.compiled.happenings import (
     EXCESS,
     PASSED,
@@ -21,9 +21,9 @@ from rsfstudy.motion.compiled.happenings import (
     tell_beginning,
     tell_watched,
 )
-from rsfstudy.motion.compiled.order_eight import STAGES, copy
+from rsfstudy.motion.compiled.order_eight import copy
 from rsfstudy.motion.compiled.room import room
-from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, fill_point, take_step
+from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, take_step
 from rsfstudy.motion.compiled.table import (
     CHANGE,
     CHANGES,
@@ -41,12 +41,13 @@ from rsfstudy.motion.compiled.table import (
     SLOW,
     SPRING,
 )
+from rsfstudy.motion.compiled.unrolled import STAGES, TOLERANCE
 from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed, room_left
 from rsfstudy.motion.recording import SAMPLES
 from rsfstudy.slider.slots import LOAD_VELOCITY
 
 
-def advance(memory, y, scales, last, watches, told, rows, numbers, p):
+def advance(memory, y, scales, functions, space, last, watches, told, rows, numbers, p):
     """Follow a motion from where `memory` and `y` are.
 
     Parameters
@@ -56,6 +57,10 @@ def advance(memory, y, scales, last, watches, told, rows, numbers, p):
         Unknowns, and behind them their rates.
     scales : ndarray
         Of the unknowns; those in a rupture follow those between ruptures.
+    functions : ndarray of int
+        Addresses of the equations of each regime.
+    space : ndarray
+        Room for the arrays of a regime.
     last : ndarray
         The last point of the regime before.
     watches, told, rows : ndarray
@@ -71,22 +76,23 @@ def advance(memory, y, scales, last, watches, told, rows, numbers, p):
         Why it returns.
     """
     now = memory[0]
+    y, scales, space = first_of(y), first_of(scales), first_of(space)
+    last, p = first_of(last), first_of(p)
     limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
     end = CHANGES
     while end == CHANGES:
-        of_regime = scales[: now.unknowns] if now.regime == SLOW else scales[now.unknowns :]
-        place = room(y, of_regime, now.states, len(watches))
-        end = through_regime(now, place, last, watches, told, rows, limits, p)
+        place = begun(now, y, scales, functions, space, watches, p)
+        end = through_regime(now, place, last, told, rows, limits)
         if end == CHANGES:
             change_regime(now, y, last)
-            if is_full(now, watches, told, rows):
+            if is_full(now, len(watches), told, rows):
                 end = HANDS_OVER
     return end
 
 
-def is_full(now, watches, told, rows):
+def is_full(now, watched, told, rows):
     """Whether the tables have no room for all that one more step may add to them."""
-    full = len(told) - now.told < 2 * len(watches) + 3
+    full = len(told) - now.told < 2 * watched + 3
     return full or (len(rows) > 0 and len(rows) - now.recorded < 2 * SAMPLES)
 
 
@@ -104,36 +110,48 @@ def change_regime(now, y, last):
     now.regime, now.begins = FAST - now.regime, CHANGE
 
 
-def through_regime(now, place, last, watches, told, rows, limits, p):
+def begun(now, y, scales, functions, space, watches, p):
+    """Room for the regime that a motion is in."""
+    unknowns, first = now.unknowns, 0
+    if now.regime == FAST:
+        unknowns, first = now.unknowns_fast, now.unknowns
+    of_regime, asked = functions[now.regime], first_of(watches)
+    scales = moved(scales, first)
+    return room(space, y, unknowns, scales, now.states, of_regime, asked, len(watches), p)
+
+
+def through_regime(now, place, last, told, rows, limits):
     """Follow one regime; returns why it ends, or why the call has to."""
-    unknowns, recording = len(place.new), len(rows) > 0
+    unknowns, p, recording = place.unknowns, place.p, len(rows) > 0
+    place.step[TOLERANCE] = now.tolerance
     if now.begins:
-        begin(now, place, p)
+        begin(now, place)
     else:
         for i in range(unknowns):
-            place.stages[0, i] = place.y[unknowns + i]
-    fill_point(now, place.y, place.stages[0], p, place.before)
+            place.stages[i] = place.y[unknowns + i]
+    evaluate(place.point, place.y, place.stages, p, place.before)
+    rates_at_end = moved(place.stages, STAGES * unknowns)
     while True:
-        taken = take_step(now, place, limits, p)
+        taken = take_step(now, place, limits)
         if taken != TAKEN:
             return taken
-        fill_point(now, place.new, place.stages[STAGES], p, place.after)
+        evaluate(place.point, place.new, rates_at_end, p, place.after)
         if math.isnan(place.after[LOG_RATE]):
             return NO_LENGTH
         if now.ends_by_fate:
             now.stress = place.after[RATIO]
             now.fate = fate(place.after[LOG_RATE], now.stress, p[LOAD_VELOCITY])
-            if now.fate != GOES_ON and not cut_at_the_end(now, place, watches, limits, p):
+            if now.fate != GOES_ON and not cut_at_the_end(now, place, limits):
                 return HALTED
-        leaves, over = cut_short(now, place, watches, limits, p)
+        leaves, over = cut_short(now, place, limits)
         if now.begins:
             if recording:
                 record_point(now, rows, now.started, place.before, p)
-            if tell_beginning(now, place, last, watches, told, limits, p):
+            if tell_beginning(now, place, last, told, limits):
                 return ENDED
         if recording:
-            record(now, place, rows, limits, p)
-        urgent = tell_watched(now, place, watches, told, limits, p)
+            record(now, place, rows, limits)
+        urgent = tell_watched(now, place, told, limits)
         if now.begins:
             urgent, now.begins = max(urgent, 2 if now.begins != CHANGE else 1), 0
         if urgent == 3:
@@ -141,45 +159,45 @@ def through_regime(now, place, last, watches, told, rows, limits, p):
         if over:
             tell(now, told, float(END), now.end, passed_at_end(now, place, limits), place.after, p)
             return ENDED
-        if leaves or lands(now, place, limits, p):
+        if leaves or lands(now, place, limits):
             now.started = passed_at_end(now, place, limits)
-            copy(place.after, last)
+            copy(place.after, last, PSIS + now.states)
             return CHANGES
         if now.ends_by_fate and now.fate != GOES_ON:
             return HALTED
         move_on(now, place)
-        if urgent == 2 or is_full(now, watches, told, rows):
+        if urgent == 2 or is_full(now, place.asked, told, rows):
             for i in range(unknowns):
-                place.y[unknowns + i] = place.stages[0, i]
+                place.y[unknowns + i] = place.stages[i]
             return HANDS_OVER
 
 
-def cut_at_the_end(now, place, watches, limits, p):
+def cut_at_the_end(now, place, limits):
     """Let the step end where the motion cannot go on; whether it began before that."""
-    before, after = place.before, place.after
+    before, after, p = place.before, place.after, place.p
     at_begin = room_left(before[LOG_RATE], before[RATIO], p[LOAD_VELOCITY])
     at_end = room_left(after[LOG_RATE], after[RATIO], p[LOAD_VELOCITY])
     if at_begin <= 0.0:
         return False
-    cut(now, place, located(ROOM, at_begin, at_end, now, place, watches, limits, p), p)
+    cut(now, place, located(ROOM, at_begin, at_end, now, place, limits))
     return True
 
 
-def cut_short(now, place, watches, limits, p):
+def cut_short(now, place, limits):
     """Let the step end where the regime has to be left, and where time is over; whether it is."""
     before, after = excess(now, place.before, limits), excess(now, place.after, limits)
     leaves = after >= 0.0 > before
     if leaves:
-        cut(now, place, located(EXCESS, before, after, now, place, watches, limits, p), p)
+        cut(now, place, located(EXCESS, before, after, now, place, limits))
     over = passed_at_end(now, place, limits) >= now.lasts
     if over:
         at_begin = now.started + elapsed(now, now.clock, place.y, limits) - now.lasts
         at_end = passed_at_end(now, place, limits) - now.lasts
-        cut(now, place, located(PASSED, at_begin, at_end, now, place, watches, limits, p), p)
+        cut(now, place, located(PASSED, at_begin, at_end, now, place, limits))
     return leaves, over
 
 
-def lands(now, place, limits, p):
+def lands(now, place, limits):
     """Whether the full equations have done their work."""
     if now.regime == SLOW:
         return False
@@ -187,7 +205,7 @@ def lands(now, place, limits, p):
     place.within[0] = columns[SPRING]
     for i in range(now.states):
         place.within[1 + i] = columns[PSIS + i]
-    evaluate(now.balance, place.within, place.within, p, below)
+    evaluate(place.balance, place.within, place.within, place.p, below)
     missing = columns[SPRING] - below[1]
     return has_landed(columns[LOG_RATE], columns[GROWTH], below[0], missing, limits)
 
@@ -195,6 +213,6 @@ def lands(now, place, limits, p):
 def move_on(now, place):
     """The end of a step is the beginning of the next."""
     now.clock = now.end
-    copy(place.new, place.y)
-    copy(place.stages[STAGES], place.stages[0])
-    copy(place.after, place.before)
+    copy(place.new, place.y, place.unknowns)
+    copy(moved(place.stages, STAGES * place.unknowns), place.stages, place.unknowns)
+    copy(place.after, place.before, PSIS + now.states)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.compiled import machine, table
+from rsfstudy.motion.compiled import machine, room, table
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.recording import REGIME, STATES, Recording
@@ -46,7 +46,11 @@ _COLUMNS = {
     "reading": table.READING,
     "": 0,
 }
-_BESIDE = {table.BEGIN: Kind.START, table.CHANGE: Kind.REGIME, table.END: Kind.END}
+#: What is told beside what was asked for: the codes of these count from the end.
+_SAMPLE = Kind.SAMPLE, None
+_BESIDE = [(Kind.END, None), (Kind.REGIME, None), (Kind.START, None)]
+#: Where the states of a point begin in a line of the table of events.
+_OF_STATES = table.POINT + table.PSIS
 _NO_MASS = (math.nan,) * len(Limits._fields)
 
 
@@ -56,8 +60,9 @@ class _Course(NamedTuple):
     Attributes
     ----------
     memory : ndarray of NOW, shape (1,)
-    y, scales : ndarray
-        Unknowns and room for their rates; scales of the unknowns of all regimes.
+    y, scales, functions : ndarray
+        Unknowns and room for their rates; scales of the unknowns of all regimes; addresses of the
+        equations of each.
     limits : tuple of float
     p : ndarray
         The numbers of the scene.
@@ -68,6 +73,7 @@ class _Course(NamedTuple):
     memory: np.ndarray
     y: np.ndarray
     scales: np.ndarray
+    functions: np.ndarray
     limits: Numbers
     p: np.ndarray
     regimes: tuple[str, ...]
@@ -117,8 +123,7 @@ def segment(
     now = course.memory[0]
     now["time"], now["slip"], now["spring"] = origin
     now["lasts"] = lasts
-    for event, _clock in _told(course, meter, watches, (), recording):
-        yield event
+    return _told(course, meter, watches, recording=recording)
 
 
 def along(
@@ -137,9 +142,10 @@ def along(
     now["direction"], now["anew"] = -1.0 if backward else 1.0, not is_rigid
     now["strides"] = not is_rigid
     scales, p = np.array(equations.scales), np.array(equations.p)
-    course = _Course(memory, _unknowns(state), scales, _NO_MASS, p, (equations.regime,))
-    for event, at in _told(course, meter, watches, samples, None):
-        yield event._replace(slip=at) if is_rigid else event
+    functions, names = _table(_addresses(equations)), (equations.regime,)
+    course = _Course(memory, _unknowns(state), scales, functions, _NO_MASS, p, names)
+    # a rigid slider has slip for its clock
+    return _told(course, meter, watches, samples, slips=table.CLOCK if is_rigid else table.SLIP)
 
 
 def _course(scene: Scene, accuracy: Accuracy, start: Point, *, clock: bool) -> _Course:
@@ -151,15 +157,15 @@ def _course(scene: Scene, accuracy: Accuracy, start: Point, *, clock: bool) -> _
     now["ends_by_fate"], now["has_clock"], now["strides"], now["anew"] = 1, clock, 1, 1
     state = slow_state(start, clock)
     if both is None:
-        return _Course(memory, _unknowns(state), np.array(slow.scales), _NO_MASS, p, (slow.regime,))
+        functions, scales = _table(_addresses(slow)), np.array(slow.scales)
+        return _Course(memory, _unknowns(state), scales, functions, _NO_MASS, p, (slow.regime,))
     fast = both.fast
-    now["has_mass"] = 1
-    now["fast_rates"], now["fast_point"] = _addresses(fast)[:2]
-    now["balance"] = _addresses(slow)[2]
+    now["has_mass"], now["unknowns_fast"] = 1, len(fast.unknowns)
     if not both.begins_slow(start):
         now["regime"], state = table.FAST, fast_state(start)
     names, scales = (slow.regime, fast.regime), np.array((*slow.scales, *fast.scales))
-    return _Course(memory, _unknowns(state), scales, tuple(both.limits), p, names)
+    functions = _table(_addresses(slow), _addresses(fast))
+    return _Course(memory, _unknowns(state), scales, functions, tuple(both.limits), p, names)
 
 
 def _addresses(equations: Equations) -> tuple[int, ...]:
@@ -174,27 +180,33 @@ def _addresses(equations: Equations) -> tuple[int, ...]:
     )
 
 
+@cache
+def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
+    """The table of addresses; both regimes know of the balance between ruptures."""
+    rows = np.zeros((2, table.FUNCTIONS), dtype=np.int64)
+    rows[table.SLOW, : len(slow)], rows[table.FAST, : len(fast)] = slow, fast
+    rows[table.FAST, -1] = rows[table.SLOW, -1]
+    return rows
+
+
 def _memory(equations: Equations, tolerance: float) -> np.ndarray:
     """What a motion that begins with these equations remembers."""
-    return _template(
-        max(tolerance, TIGHTEST),
-        len(equations.unknowns),
-        equations.states,
-        *_addresses(equations)[:2],
-    ).copy()
+    unknowns = len(equations.unknowns)
+    # records are copied one field after the other, and bytes at once
+    template = _template(max(tolerance, TIGHTEST), unknowns, equations.states)
+    return template.copy().view(table.NOW)
 
 
 @lru_cache(maxsize=256)
-def _template(tolerance: float, unknowns: int, states: int, rates: int, point: int) -> np.ndarray:
-    """The same, for all motions by these equations at a tolerance."""
+def _template(tolerance: float, unknowns: int, states: int) -> np.ndarray:
+    """The same as bytes, for all motions by these equations at a tolerance."""
     memory = np.zeros(1, table.NOW)
     now = memory[0]
     now["tolerance"], now["direction"] = tolerance, 1.0
     now["finer"] = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
     now["lasts"], now["begins"] = math.inf, table.BEGIN
     now["unknowns"], now["states"] = unknowns, states
-    now["slow_rates"], now["slow_point"] = rates, point
-    return memory
+    return memory.view(np.uint8)
 
 
 def _unknowns(state: Numbers) -> np.ndarray:
@@ -208,10 +220,12 @@ def _told(
     course: _Course,
     meter: Meter,
     watches: Sequence[Watch],
-    samples: Sequence[float],
-    recording: Recording | None,
-) -> Iterator[tuple[Event, float]]:
-    """Events of a motion, each with its clock; a call of the compiled motion fills a table.
+    samples: Sequence[float] = (),
+    recording: Recording | None = None,
+    slips: int = table.SLIP,
+) -> Iterator[Event]:
+    """Events of a motion, a table of them by each call of the compiled motion; their slip stands in
+    the column `slips`.
 
     Raises
     ------
@@ -219,20 +233,27 @@ def _told(
         Where it cannot go on.
     """
     now, asked = course.memory[0], _asked(tuple(watches), tuple(samples)).copy()
+    states = int(now["states"])
     now["budget"] = meter.budget - meter.spent
-    point, advance = table.PSIS + int(now["states"]), machine.course()
-    told = np.empty((max(_EVENTS, 2 * len(asked) + 3), table.POINT + point))
-    rows = np.empty((0 if recording is None else _RECORDED, STATES + int(now["states"])))
+    meanings = [*((watch.kind, watch) for watch in watches), *[_SAMPLE] * len(samples), *_BESIDE]
+    told = np.empty((max(_EVENTS, 2 * len(asked) + 3), table.POINT + table.PSIS + states))
+    rows = np.empty((0 if recording is None else _RECORDED, STATES + states))
+    space = np.empty(room.size(len(course.y), states, len(asked)))
+    arguments = (*course[:4], space, np.zeros(table.PSIS + states), asked, told, rows)
     account = _Account(meter, course.regimes)
-    arguments = course.memory, course.y, course.scales, np.zeros(point), asked, told, rows
-    end = table.HANDS_OVER
+    advance, end = machine.course(), table.HANDS_OVER
     while end == table.HANDS_OVER:
         end = advance(*arguments, course.limits, course.p)
         if recording is not None:
             _keep(recording, rows[: now["recorded"]], course.regimes)
         for line in told[: now["told"]].tolist():
-            account.charge(*line[table.STEPS : table.POINT])
-            yield _event(line, watches, course.regimes, meter.spent), line[table.CLOCK]
+            code, regime, _clock, time, _slip, *work = line[: table.POINT]
+            account.charge(*work)
+            x, growth, spring, friction, *others = line[table.POINT : _OF_STATES]
+            point = Point(x, growth, spring, friction, tuple(line[_OF_STATES:]), *others)
+            kind, watch = meanings[int(code)]
+            name = course.regimes[int(regime)]
+            yield Event(kind, watch, time, line[slips], point, name, meter.spent)
         now["told"] = now["recorded"] = 0
     account.charge(now["steps"], now["spent_slow"], now["spent_fast"])
     if end != table.ENDED:
@@ -244,29 +265,19 @@ class _Account:
 
     def __init__(self, meter: Meter, names: tuple[str, ...]) -> None:
         self._meter, self._names = meter, names
-        self._steps, self._spent = 0, (0, 0)
+        self._steps = self._slow = self._fast = 0
 
-    def charge(self, steps: float, *spent: float) -> None:
+    def charge(self, steps: float, slow: float, fast: float) -> None:
         """Charge what has been spent up to here."""
-        before, self._spent = self._spent, (int(spent[0]), int(spent[1]))
-        self._meter.steps += int(steps) - self._steps
+        meter, names = self._meter, self._names
+        meter.steps += int(steps) - self._steps
         self._steps = int(steps)
-        for name, now, then in zip(self._names, self._spent, before, strict=False):
-            if now > then:
-                self._meter.charge(name, now - then)
-
-
-def _event(
-    line: Sequence[float], watches: Sequence[Watch], names: tuple[str, ...], spent: int
-) -> Event:
-    """The event of a line of the table."""
-    code, at = int(line[table.CODE]), table.POINT
-    watch = watches[code] if 0 <= code < len(watches) else None
-    kind = watch.kind if watch is not None else _BESIDE.get(code, Kind.SAMPLE)
-    x, growth, spring, friction, *others = line[at : at + table.PSIS]
-    point = Point(x, growth, spring, friction, tuple(line[at + table.PSIS :]), *others)
-    time, slip, regime = line[table.TIME], line[table.SLIP], names[int(line[table.REGIME])]
-    return Event(kind, watch, time, slip, point, regime, spent)
+        if slow > self._slow:
+            meter.charge(names[0], int(slow) - self._slow)
+            self._slow = int(slow)
+        if fast > self._fast:
+            meter.charge(names[1], int(fast) - self._fast)
+            self._fast = int(fast)
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rsfstudy.motion.compiled.calls import moved
 from rsfstudy.motion.compiled.steps import elapsed, point_within, unknowns_at
 from rsfstudy.motion.compiled.table import (
     CHANGE,
@@ -38,6 +39,7 @@ from rsfstudy.motion.compiled.table import (
     TIME,
     UNREST,
     WAITS,
+    WATCHED,
 )
 from rsfstudy.motion.handover import room_left, weight_of_mass
 from rsfstudy.motion.recording import SAMPLES, STATES
@@ -63,6 +65,11 @@ def quantity(watch, columns, p):
     return columns[int(watch[OF])] - watch[LEVEL]
 
 
+def watch_of(room, number):
+    """One of the watches."""
+    return moved(room.watches, len(WATCHED) * number)
+
+
 def excess(now, columns, limits):
     """Not negative where the slow manifold has to be left; always negative elsewhere."""
     if now.regime != SLOW or not now.has_mass:
@@ -82,20 +89,20 @@ def happens(watch, before, after, direction):
     return before > 0.0 >= after
 
 
-def reading(what, clock, now, room, watches, limits, p):
+def reading(what, clock, now, room, limits):
     """The quantity of a watch, `EXCESS`, `PASSED` or `ROOM`, at a clock within the step."""
     if what == PASSED:
-        unknowns_at(now, room, clock, p)
+        unknowns_at(now, room, clock)
         return now.started + elapsed(now, clock, room.within, limits) - now.lasts
-    point_within(now, room, clock, p)
+    point_within(now, room, clock)
     if what == EXCESS:
         return excess(now, room.between, limits)
     if what == ROOM:
-        return room_left(room.between[LOG_RATE], room.between[RATIO], p[LOAD_VELOCITY])
-    return quantity(watches[int(what)], room.between, p)
+        return room_left(room.between[LOG_RATE], room.between[RATIO], room.p[LOAD_VELOCITY])
+    return quantity(watch_of(room, int(what)), room.between, room.p)
 
 
-def located(what, at_begin, at_end, now, room, watches, limits, p):
+def located(what, at_begin, at_end, now, room, limits):
     """Clock within the step at which a reading, given at both ends, changes sign: Brent's method,
     to 1e-13 of the step.
     """
@@ -125,7 +132,7 @@ def located(what, at_begin, at_end, now, room, watches, limits, p):
         earlier, move = move, tried
         latest, at_latest = best, at_best
         best += move if abs(move) > enough else math.copysign(enough, half)
-        at_best = reading(what, best, now, room, watches, limits, p)
+        at_best = reading(what, best, now, room, limits)
     return best
 
 
@@ -147,7 +154,7 @@ def tell(now, told, code, clock, passed, columns, p):
     told[n, SLIP] = now.slip + slipped(now, passed, columns[SPRING], p)
     told[n, STEPS] = now.steps
     told[n, SPENT_SLOW], told[n, SPENT_FAST] = now.spent_slow, now.spent_fast
-    for i in range(len(columns)):
+    for i in range(told.shape[1] - POINT):
         told[n, POINT + i] = columns[i]
     now.told = n + 1
 
@@ -157,17 +164,17 @@ def slipped(now, passed, spring, p):
     return p[LOAD_VELOCITY] * passed - (spring - now.spring) / p[STIFFNESS]
 
 
-def tell_beginning(now, room, last, watches, told, limits, p):
+def tell_beginning(now, room, last, told, limits):
     """Tell that a regime has begun, and what happened on the way to it from the last point of the
     one before: at the more extreme of both, or at the first beyond a level. Returns whether that
     ends the motion.
     """
-    passed = now.started + elapsed(now, now.clock, room.y, limits)
+    p, passed = room.p, now.started + elapsed(now, now.clock, room.y, limits)
     tell(now, told, float(now.begins), now.clock, passed, room.before, p)
     if now.begins != CHANGE:
         return False
-    for w in range(len(watches)):
-        watch = watches[w]
+    for w in range(room.asked):
+        watch = watch_of(room, w)
         if watch[KIND] == SETTLED or watch[KIND] == MOMENT:
             continue
         if happens(watch, quantity(watch, last, p), quantity(watch, room.before, p), 1.0):
@@ -180,13 +187,13 @@ def tell_beginning(now, room, last, watches, told, limits, p):
     return False
 
 
-def watched(now, room, watches, limits, p):
+def watched(now, room, limits):
     """Find when each thing watched for happens within the step; NaN where it does not. Returns how
     many do.
     """
-    count = 0
-    for w in range(len(watches)):
-        watch = watches[w]
+    count, p = 0, room.p
+    for w in range(room.asked):
+        watch = watch_of(room, w)
         room.when[w] = math.nan
         if watch[KIND] == SETTLED:
             away = max(abs(room.after[LOG_RATE] - p[LOG_LOAD_RATE]), room.after[UNREST] / p[SIZE])
@@ -199,20 +206,20 @@ def watched(now, room, watches, limits, p):
         else:
             before, after = quantity(watch, room.before, p), quantity(watch, room.after, p)
             if happens(watch, before, after, now.direction):
-                room.when[w] = located(float(w), before, after, now, room, watches, limits, p)
+                room.when[w] = located(float(w), before, after, now, room, limits)
         if not math.isnan(room.when[w]):
             count += 1
     return count
 
 
-def tell_watched(now, room, watches, told, limits, p):
+def tell_watched(now, room, told, limits):
     """Tell what happens within the step, in its order. Returns 0 where nothing does, 1 where the
     asker can wait for it, 2 where not, and 3 where it ends the motion.
     """
-    urgent = 0
-    for _ in range(watched(now, room, watches, limits, p)):
+    urgent, p = 0, room.p
+    for _ in range(watched(now, room, limits)):
         first = -1
-        for w in range(len(watches)):
+        for w in range(room.asked):
             later = first >= 0 and now.direction * (room.when[w] - room.when[first]) >= 0.0
             if not math.isnan(room.when[w]) and not later:
                 first = w
@@ -221,11 +228,12 @@ def tell_watched(now, room, watches, told, limits, p):
         if clock == now.end:
             tell(now, told, float(first), clock, passed_at_end(now, room, limits), room.after, p)
         else:
-            point_within(now, room, clock, p)
+            point_within(now, room, clock)
             passed = now.started + elapsed(now, clock, room.within, limits)
             tell(now, told, float(first), clock, passed, room.between, p)
-        urgent = max(urgent, 1 if watches[first, WAITS] else 2)
-        if watches[first, ENDS]:
+        watch = watch_of(room, first)
+        urgent = max(urgent, 1 if watch[WAITS] else 2)
+        if watch[ENDS]:
             return 3
     return urgent
 
@@ -235,14 +243,14 @@ def passed_at_end(now, room, limits):
     return now.started + elapsed(now, now.end, room.new, limits)
 
 
-def record(now, room, rows, limits, p):
+def record(now, room, rows, limits):
     """Record the step: evenly spaced along its clock, up to its end."""
     for sample in range(1, SAMPLES):
         clock = now.clock + (now.end - now.clock) * (sample / SAMPLES)
-        point_within(now, room, clock, p)
+        point_within(now, room, clock)
         passed = now.started + elapsed(now, clock, room.within, limits)
-        record_point(now, rows, passed, room.between, p)
-    record_point(now, rows, passed_at_end(now, room, limits), room.after, p)
+        record_point(now, rows, passed, room.between, room.p)
+    record_point(now, rows, passed_at_end(now, room, limits), room.after, room.p)
 
 
 def record_point(now, rows, passed, columns, p):

@@ -11,7 +11,7 @@ import numba
 from numba import types
 from numba.core.errors import NumbaError
 
-from rsfstudy.motion.compiled import equations
+from rsfstudy.motion.compiled import equations, unrolled
 from rsfstudy.motion.compiled.building import called_by_address, called_from_python
 from rsfstudy.motion.compiled.course import advance
 from rsfstudy.motion.compiled.refusal import check_raises_nothing, refused
@@ -20,6 +20,7 @@ from rsfstudy.motion.handover import Limits
 from rsfstudy.slider.parts import Function
 
 _ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
+_ADDRESSES = types.int64[:, ::1]
 _LIMITS = types.UniTuple(types.float64, len(Limits._fields))
 
 
@@ -27,8 +28,8 @@ _LIMITS = types.UniTuple(types.float64, len(Limits._fields))
 def course() -> Any:
     """The compiled course of motions."""
     memory = types.Array(numba.from_dtype(NOW), 1, "C")
-    tables = _ARRAY, _ARRAY, _ARRAY, _TABLE, _TABLE, _TABLE
-    return called_from_python(advance, types.int64(memory, *tables, _LIMITS, _ARRAY))
+    arrays = _ARRAY, _ARRAY, _ADDRESSES, _ARRAY, _ARRAY, _TABLE, _TABLE, _TABLE
+    return called_from_python(advance, types.int64(memory, *arrays, _LIMITS, _ARRAY))
 
 
 @cache
@@ -40,7 +41,7 @@ def addresses(
     states: int,
     numbers: int,
 ) -> tuple[int, ...]:
-    """Where the compiled rates, point and balance of a system of equations are.
+    """Where the compiled functions of a system of equations are, in the order of `Room`.
 
     Parameters
     ----------
@@ -57,7 +58,8 @@ def addresses(
     for function in (rate, point):
         check_raises_nothing(function)
     places = equations.places(rate, point, balance, unknowns, states, numbers)
-    wanted = [equations.fill_rates, equations.fill_point]
+    wanted = [equations.fill_rates, equations.fill_point, equations.fill_whole_point]
+    wanted += [unrolled.attempt(unknowns)]
     wanted += [equations.fill_balance] if balance is not None else []
     try:
         return called_by_address(wanted, places)

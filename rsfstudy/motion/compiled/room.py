@@ -1,46 +1,84 @@
-"""The arrays of one regime of a compiled motion."""
+"""Where one regime of a compiled motion finds and leaves its numbers."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
+from rsfstudy.motion.compiled.calls import moved
+from rsfstudy.motion.compiled.order_eight import copy
+from rsfstudy.motion.compiled.table import FUNCTIONS, PSIS, SLOW
+from rsfstudy.motion.compiled.unrolled import ALL_STAGES, ROWS, SIZES
 
-from rsfstudy.motion.compiled.order_eight import ALL_STAGES, ROWS
-from rsfstudy.motion.compiled.table import PSIS, SLOW
+Pointer = Any
 
 
 class Room(NamedTuple):
-    """Unknowns at the beginning of a step, at its end and within; the stages of a step and its
-    dense output; the points there; and when events happen.
+    """How many unknowns there are. Pointers to them at the beginning of a step, at its end and
+    within; to its stages; to a block of what else is known of it, and of this to the scales and
+    the rows of dense output; to the points there; to when events happen; and to what stays: the
+    addresses of the equations, the watches and how many they are, and the numbers of the scene.
     """
 
-    y: np.ndarray
-    new: np.ndarray
-    within: np.ndarray
-    scales: np.ndarray
-    stages: np.ndarray
-    dense: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    between: np.ndarray
-    when: np.ndarray
+    unknowns: int
+    y: Pointer
+    new: Pointer
+    within: Pointer
+    stages: Pointer
+    step: Pointer
+    scales: Pointer
+    dense: Pointer
+    before: Pointer
+    after: Pointer
+    between: Pointer
+    when: Pointer
+    rates: int
+    point: int
+    whole_point: int
+    attempt: int
+    balance: int
+    watches: Pointer
+    asked: int
+    p: Pointer
 
 
-def room(y, scales, states, watches):
-    """Room for a regime."""
-    unknowns = len(scales)
+def size(unknowns: int, states: int, watches: int) -> int:
+    """How many numbers it takes."""
+    return SIZES + (1 + ROWS + 1 + ALL_STAGES + 1) * unknowns + 3 * (PSIS + states) + watches
+
+
+def room(space, y, unknowns, scales, states, functions, watches, watched, p):
+    """Room for a regime, in a space of that size."""
+    new = moved(space, SIZES)
+    own = moved(new, unknowns)
+    dense = moved(own, unknowns)
+    stages = moved(dense, ROWS * unknowns)
+    within = moved(stages, ALL_STAGES * unknowns)
+    before = moved(within, unknowns)
+    after = moved(before, PSIS + states)
+    between = moved(after, PSIS + states)
+    when = moved(between, PSIS + states)
+    copy(scales, own, unknowns)
     return Room(
+        unknowns,
         y,
-        np.empty(unknowns),
-        np.empty(unknowns),
-        scales,
-        np.empty((ALL_STAGES, unknowns)),
-        np.empty((ROWS, unknowns)),
-        np.empty(PSIS + states),
-        np.empty(PSIS + states),
-        np.empty(PSIS + states),
-        np.empty(watches),
+        new,
+        within,
+        stages,
+        space,
+        own,
+        dense,
+        before,
+        after,
+        between,
+        when,
+        functions[0],
+        functions[1],
+        functions[2],
+        functions[3],
+        functions[FUNCTIONS - 1],
+        watches,
+        watched,
+        p,
     )
 
 

@@ -8,14 +8,10 @@ import numpy as np
 
 from rsfstudy.motion.compiled.calls import evaluate
 from rsfstudy.motion.compiled.order_eight import (
-    EXTRA,
-    STAGES,
-    attempt,
     copy,
-    error_norm,
     first_length,
     interpolate,
-    interpolated,
+    prepare_interpolation,
     shortened,
     stretched,
 )
@@ -26,24 +22,16 @@ from rsfstudy.motion.compiled.table import (
     LOG_RATE,
     NO_LENGTH,
     NO_STEP,
+    PSIS,
     RATIO,
     SLOW,
 )
+from rsfstudy.motion.compiled.unrolled import ERROR, EXTRA, LENGTH, STAGES
 from rsfstudy.slider.equations import LONGEST_STEP, stride
 from rsfstudy.slider.slots import LOG_LOAD_RATE
 
 #: What `take_step` returns where it has taken one.
 TAKEN = -1
-
-
-def rates_of(now):
-    """Address of the rates of the unknowns."""
-    return now.slow_rates if now.regime == SLOW else now.fast_rates
-
-
-def fill_point(now, y, rates, p, columns):
-    """Fill in what the slider does, at unknowns with these rates."""
-    evaluate(now.slow_point if now.regime == SLOW else now.fast_point, y, rates, p, columns)
 
 
 def elapsed(now, clock, y, limits):
@@ -53,19 +41,15 @@ def elapsed(now, clock, y, limits):
     return y[now.unknowns - 1] if now.has_clock else math.nan
 
 
-def begin(now, room, p):
+def begin(now, room):
     """Start the clock of the equations."""
-    rates = rates_of(now)
     now.clock = 0.0
-    evaluate(rates, room.y, room.y, p, room.stages[0])
-    length = first_length(
-        room.y, room.stages, room.new, now.direction, room.scales, now.tolerance, rates, p
-    )
-    now.length = min(length, LONGEST_STEP)
+    evaluate(room.rates, room.y, room.y, room.p, room.stages)
+    now.length = min(first_length(room, now.direction, now.tolerance), LONGEST_STEP)
     spend(now, 2)
 
 
-def take_step(now, room, limits, p):
+def take_step(now, room, limits):
     """Take a step whose local error is allowed; why not, where there is none.
 
     Where steps become shorter than the spacing of floating-point numbers around it, the clock
@@ -73,11 +57,11 @@ def take_step(now, room, limits, p):
     """
     longest = LONGEST_STEP
     if now.regime == SLOW and now.strides:
-        longest = stride(room.before[LOG_RATE], room.before[RATIO], p[LOG_LOAD_RATE])
+        longest = stride(room.before[LOG_RATE], room.before[RATIO], room.p[LOG_LOAD_RATE])
     longest *= now.finer
     while True:
         shortest = 10.0 * abs(np.nextafter(now.clock, now.direction * np.inf) - now.clock)
-        length = attempted(now, room, longest, shortest, p)
+        length = attempted(now, room, longest, shortest)
         now.steps += 1
         if length > 0.0:
             break
@@ -86,16 +70,16 @@ def take_step(now, room, limits, p):
         if now.clock == 0.0 or not now.anew:
             return NO_STEP
         now.started += elapsed(now, now.clock, room.y, limits)
-        begin(now, room, p)
+        begin(now, room)
     total = 0.0
-    for i in range(len(room.new)):
+    for i in range(room.unknowns):
         total += room.new[i]
     if now.end == now.clock or not math.isfinite(total):
         return NO_LENGTH
     return TAKEN
 
 
-def attempted(now, room, longest, shortest, p):
+def attempted(now, room, longest, shortest):
     """Length of the step that could be taken; 0 where it would be too short, and less where the
     budget is spent.
     """
@@ -105,11 +89,12 @@ def attempted(now, room, longest, shortest, p):
         now.end = now.clock + length * now.direction
         now.taken = now.end - now.clock
         length = abs(now.taken)
-        attempt(room.y, room.stages, now.taken, room.new, rates_of(now), p)
+        room.step[LENGTH] = now.taken
+        evaluate(room.attempt, room.y, room.stages, room.p, room.step)
         spend(now, STAGES)
         if now.spent_slow + now.spent_fast > now.budget:
             return -1.0
-        error = error_norm(room.y, room.new, room.stages, length, room.scales, now.tolerance)
+        error = room.step[ERROR]
         if error < 1.0:
             now.length = stretched(length, error, rejected)
             now.is_dense = 0
@@ -118,30 +103,26 @@ def attempted(now, room, longest, shortest, p):
     return 0.0
 
 
-def unknowns_at(now, room, clock, p):
+def unknowns_at(now, room, clock):
     """Fill in the unknowns at a clock within the step."""
     if not now.is_dense:
-        interpolate(
-            room.y, room.new, room.within, room.stages, now.taken, room.dense, rates_of(now), p
-        )
+        prepare_interpolation(room, now.taken)
         spend(now, EXTRA)
         now.is_dense = 1
-    interpolated(room.y, room.dense, (clock - now.clock) / now.taken, room.within)
+    interpolate(room, (clock - now.clock) / now.taken)
 
 
-def point_within(now, room, clock, p):
+def point_within(now, room, clock):
     """Fill in what the slider does at a clock within the step."""
-    unknowns_at(now, room, clock, p)
+    unknowns_at(now, room, clock)
     spend(now, 1)
-    rates = room.stages[STAGES + EXTRA]  # not needed once dense output is there
-    evaluate(rates_of(now), room.within, room.within, p, rates)
-    fill_point(now, room.within, rates, p, room.between)
+    evaluate(room.whole_point, room.within, room.within, room.p, room.between)
 
 
-def cut(now, room, clock, p):
+def cut(now, room, clock):
     """Let the step end at a clock within it."""
     if clock != now.end:
-        point_within(now, room, clock, p)
-        copy(room.between, room.after)
-        copy(room.within, room.new)
+        point_within(now, room, clock)
+        copy(room.between, room.after, PSIS + now.states)
+        copy(room.within, room.new, room.unknowns)
         now.end = clock

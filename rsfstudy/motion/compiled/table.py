@@ -35,16 +35,15 @@ NOW = np.dtype(
         ("recorded", "i8"),
         ("fate", "i8"),  # why the motion cannot go on, and normal stress there
         ("stress", "f8"),
-        ("unknowns", "i8"),  # between ruptures
+        ("unknowns", "i8"),  # between ruptures, and in them
+        ("unknowns_fast", "i8"),
         ("states", "i8"),
-        ("slow_rates", "i8"),  # addresses of the equations
-        ("slow_point", "i8"),
-        ("fast_rates", "i8"),
-        ("fast_point", "i8"),
-        ("balance", "i8"),
     ]
 )
+#: Rows of the table of addresses; and how many functions of equations have theirs there, of which
+#: the last may be missing (see `machine.addresses`).
 SLOW, FAST = 0, 1
+FUNCTIONS = 5
 
 #: Columns of the table of watches.
 WATCHED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
@@ -52,7 +51,8 @@ MAXIMUM, MINIMUM, RISE, FALL, SETTLED, MOMENT = range(6)
 
 #: Columns of the table of events; from POINT on, those of a point.
 CODE, REGIME, CLOCK, TIME, SLIP, STEPS, SPENT_SLOW, SPENT_FAST, POINT = range(9)
-#: Codes of events that are not asked for; those of others are the places of their watches.
+#: Codes of events that are not asked for; those of others are the places of their watches, behind
+#: which come the samples.
 BEGIN, CHANGE, END = -1, -2, -3
 
 #: Columns of a point; its states follow.

@@ -1,0 +1,112 @@
+"""Source of steps of order eight, written out for so many unknowns.
+
+The tableau is that of SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over stages and
+unknowns would cost as much as simple equations do; and what is the same in all stages a compiler
+finds only where the equations stand in the step itself.
+
+What is known of a step beside its stages is one block of numbers: its sizes, the unknowns at its
+end, their scales, and the rows of its dense output.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from rsfstudy.motion.compiled import equations
+
+#: Stages of a step, of its dense output beyond the step's end, and rows of that.
+STAGES, EXTRA, ROWS = 12, 3, 7
+ALL_STAGES = STAGES + 1 + EXTRA
+#: Weights of the stages before each stage, of which the last is the end of the step, and of all of
+#: them in its errors of fifth and third order.
+_WEIGHTS: Mapping[str, np.ndarray] = {
+    **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGES)},
+    f"stage_{STAGES}": DOP853.B,
+    "error_of_fifth": DOP853.E5,
+    "error_of_third": DOP853.E3,
+}
+#: Places of the sizes of a step, in front of its block, and how many they are: its length, the
+#: tolerance, and its local error over what is allowed.
+LENGTH, TOLERANCE, ERROR, SIZES = 0, 1, 2, 3
+
+Steps = Callable[..., None]
+
+
+@cache
+def attempt(unknowns: int) -> Steps:
+    """One step from `y`, whose rates are the first stage: fills in the other stages, the unknowns
+    at its end, and its local error over what is allowed.
+    """
+    n, scales = range(unknowns), SIZES + unknowns
+    lines = [
+        "def attempt(y, stages, p, step):",
+        f"step[{ERROR}] = math.nan",
+        "of_scene = numbers(p)",
+        f"length, tolerance = step[{LENGTH}], step[{TOLERANCE}]",
+        *(f"y{i}, k0_{i} = y[{i}], stages[{i}]" for i in n),
+    ]
+    for s in range(1, STAGES + 1):
+        unknown, rates = (", ".join(f"{x}{i}" for i in n) for x in ("z", f"k{s}_"))
+        lines += [
+            *(f"z{i} = y{i} + length * {_call(f'stage_{s}', i)}" for i in n),
+            f"{rates}, = rate_of(({unknown},), of_scene)",
+            *(f"stages[{s * unknowns + i}] = k{s}_{i}" for i in n),
+        ]
+    for i in n:
+        lines += [
+            f"step[{SIZES + i}] = z{i}",
+            f"allowed = tolerance * (step[{scales + i}] + max(abs(y{i}), abs(z{i})))",
+            f"fifth{i} = {_call('error_of_fifth', i)} / allowed",
+            f"third{i} = {_call('error_of_third', i)} / allowed",
+        ]
+    lines += [
+        f"fifth = {' + '.join(f'fifth{i} * fifth{i}' for i in n)}",
+        f"both = fifth + 0.01 * ({' + '.join(f'third{i} * third{i}' for i in n)})",
+        f"error = abs(length) * fifth / math.sqrt(both * {unknowns}.0) if both != 0.0 else 0.0",
+        f"step[{ERROR}] = error",
+    ]
+    return _made(lines, _sums())
+
+
+@cache
+def _sums() -> dict[str, Any]:
+    """Weighted sums of the rates in all stages, as functions: compiled once for all equations."""
+    return {
+        name: _made([f"def {name}({_rates(name)}):", f"return {_terms(name)}"], {})
+        for name in _WEIGHTS
+    }
+
+
+def _call(name: str, unknown: int) -> str:
+    """A weighted sum of the rates of an unknown."""
+    rates = _rates(name).split(", ")
+    return f"{name}({', '.join(f'{rate}_{unknown}' for rate in rates)})"
+
+
+def _rates(name: str) -> str:
+    """What a sum is of."""
+    return ", ".join(f"k{s}" for s in np.flatnonzero(_WEIGHTS[name]))
+
+
+def _terms(name: str) -> str:
+    return " + ".join(f"{float(x)!r} * k{s}" for s, x in enumerate(_WEIGHTS[name]) if x)
+
+
+def _made(lines: Sequence[str], known: Mapping[str, Any]) -> Steps:
+    """The function that some lines define."""
+    made: dict[str, Any] = {
+        **known,
+        "__name__": __name__,
+        "math": math,
+        "rate_of": equations.rate_of,
+        "numbers": equations.numbers,
+    }
+    exec("\n    ".join(lines), made)
+    function: Steps = made[lines[0].removeprefix("def ").partition("(")[0]]
+    return function
