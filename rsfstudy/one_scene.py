@@ -168,8 +168,9 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     for name, dims in measure.variables.items():
         about = quantity(name, own)
         attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
-        missing = np.full([len(inner[dim]) for dim in dims], np.nan)
-        values = outcome.values.get(name, missing)
+        values = outcome.values.get(name)
+        if values is None:
+            values = np.full([len(inner[dim]) for dim in dims], np.nan)
         variables[name] = (dims, values, {k: v for k, v in attrs.items() if v})
     variables["rhs_evaluations"] = ((), outcome.rhs_evaluations)
     rate = ((), scene.reference_rate, {"units": "s-1"})

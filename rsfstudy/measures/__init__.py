@@ -246,9 +246,9 @@ class Measure:
             raise InvalidValue("message", type(outcome.message).__name__, "must be a text")
         if outcome.status is Status.PENDING:
             raise InvalidValue("measured", outcome, "must say what became of the cell")
-        declared = self.variables
+        declared, inner = self.variables, self.inner_coordinates
         values = {
-            name: self._number(declared, name, value) for name, value in outcome.values.items()
+            name: _number(declared, inner, name, value) for name, value in outcome.values.items()
         }
         if outcome.status is not Status.OK:
             return outcome.status, values, outcome.message
@@ -258,26 +258,29 @@ class Measure:
             return Status.OK, values, outcome.message
         return Status.NOT_FINITE, values, f"{self.headline} = {headline}"
 
-    def _number(self, declared: Mapping[str, tuple[str, ...]], name: str, value: Any) -> Value:
-        """A measured number, or an array of them, as NumPy's or Python's own."""
-        if name not in declared:
-            raise InvalidValue("measured", name, "is not declared", choices=declared)
-        if isinstance(value, float) and not declared[name]:
-            return value  # as most are
-        if isinstance(value, np.ma.MaskedArray):
-            raise InvalidValue(name, value, "is masked, and must be a real number")
-        array = np.asarray(value)
-        if array.dtype.kind not in "iufb":
-            raise InvalidValue(name, value, "must be a real number")
-        shape = tuple(len(self.inner_coordinates[d]) for d in declared[name])
-        if array.shape != shape:
-            rule = f"has the shape {array.shape} and must have {shape}"
-            raise InvalidValue("measured", name, rule)
-        return array if shape else array.item()
-
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""
         return {"name": self.name, **asdict(self)}
+
+
+def _number(
+    declared: Mapping[str, tuple[str, ...]], inner: Mapping[str, np.ndarray], name: str, value: Any
+) -> Value:
+    """A measured number, or an array of them, as NumPy's or Python's own."""
+    if name not in declared:
+        raise InvalidValue("measured", name, "is not declared", choices=declared)
+    if isinstance(value, float) and not declared[name]:
+        return value  # as most are
+    if isinstance(value, np.ma.MaskedArray):
+        raise InvalidValue(name, value, "is masked, and must be a real number")
+    array = np.asarray(value)
+    if array.dtype.kind not in "iufb":
+        raise InvalidValue(name, value, "must be a real number")
+    shape = tuple(len(inner[dim]) for dim in declared[name])
+    if array.shape != shape:
+        rule = f"has the shape {array.shape} and must have {shape}"
+        raise InvalidValue("measured", name, rule)
+    return array if shape else array.item()
 
 
 def _alike(name: str, value: Any, present: Plain, whole: bool) -> Any:

@@ -20,7 +20,6 @@ one regime or segment to the next is told where that begins. A motion that canno
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from operator import attrgetter
 from typing import NamedTuple
@@ -48,8 +47,7 @@ class Kind(StrEnum):
     END = "end"
 
 
-@dataclass(frozen=True)
-class Watch:
+class Watch(NamedTuple):
     """What to be told of; whether the motion ends there; and whether whoever asks can wait for it
     until something else has happened, so that an engine may tell several events at once.
     """

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.slider.assembly import functions
 from rsfstudy.slider.dynamics import Dynamics
@@ -87,6 +88,21 @@ class Equations:
         return now
 
 
+def _once(make: Callable[..., Equations]) -> Callable[..., Equations]:
+    """Make equations once for each scene."""
+
+    @wraps(make)
+    def known(scene: Scene, **how: Any) -> Equations:
+        key = make.__name__, *how.values()
+        if key not in scene.made:
+            scene.made[key] = make(scene, **how)
+        found: Equations = scene.made[key]
+        return found
+
+    return known
+
+
+@_once
 def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
     """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
     of a law that has several), and time as a passenger where a `clock` is wanted.
@@ -94,6 +110,7 @@ def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
     return _slow(scene, scene.dynamics, clock=clock)
 
 
+@_once
 def without_mass(scene: Scene, *, clock: bool) -> Equations:
     """The same, with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
@@ -119,6 +136,7 @@ def _states(scene: Scene) -> tuple[str, ...]:
     return (*of_law, *(unknown.name for unknown in scene.pressing.unknowns))
 
 
+@_once
 def in_rupture(scene: Scene) -> Equations:
     """The full equations of a scene with mass, in inertial time T/(2 pi): f, ln(V/V_*) and g, and
     the states but the first.

@@ -271,6 +271,11 @@ class Scene(Shown):
         return self.under(loading.Segment(self.load_velocity))
 
     @cached_property
+    def made(self) -> dict[tuple[Any, ...], Any]:
+        """What others make of it once and for all."""
+        return {}
+
+    @cached_property
     def numbers(self) -> Numbers:
         """All numbers, as the functions of the equations read them (see `assembly`)."""
         return assembly.numbers(self)

@@ -42,6 +42,10 @@ class Step(Loading):
         return self.load_velocity_ratio
 
     @property
+    def imposes(self) -> bool:
+        return self.normal_stress_step != 0.0
+
+    @property
     def segments(self) -> tuple[Segment, ...]:
         """The step, and what follows it."""
         step = Segment(self.load_velocity, self.displacement_step)
