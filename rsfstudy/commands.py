@@ -8,7 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import xarray as xr
 from rsfstudy import api, assignments, terminal, terminal_numbers
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
-from rsfstudy.compute.workers import Workers
+from rsfstudy.compute.workers import SharedProcesses, Workers
 from rsfstudy.console import console, stderr
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.study import Study
@@ -70,8 +70,12 @@ def run(
     command = shlex.join(["rsfstudy", *sys.argv[1:]])
     keeping = Keeping(output=output, command=command, **choices)
     look = Look(form, style)
-    with _client(scheduler, serial) as client:
+    with _client(scheduler, serial) as client, contextlib.ExitStack() as stack:
         where = Workers(0 if serial else workers, client, time_limit)
+        if every and where.processes and client is None:
+            log = output / "workers.log"
+            shared = stack.enter_context(SharedProcesses(where.processes, log))
+            where = replace(where, shared=shared)
         ready = [(study, api.prepared(study, keeping, where, not quiet)) for study in studies]
         for study in studies if rtol is not None else ():
             terminal.announce(study)

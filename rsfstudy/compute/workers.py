@@ -7,6 +7,7 @@ its own is blamed.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
@@ -17,6 +18,7 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 from rsfstudy.compute.cells import (
@@ -60,11 +62,14 @@ class Workers:
         A Dask cluster to use instead.
     time_limit : float
         CPU time in s that a cell may take on a worker.
+    shared : SharedProcesses, optional
+        Worker processes that other runs use too.
     """
 
     processes: int = 2
     client: Any = None
     time_limit: float = TIME_LIMIT
+    shared: SharedProcesses | None = None
 
     def __post_init__(self) -> None:
         whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
@@ -93,6 +98,8 @@ class Workers:
         """
         if self.client is not None:
             return on_client(self.client)
+        if self.shared is not None:
+            return self.shared.mapper
         return on_local_cluster(self.processes, log) if self.processes > 0 else serial
 
 
@@ -268,9 +275,51 @@ def on_local_cluster(processes: int, log: Path | None) -> Mapper:
     """Compute on worker processes of this machine, started when the first cell is needed."""
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
-        from rsfstudy.compute import worker_log
-
-        with worker_log.kept(log) as file, local_cluster(processes, file) as client:
-            yield from on_client(client, str(file))(task, batches)
+        with SharedProcesses(processes, log) as started:
+            yield from started.mapper(task, batches)
 
     return mapper
+
+
+class SharedProcesses(contextlib.AbstractContextManager["SharedProcesses"]):
+    """Worker processes of this machine for one run after the other: to start them takes seconds.
+    They are started when the first cell is needed, and end where the context does.
+
+    Parameters
+    ----------
+    processes : int
+        How many.
+    log : Path or None
+        Where they write errors; a temporary file where no name is given.
+    """
+
+    def __init__(self, processes: int, log: Path | None) -> None:
+        self._processes, self._log = processes, log
+        self._stack = contextlib.ExitStack()
+        self._started: Mapper | None = None
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        self._started = None
+        self._stack.close()
+
+    def mapper(self, task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
+        """Compute batches of cells there; see `cells.Mapper`."""
+        if self._started is None:
+            self._started = self._start()
+        try:
+            yield from self._started(task, batches)
+        except RunError:
+            self.__exit__(None, None, None)  # whoever comes next starts others
+            raise
+
+    def _start(self) -> Mapper:
+        from rsfstudy.compute import worker_log
+
+        file = self._stack.enter_context(worker_log.kept(self._log))
+        client = self._stack.enter_context(local_cluster(self._processes, file))
+        return on_client(client, str(file))
