@@ -19,6 +19,7 @@ from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
 from rsfstudy.declare.wording import settings
@@ -83,6 +84,7 @@ def figure(
         rows = -(-len(panels) // columns)
         height = getattr(module, "HEIGHT", None)
         figure = Drawing(figsize=size(columns, rows, height), layout="constrained")
+        FigureCanvasAgg(figure)  # keeps its renderer, and with it how large texts are
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)
