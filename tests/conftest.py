@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 from collections.abc import Callable
 
 import pytest
 from hypothesis import HealthCheck, settings
+from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
 from rsfstudy.compute import clusters, workers
@@ -43,6 +45,25 @@ def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
     monkeypatch.setattr(workers, "TELL", math.inf)
     monkeypatch.setattr(workers, "PATIENCE", math.inf)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def formulas_are_set_once():
+    """Matplotlib forgets all but fifty formulas, and sets each anew for each renderer; here they
+    are the same in all figures.
+    """
+    cached = MathTextParser._parse_cached
+    set_once = functools.cache(
+        lambda form, *asked: cached.__wrapped__(MathTextParser(form), *asked)
+    )
+    forms = {"vector": "path", "raster": "agg"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            MathTextParser,
+            "_parse_cached",
+            lambda parser, *asked: set_once(forms[parser._output_type], *asked),
+        )
+        yield
 
 
 @pytest.fixture
