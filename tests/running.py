@@ -128,6 +128,7 @@ def named_results(name: str, tmp_path_factory, **where) -> tuple[xr.Dataset, Pat
         except DataError as error:
             if "another run uses" not in str(error) or time.monotonic() > end:
                 raise
+            time.sleep(0.1)
 
 
 def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
