@@ -24,6 +24,36 @@ settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
 
 
+#: Modules that take longest, which begin first: none of them is left for one process alone at the
+#: end. Figures come after studies, whose results they draw.
+DEAR = (
+    "test_studies",
+    "test_resume",
+    "test_faults",
+    "test_readings",
+    "test_clusters",
+    "test_figures",
+    "test_strangers",
+    "test_every_law",
+    "test_cli",
+    "test_two_states",
+    "test_notebook",
+    "test_scale",
+    "test_critical_step",
+    "test_compiled",
+    "test_periods",
+    "test_extensions",
+    "test_limit_cycle",
+    "test_laboratory",
+    "test_fluid",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    order = {name: number for number, name in enumerate(DEAR)}
+    items.sort(key=lambda item: order.get(item.path.stem, len(order)))
+
+
 def follow(
     scene: Scene, rtol: float, until: Callable[[Step], bool], budget: int = 2_000_000
 ) -> Meter:
