@@ -49,6 +49,10 @@ _COLUMNS = 2
 class Drawing(Figure):
     """A figure that a notebook shows, without pyplot."""
 
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        FigureCanvasAgg(self)  # keeps its renderer, and with it how large texts are
+
     def _repr_png_(self) -> bytes:
         image = io.BytesIO()
         self.savefig(image, format="png", dpi=_ON_SCREEN)
@@ -84,7 +88,6 @@ def figure(
         rows = -(-len(panels) // columns)
         height = getattr(module, "HEIGHT", None)
         figure = Drawing(figsize=size(columns, rows, height), layout="constrained")
-        FigureCanvasAgg(figure)  # keeps its renderer, and with it how large texts are
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)
