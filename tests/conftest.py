@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 from collections.abc import Callable
 
 import pytest
 from hypothesis import HealthCheck, settings
+from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
 from rsfstudy.compute import clusters, workers
@@ -20,6 +22,36 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
+
+
+#: Modules that take longest, which begin first: none of them is left for one process alone at the
+#: end. Figures come after studies, whose results they draw.
+DEAR = (
+    "test_studies",
+    "test_resume",
+    "test_faults",
+    "test_readings",
+    "test_clusters",
+    "test_figures",
+    "test_strangers",
+    "test_every_law",
+    "test_cli",
+    "test_two_states",
+    "test_notebook",
+    "test_scale",
+    "test_critical_step",
+    "test_compiled",
+    "test_periods",
+    "test_extensions",
+    "test_limit_cycle",
+    "test_laboratory",
+    "test_fluid",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    order = {name: number for number, name in enumerate(DEAR)}
+    items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
 
 def follow(
@@ -43,6 +75,25 @@ def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
     monkeypatch.setattr(workers, "TELL", math.inf)
     monkeypatch.setattr(workers, "PATIENCE", math.inf)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def formulas_are_set_once():
+    """Matplotlib forgets all but fifty formulas, and sets each anew for each renderer; here they
+    are the same in all figures.
+    """
+    cached = MathTextParser._parse_cached
+    set_once = functools.cache(
+        lambda form, *asked: cached.__wrapped__(MathTextParser(form), *asked)
+    )
+    forms = {"vector": "path", "raster": "agg"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            MathTextParser,
+            "_parse_cached",
+            lambda parser, *asked: set_once(forms[parser._output_type], *asked),
+        )
+        yield
 
 
 @pytest.fixture

@@ -328,7 +328,10 @@ def test_every_declaration_restores_its_study(name):
         contents.fit(described, contents.Declaration, "declaration")
     )
     assert json.loads(json.dumps(restored.describe())) == described
-    assert set(restored.scenes()) == set(study.scenes())
+    assert restored.size == study.size
+    # of thousands of cells some, which have all points of every axis
+    for number in range(0, study.size, 1 if study.size < 1000 else 23):
+        assert restored.scene(number) == study.scene(number)
 
 
 def test_a_rerun_reproduces_every_number(small):

@@ -19,6 +19,7 @@ from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
 from rsfstudy.declare.wording import settings
@@ -47,6 +48,10 @@ _COLUMNS = 2
 
 class Drawing(Figure):
     """A figure that a notebook shows, without pyplot."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        FigureCanvasAgg(self)  # keeps its renderer, and with it how large texts are
 
     def _repr_png_(self) -> bytes:
         image = io.BytesIO()

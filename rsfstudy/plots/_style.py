@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import LayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import blended_transform_factory, offset_copy
@@ -202,5 +203,5 @@ def settle(figure: Figure) -> None:
     """Give everything its place: ticks take their style when they are made, and how much room they
     need is known only then.
     """
-    for _pass in range(2):
-        figure.draw_without_rendering()
+    cast(LayoutEngine, figure.get_layout_engine()).execute(figure)
+    figure.draw_without_rendering()
