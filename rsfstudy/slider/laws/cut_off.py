@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity, exp_less_one
 from rsfstudy.slider.parts import Numbers
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[OWN]
     behind = steady_over_b(log_rate, p[OWN + 1], p[OWN + 2]) - state / b
-    return b * math.expm1(min(behind, LARGEST_EXPONENT))
+    return b * exp_less_one(min(behind, LARGEST_EXPONENT))
 
 
 def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:

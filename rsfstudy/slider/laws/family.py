@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
 from rsfstudy.slider.parts import Numbers, number
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     b, exponent = p[OWN], p[OWN + 1]
     if exponent == 0.0:
         return -(state + b * log_rate)
-    return b * math.expm1(min(-exponent * (state / b + log_rate), LARGEST_EXPONENT)) / exponent
+    return b * exp_less_one(min(-exponent * (state / b + log_rate), LARGEST_EXPONENT)) / exponent
 
 
 @dataclass(frozen=True, kw_only=True)

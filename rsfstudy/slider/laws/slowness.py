@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
 from rsfstudy.slider.parts import Numbers
 
 OWN = 0
@@ -37,9 +37,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
     """
     b = p[OWN]
-    # far from steady sliding exp(x) - 1 keeps all digits too, in a third of the time
-    excess = min(-(state / b + log_rate), LARGEST_EXPONENT)
-    return b * (math.expm1(excess) if abs(excess) < 0.5 else math.exp(excess) - 1.0)
+    return b * exp_less_one(min(-(state / b + log_rate), LARGEST_EXPONENT))
 
 
 def stress_left(rate: float, slip: float) -> float:

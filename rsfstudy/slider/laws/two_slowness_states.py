@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import LARGEST_EXPONENT
+from rsfstudy.slider.laws import LARGEST_EXPONENT, exp_less_one
 from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
 from rsfstudy.slider.parts import Numbers
 
@@ -44,8 +43,8 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
     first = (psis[0] - p[OWN + OF_FIRST] * shift) / p[OWN + FIRST] + log_rate
     second = (psis[1] - p[OWN + OF_SECOND] * shift) / p[OWN + SECOND] + log_rate
     return (
-        share * p[OWN + FIRST] * math.expm1(min(-first, LARGEST_EXPONENT)),
-        share * p[OWN + OVER] * p[OWN + SECOND] * math.expm1(min(-second, LARGEST_EXPONENT)),
+        share * p[OWN + FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
+        share * p[OWN + OVER] * p[OWN + SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
     )
 
 
