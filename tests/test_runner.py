@@ -4,17 +4,18 @@ import os
 import subprocess
 import sys
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from faulty import declared
 from running import HANGS, SMALL, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Scene, Study
-from rsfstudy.compute import plan
-from rsfstudy.errors import InvalidValue
+from rsfstudy import Scene, Study, api
+from rsfstudy.compute import plan, runner, workers
+from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -132,3 +133,46 @@ def test_accuracy_reaches_the_cells():
     loose, tight = run(rtol=1e-4), run(rtol=1e-9)
     assert (loose.rhs_evaluations < tight.rhs_evaluations).all()
     assert Accuracy().rtol == 1e-7
+
+
+def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
+    """When the first cell is needed; and anew where they were lost."""
+    started, lost, log = [], [], tmp_path / "workers.log"
+    start, on_client = workers.local_cluster, workers.on_client
+
+    def started_again(processes, file):
+        started.append(file)
+        return start(processes, file)
+
+    def losing(client, file):
+        def mapper(task, batches):
+            if lost:
+                raise RunError("the Dask scheduler is lost")
+            yield from on_client(client, file)(task, batches)
+
+        return mapper
+
+    monkeypatch.setattr(workers, "local_cluster", started_again)
+    monkeypatch.setattr(workers, "on_client", losing)
+    with workers.SharedProcesses(1, log) as shared:
+        where = workers.Workers(1, shared=shared)
+
+        def ran(name, fault=""):
+            study = replace(declared(fault, (3.0,) if fault else ()), name=name)
+            results = api.prepared(study, runner.Keeping(output=tmp_path), where, False)()
+            return [Status(code).name for code in results["status"].values]
+
+        assert not started
+        assert ran("one") == 4 * ["OK"]
+        assert ran("one") == 4 * ["OK"]  # from its journal
+        ended, failed = (pytest.warns(match=text) for text in ("a worker ended", "cell .* failed"))
+        with ended, failed:
+            assert ran("two", "dies") == ["OK", "OK", "WORKER_LOST", "OK"]
+        assert ran("three") == 4 * ["OK"]
+        assert started == [log]
+        lost.append("the scheduler")
+        with pytest.raises(RunError, match="lost"):
+            ran("four")
+        lost.clear()
+        assert ran("four") == 4 * ["OK"]
+        assert started == [log, log]
