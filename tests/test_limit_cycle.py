@@ -13,6 +13,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.recording import OBSERVED
 from rsfstudy.status import Status
 
 CASES = [
@@ -167,6 +168,16 @@ def test_no_cycle_is_told_and_not_only_nan():
             Scene(load_velocity_ratio=1.1, stiffness_ratio=3.0), rtol=1e-4
         )
     assert math.isnan(settled.recurrence_interval)
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_an_orbit_of_two_points_is_the_ends_of_any(case):
+    """It is not recorded, and all numbers are the same."""
+    ends, orbit = (LimitCycle(phases=n)(scene(**case), Accuracy(1e-5)) for n in (2, 50))
+    assert ends.rhs_evaluations < orbit.rhs_evaluations
+    for name, values in orbit.values.items():
+        same = values[[0, -1]] if name in OBSERVED else values
+        assert ends.values[name] == pytest.approx(same, rel=1e-12, abs=1e-12, nan_ok=True), name
 
 
 @pytest.mark.parametrize("phases", [0, 1])

@@ -27,7 +27,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.recording import OBSERVED, along_path
+from rsfstudy.motion.recording import OBSERVED, Recording, along_path, row
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
@@ -45,6 +45,8 @@ NUDGE = 0.1
 _SLOW_APPROACH, _DIVERGES = 0.03, 0.98
 #: Longest leap, as a part of the swing of ln V.
 _NEAR = 0.1
+#: Points of an orbit that are no more than its ends, of which no recording has to be made.
+_ENDS = 2
 #: Relative accuracy with which a limit cycle is looked for, before it is followed as asked.
 _LOW = 1e-4
 
@@ -121,7 +123,7 @@ class LimitCycle(Measure):
         if approach is None:
             return SETTLES
         cycle = approach.seen[-1]
-        again, rows = recorded(scene, cycle.end, accuracy.refined(), meter)
+        again, orbit = self._once_more(scene, cycle.end, accuracy.refined(), meter)
         if again is None:
             return Outcome(
                 Status.UNVERIFIED,
@@ -133,7 +135,17 @@ class LimitCycle(Measure):
         values["period_events"] = 1.0
         values["events_until_repeat"] = float(approach.events)
         values["work_per_cycle"] = float(approach.work)
-        return Outcome(Status.OK, values | along_path(rows, self.phases))
+        return Outcome(Status.OK, values | orbit)
+
+    def _once_more(
+        self, scene: Scene, start: Point, accuracy: Accuracy, meter: Meter
+    ) -> tuple[Cycle | None, dict[str, np.ndarray]]:
+        """One cycle from a point, and its orbit; none where the motion settles."""
+        if self.phases > _ENDS:
+            cycle, rows = recorded(scene, start, accuracy, meter)
+            return cycle, along_path(rows, self.phases)
+        cycle = next(cycles(scene, accuracy, meter, start))
+        return cycle, {} if cycle is None else _ends(scene, cycle)
 
     def _of_several_states(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events loosely up to a cycle of any period that attracts; close it as accurately
@@ -189,6 +201,15 @@ def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
         why = f"no cycle repeats yet: {text}; {remedy}"
         return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
+
+
+def _ends(scene: Scene, cycle: Cycle) -> dict[str, np.ndarray]:
+    """The ends of an orbit."""
+    begin, end, passed = cycle.begin, cycle.end, cycle.interval
+    slip = scene.load_velocity * passed - (end.spring - begin.spring) / scene.stiffness
+    recording = Recording()
+    recording.add([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)])
+    return dict(zip(OBSERVED, recording.seen(scene).T, strict=False))
 
 
 def _headlines(
