@@ -222,6 +222,17 @@ def test_a_measure_a_reduction_and_a_figure(outside):
     assert drawn.get_ylabel() == "Angle (degrees)"
 
 
+def test_a_figure_of_ones_own_may_lay_itself_out(outside):
+    own = outside["own_figure"]
+    draw = catalogue.load(str(own.study)).plot
+
+    def laid_out(dataset, axes):
+        axes.figure.set_layout_engine(None)
+        return draw(dataset, axes)
+
+    assert plots.figure(own.dataset, laid_out).get_layout_engine() is None
+
+
 # ---- without its file, and with another ---------------------------------------------------------
 
 

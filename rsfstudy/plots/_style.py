@@ -17,7 +17,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import LayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import blended_transform_factory, offset_copy
@@ -203,5 +202,7 @@ def settle(figure: Figure) -> None:
     """Give everything its place: ticks take their style when they are made, and how much room they
     need is known only then.
     """
-    cast(LayoutEngine, figure.get_layout_engine()).execute(figure)
+    layout = figure.get_layout_engine()
+    if layout is not None:  # a figure of the user's own may have taken it away
+        layout.execute(figure)
     figure.draw_without_rendering()
