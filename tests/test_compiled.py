@@ -500,6 +500,10 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     monkeypatch.setitem(strength.__globals__["state_effect"].__globals__, "OWN", 3)
     assert building.digest_of(None, rate) != before
     assert building.digest_of(None, doubled) != building.digest_of(None, tripled)
+    before = building.digest_of(None, doubled)
+    assert building.digest_of(int, doubled) != before
+    monkeypatch.setitem(building._OPTIONS, "fastmath", {"nsz"})
+    assert building.digest_of(None, doubled) != before
 
 
 def by_module(y, rates, p, result):

@@ -85,14 +85,15 @@ def filled(function: Callable[..., Any], places: Mapping[str, Any]) -> Callable[
 
 
 def digest_of(signature: Any, *functions: Callable[..., Any]) -> str:
-    """Digest of functions of a signature and of all that they reach, of the compiler and of the
-    processor.
+    """Digest of functions of a signature and of all that they reach, of the compiler, what it is
+    allowed, and the processor.
     """
     content = _Content()
     content.add((signature, functions))
     processor = llvmlite.binding.get_host_cpu_name(), str(llvmlite.binding.get_host_cpu_features())
     content.add((_LAYOUT, numba.__version__, np.__version__, str(config.CPU_NAME), str(config.OPT)))
     content.add(processor)
+    content.add([(name, sorted(x) if isinstance(x, set) else x) for name, x in _OPTIONS.items()])
     return content.digest.hexdigest()[:32]
 
 
