@@ -215,11 +215,16 @@ def _ends(scene: Scene, cycle: Cycle) -> dict[str, np.ndarray]:
 def _headlines(
     accuracy: Accuracy, numbers: np.ndarray, refined: np.ndarray
 ) -> dict[str, float | np.ndarray]:
-    """The headline numbers with their errors, from two runs."""
+    """The headline numbers with their errors, from two runs.
+
+    Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
+    """
+    chance, scales = _BY_CHANCE * accuracy.rtol, numbers.copy()
+    scales[-2:] = 0.5 * (numbers[-1] - numbers[-2])
     values: dict[str, float | np.ndarray] = {}
-    for name, number, again in zip(_HEADLINES, numbers, refined, strict=True):
+    for name, number, again, scale in zip(_HEADLINES, numbers, refined, scales, strict=True):
         values[name] = float(number)
-        values[f"{name}_error"] = error_between(number, again, _BY_CHANCE * accuracy.rtol)
+        values[f"{name}_error"] = error_between(number, again, chance, scale)
     return values
 
 

@@ -112,7 +112,9 @@ class Accuracy:
         return 0.3 * self.rtol * self.refinement
 
 
-def error_between(number: float, refined: float, chance: float) -> float:
+def error_between(
+    number: float, refined: float, chance: float, scale: float | None = None
+) -> float:
     """Error estimate of a number, from what `Accuracy.refined` makes of it.
 
     Three times the difference, which misses only where the second error is more than two thirds of
@@ -125,9 +127,12 @@ def error_between(number: float, refined: float, chance: float) -> float:
     chance : float
         Relative error that chance may hide: a small part of the accuracy asked for, measured by the
         study coverage.
+    scale : float, optional
+        What that error is relative to, where the number itself may come near zero.
     """
     number = float(number)
-    return 3.0 * abs(number - float(refined)) + (chance + ROUNDING) * abs(number)
+    hidden = (chance + ROUNDING) * abs(number if scale is None else scale)
+    return 3.0 * abs(number - float(refined)) + hidden
 
 
 def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:
