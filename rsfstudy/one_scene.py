@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
+from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +14,7 @@ import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.errors import InvalidValue, NoAnswer
-from rsfstudy.measures import Measure
+from rsfstudy.measures import Measure, Value
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
@@ -162,19 +165,9 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
         warnings.warn(text, NoAnswer, stacklevel=3)
-    own = {about.name: about for about in measure.quantities}
-    inner = measure.inner_coordinates
-    variables: dict[str, Any] = {}
-    for name, dims in measure.variables.items():
-        about = quantity(name, own)
-        attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
-        values = outcome.values.get(name)
-        if values is None:
-            values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = (dims, values, {k: v for k, v in attrs.items() if v})
-    variables["rhs_evaluations"] = ((), outcome.rhs_evaluations)
-    rate = ((), scene.reference_rate, {"units": "s-1"})
-    dataset = xr.Dataset(variables, coords={**inner, "reference_rate": rate})
+    numbers = {**outcome.values, "rhs_evaluations": outcome.rhs_evaluations}
+    dataset = _like(_blank(measure), numbers)
+    dataset.variables["reference_rate"].data = np.array(scene.reference_rate)
     dataset.attrs = {
         "scene": json.dumps(scene.describe()),
         "rtol": accuracy.rtol,
@@ -183,3 +176,28 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "message": outcome.message,
     }
     return dataset
+
+
+def _like(blank: xr.Dataset, numbers: Mapping[str, Value]) -> xr.Dataset:
+    """A copy of a dataset with other numbers, where there are any."""
+    data = {name: numbers.get(name) for name in map(str, blank)}
+    kept = {name: blank[name].values.copy() for name, value in data.items() if value is None}
+    return blank.copy(data=data | kept)
+
+
+@lru_cache(maxsize=32)
+def _blank(measure: Measure) -> xr.Dataset:
+    """The dataset of a measure in which all numbers are missing; copying it takes a third of the
+    time of making one.
+    """
+    own = {about.name: about for about in measure.quantities}
+    inner = measure.inner_coordinates
+    variables: dict[str, Any] = {}
+    for name, dims in measure.variables.items():
+        about = quantity(name, own)
+        attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
+        missing = np.full([len(inner[dim]) for dim in dims], np.nan)
+        variables[name] = (dims, missing, {k: v for k, v in attrs.items() if v})
+    variables["rhs_evaluations"] = ((), 0)
+    rate = ((), math.nan, {"units": "s-1"})
+    return xr.Dataset(variables, coords={**inner, "reference_rate": rate})

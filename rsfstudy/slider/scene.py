@@ -429,16 +429,11 @@ class Scene(Shown):
         rows : iterable of sequence of float
             Their values in each copy.
         """
-        layout, parts = self._layout, (self._slider, *self.parts)
-        kept = {**layout.elsewhere, "_layout": layout, "_slider": self._slider}
-        for part in parts:
-            kept |= part.__dict__
-        copiers = []
-        for place, part in enumerate(parts):
-            own = [(name, i) for i, name in enumerate(names) if layout.places[name] == place]
-            copiers += [(place, copier(part), own)] if own else []
+        kept, copiers = self._copying(tuple(names))
+        parts = self._slider, *self.parts
         if all(place == len(parts) - 1 for place, _copy, _own in copiers):
-            kept |= {name: self.__dict__[name] for name in _UNLOADED if name in self.__dict__}
+            inherited = {name: self.__dict__[name] for name in _UNLOADED if name in self.__dict__}
+            kept = kept | inherited
         for row in rows:
             scene, made = Scene.__new__(Scene), list(parts)
             scene.__dict__.update(kept)
@@ -447,6 +442,23 @@ class Scene(Shown):
                 scene.__dict__.update(made[place].__dict__)
             scene.__dict__["_slider"], scene.__dict__["parts"] = made[0], Parts._make(made[1:])
             yield scene
+
+    def _copying(self, names: tuple[str, ...]) -> tuple[dict[str, Any], list[tuple[Any, ...]]]:
+        """What copies with other numbers in these fields share; and where the parts are that have
+        them, what copies those, and which of the fields they have. Found once.
+        """
+        key = "copying", *names
+        if key not in self.made:
+            layout, parts = self._layout, (self._slider, *self.parts)
+            kept = {**layout.elsewhere, "_layout": layout, "_slider": self._slider}
+            copiers = []
+            for place, part in enumerate(parts):
+                kept |= part.__dict__
+                own = [(name, i) for i, name in enumerate(names) if layout.places[name] == place]
+                copiers += [(place, copier(part), own)] if own else []
+            self.made[key] = kept, copiers
+        found: tuple[dict[str, Any], list[tuple[Any, ...]]] = self.made[key]
+        return found
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""

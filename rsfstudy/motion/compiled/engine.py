@@ -14,7 +14,7 @@ from rsfstudy.motion.compiled import machine, room, table
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.recording import REGIME, STATES, Recording
-from rsfstudy.motion.regimes import fast_state, halted, slow_state
+from rsfstudy.motion.regimes import Regimes, fast_state, halted, slow_state
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.motion.stepping import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.slider.equations import RIGID, Equations, between_ruptures, in_rupture, without_mass
@@ -54,24 +54,23 @@ _OF_STATES = table.POINT + table.PSIS
 _NO_MASS = (math.nan,) * len(Limits._fields)
 
 
-class _Course(NamedTuple):
-    """A compiled motion, ready to begin, and what it is called with.
+class _Plan(NamedTuple):
+    """What all motions by the same equations begin and are called with.
 
     Attributes
     ----------
-    memory : ndarray of NOW, shape (1,)
-    y, scales, functions : ndarray
-        Unknowns and room for their rates; scales of the unknowns of all regimes; addresses of the
-        equations of each.
+    memory : ndarray of bytes
+        What they remember at first, one NOW.
+    scales, functions : ndarray
+        Scales of the unknowns of all regimes, and addresses of the equations of each.
     limits : tuple of float
     p : ndarray
         The numbers of the scene.
     regimes : tuple of str
-        Names of those it goes through.
+        Names of those they go through.
     """
 
     memory: np.ndarray
-    y: np.ndarray
     scales: np.ndarray
     functions: np.ndarray
     limits: Numbers
@@ -119,11 +118,14 @@ def segment(
     lasts : float
         How long it lasts.
     """
-    course = _course(scene, accuracy, start, clock=clock)
-    now = course.memory[0]
+    plan, both = _planned(scene, accuracy, clock=clock)
+    memory, state = plan.memory.copy(), slow_state(start, clock)
+    now = memory.view(table.NOW)[0]
     now["time"], now["slip"], now["spring"] = origin
     now["lasts"] = lasts
-    return _told(course, meter, watches, recording=recording)
+    if both is not None and not both.begins_slow(start):
+        now["regime"], state = table.FAST, fast_state(start)
+    return _told(plan, memory, state, meter, watches, recording=recording)
 
 
 def along(
@@ -137,35 +139,64 @@ def along(
     samples: Sequence[float],
 ) -> Iterator[Event]:
     """Events along one system of equations; the arguments are those of `course.along`."""
-    memory, is_rigid = _memory(equations, tolerance), equations.regime == RIGID
-    now = memory[0]
-    now["direction"], now["anew"] = -1.0 if backward else 1.0, not is_rigid
-    now["strides"] = not is_rigid
-    scales, p = np.array(equations.scales), np.array(equations.p)
-    functions, names = _table(_addresses(equations)), (equations.regime,)
-    course = _Course(memory, _unknowns(state), scales, functions, _NO_MASS, p, names)
-    # a rigid slider has slip for its clock
-    return _told(course, meter, watches, samples, slips=table.CLOCK if is_rigid else table.SLIP)
+    is_rigid, direction = equations.regime == RIGID, -1.0 if backward else 1.0
+    memory = _beginning(
+        (("direction", direction), ("anew", not is_rigid), ("strides", not is_rigid)),
+        tolerance,
+        (len(equations.unknowns), equations.states),
+    )
+    return _told(_plan(memory, equations), memory.copy(), state, meter, watches, samples)
 
 
-def _course(scene: Scene, accuracy: Accuracy, start: Point, *, clock: bool) -> _Course:
-    """A motion of a scene from a point."""
-    both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
-    slow = both.slow if both else without_mass(scene, clock=clock)
-    memory, p = _memory(slow, accuracy.solver), np.array(slow.p)
-    now = memory[0]
-    now["ends_by_fate"], now["has_clock"], now["strides"], now["anew"] = 1, clock, 1, 1
-    state = slow_state(start, clock)
+def _planned(scene: Scene, accuracy: Accuracy, *, clock: bool) -> tuple[_Plan, Regimes | None]:
+    """What all motions of a scene at an accuracy have in common, and its regimes where it has
+    mass; found once.
+    """
+    key = "compiled", accuracy.rtol, accuracy.refinement, clock
+    if key not in scene.made:
+        both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
+        slow = both.slow if both else without_mass(scene, clock=clock)
+        both_unknowns = len(slow.unknowns), slow.states, len(both.fast.unknowns) if both else 0
+        memory = _beginning(
+            (("ends_by_fate", 1), ("has_clock", clock), ("strides", 1), ("anew", 1)),
+            accuracy.solver,
+            both_unknowns,
+        )
+        scene.made[key] = _plan(memory, slow, both), both
+    found: tuple[_Plan, Regimes | None] = scene.made[key]
+    return found
+
+
+def _plan(memory: np.ndarray, slow: Equations, both: Regimes | None = None) -> _Plan:
+    """A plan of motions by equations, and by those of another regime."""
+    p = np.array(slow.p)
     if both is None:
-        functions, scales = _table(_addresses(slow)), np.array(slow.scales)
-        return _Course(memory, _unknowns(state), scales, functions, _NO_MASS, p, (slow.regime,))
-    fast = both.fast
-    now["has_mass"], now["unknowns_fast"] = 1, len(fast.unknowns)
-    if not both.begins_slow(start):
-        now["regime"], state = table.FAST, fast_state(start)
-    names, scales = (slow.regime, fast.regime), np.array((*slow.scales, *fast.scales))
-    functions = _table(_addresses(slow), _addresses(fast))
-    return _Course(memory, _unknowns(state), scales, functions, tuple(both.limits), p, names)
+        functions = _table(_addresses(slow))
+        return _Plan(memory, np.array(slow.scales), functions, _NO_MASS, p, (slow.regime,))
+    functions = _table(_addresses(slow), _addresses(both.fast))
+    names, scales = (slow.regime, both.fast.regime), np.array((*slow.scales, *both.fast.scales))
+    return _Plan(memory, scales, functions, tuple(both.limits), p, names)
+
+
+@lru_cache(maxsize=256)
+def _beginning(
+    flags: tuple[tuple[str, float], ...], tolerance: float, counts: tuple[int, ...]
+) -> np.ndarray:
+    """What motions remember at first, as bytes: records are copied one field after the other.
+
+    Counts are those of unknowns and states, and of unknowns in ruptures where there are any.
+    """
+    memory = np.zeros(1, table.NOW)
+    now, tolerance = memory[0], max(tolerance, TIGHTEST)
+    now["tolerance"], now["direction"] = tolerance, 1.0
+    now["finer"] = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
+    now["lasts"], now["begins"] = math.inf, table.BEGIN
+    now["unknowns"], now["states"], *fast = counts
+    if fast and fast[0]:
+        now["has_mass"], now["unknowns_fast"] = 1, fast[0]
+    for name, value in flags:
+        now[name] = value
+    return memory.view(np.uint8)
 
 
 def _addresses(equations: Equations) -> tuple[int, ...]:
@@ -189,75 +220,52 @@ def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
     return rows
 
 
-def _memory(equations: Equations, tolerance: float) -> np.ndarray:
-    """What a motion that begins with these equations remembers."""
-    unknowns = len(equations.unknowns)
-    # records are copied one field after the other, and bytes at once
-    template = _template(max(tolerance, TIGHTEST), unknowns, equations.states)
-    return template.copy().view(table.NOW)
-
-
-@lru_cache(maxsize=256)
-def _template(tolerance: float, unknowns: int, states: int) -> np.ndarray:
-    """The same as bytes, for all motions by these equations at a tolerance."""
-    memory = np.zeros(1, table.NOW)
-    now = memory[0]
-    now["tolerance"], now["direction"] = tolerance, 1.0
-    now["finer"] = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
-    now["lasts"], now["begins"] = math.inf, table.BEGIN
-    now["unknowns"], now["states"] = unknowns, states
-    return memory.view(np.uint8)
-
-
-def _unknowns(state: Numbers) -> np.ndarray:
-    """Unknowns, with room for one more in another regime, and for their rates."""
-    room = np.zeros(2 * len(state) + 2)
-    room[: len(state)] = state
-    return room
-
-
 def _told(
-    course: _Course,
+    plan: _Plan,
+    memory: np.ndarray,
+    state: Numbers,
     meter: Meter,
     watches: Sequence[Watch],
     samples: Sequence[float] = (),
     recording: Recording | None = None,
-    slips: int = table.SLIP,
 ) -> Iterator[Event]:
-    """Events of a motion, a table of them by each call of the compiled motion; their slip stands in
-    the column `slips`.
+    """Events of a motion from a state, a table of them by each call of the compiled motion.
 
     Raises
     ------
     Halt
         Where it cannot go on.
     """
-    now, asked = course.memory[0], _asked(tuple(watches), tuple(samples)).copy()
-    states = int(now["states"])
+    memory = memory.view(table.NOW)
+    now, regimes, states = memory[0], plan.regimes, int(memory[0]["states"])
+    # room for one more unknown in another regime, and for their rates
+    y = np.array((*state, *[0.0] * (len(state) + 2)))
+    asked, meanings = _asked(tuple(watches), tuple(samples))
+    asked = asked.copy()
     now["budget"] = meter.budget - meter.spent
-    meanings = [*((watch.kind, watch) for watch in watches), *[_SAMPLE] * len(samples), *_BESIDE]
-    told = np.empty((max(_EVENTS, 2 * len(asked) + 3), table.POINT + table.PSIS + states))
+    told = np.empty((max(_EVENTS, 2 * len(asked) + 3), _OF_STATES + states))
     rows = np.empty((0 if recording is None else _RECORDED, STATES + states))
-    space = np.empty(room.size(len(course.y), states, len(asked)))
-    arguments = (*course[:4], space, np.zeros(table.PSIS + states), asked, told, rows)
-    account = _Account(meter, course.regimes)
+    space = np.empty(room.size(len(y), states, len(asked)))
+    last, account = np.zeros(table.PSIS + states), _Account(meter, regimes)
+    # a rigid slider has slip for its clock
+    slips = table.CLOCK if regimes[0] == RIGID else table.SLIP
+    arguments = plan.scales, plan.functions, space, last, asked, told, rows, plan.limits, plan.p
     advance, end = machine.course(), table.HANDS_OVER
     while end == table.HANDS_OVER:
-        end = advance(*arguments, course.limits, course.p)
+        end = advance(memory, y, *arguments)
         if recording is not None:
-            _keep(recording, rows[: now["recorded"]], course.regimes)
+            _keep(recording, rows[: now["recorded"]], regimes)
         for line in told[: now["told"]].tolist():
-            code, regime, _clock, time, _slip, *work = line[: table.POINT]
-            account.charge(*work)
+            account.charge(*line[table.STEPS : table.POINT])
             x, growth, spring, friction, *others = line[table.POINT : _OF_STATES]
             point = Point(x, growth, spring, friction, tuple(line[_OF_STATES:]), *others)
-            kind, watch = meanings[int(code)]
-            name = course.regimes[int(regime)]
-            yield Event(kind, watch, time, line[slips], point, name, meter.spent)
+            kind, watch = meanings[int(line[table.CODE])]
+            name = regimes[int(line[table.REGIME])]
+            yield Event(kind, watch, line[table.TIME], line[slips], point, name, meter.spent)
         now["told"] = now["recorded"] = 0
     account.charge(now["steps"], now["spent_slow"], now["spent_fast"])
     if end != table.ENDED:
-        raise _halt(end, now, course)
+        raise _halt(end, now, regimes)
 
 
 class _Account:
@@ -280,16 +288,21 @@ class _Account:
             self._fast = int(fast)
 
 
-@cache
-def _asked(watches: tuple[Watch, ...], samples: tuple[float, ...]) -> np.ndarray:
-    """The table of what is watched for; samples are told at clocks."""
+@lru_cache(maxsize=256)
+def _asked(
+    watches: tuple[Watch, ...], samples: tuple[float, ...]
+) -> tuple[np.ndarray, list[tuple[Kind, Watch | None]]]:
+    """The table of what is watched for, and what codes of events mean; samples are told at
+    clocks.
+    """
+    meanings = [*((watch.kind, watch) for watch in watches), *[_SAMPLE] * len(samples), *_BESIDE]
     asked = np.zeros((len(watches) + len(samples), len(table.WATCHED)))
     for row, watch in zip(asked, watches, strict=False):
         row[table.KIND], row[table.OF] = _KINDS[watch.kind], _COLUMNS[watch.of]
         row[table.LEVEL], row[table.ENDS], row[table.WAITS] = watch.level, watch.ends, watch.waits
     for row, clock in zip(asked[len(watches) :], samples, strict=True):
         row[table.KIND], row[table.LEVEL] = table.MOMENT, clock
-    return asked
+    return asked, meanings
 
 
 def _keep(recording: Recording, rows: np.ndarray, names: tuple[str, ...]) -> None:
@@ -300,11 +313,11 @@ def _keep(recording: Recording, rows: np.ndarray, names: tuple[str, ...]) -> Non
     recording.add(kept)
 
 
-def _halt(end: int, now: Any, course: _Course) -> Halt:
+def _halt(end: int, now: Any, regimes: tuple[str, ...]) -> Halt:
     """Why a motion cannot go on."""
     if end == table.HALTED:
         return halted(int(now["fate"]), float(now["stress"]))
-    name = course.regimes[now["regime"]]
+    name = regimes[now["regime"]]
     why = "a step would be shorter than the spacing of numbers around the clock"
     if end == table.NO_LENGTH:
         why = "step without length, or a state that is not finite"
