@@ -57,7 +57,7 @@ study = Study(
         "falls with V_0, and slow oscillation lies in a narrow band below, while at constant "
         "normal stress stick-slip reaches up to the boundary. Beside it cycles are approached "
         "slowly, over thousands of events, and small errors of a step move them far: motions "
-        "are integrated a thousand times more tightly than their numbers are asked for."
+        "are integrated 300 times more tightly than their numbers are asked for."
     ),
     base=Scene(b_over_a=2.0, alpha=0.56, inertia=True),
     axes=[
@@ -67,7 +67,7 @@ study = Study(
         Axis("load_velocity_ratio", np.geomspace(1.01, 1000.0, 100)),
     ],
     measure=LimitCycle(phases=2, events=20_000),
-    accuracy=Accuracy(rtol=1e-3, budget=20_000_000, engine="compiled", refinement=0.001),
+    accuracy=Accuracy(rtol=1e-3, budget=20_000_000, engine="compiled", refinement=0.003),
     reductions=[CyclingEdge(name="cycling_edge", of="recurrence_interval")],
     claims=[
         *(edge(*case, **LINEAR) for case in CASES),
