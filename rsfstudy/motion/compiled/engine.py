@@ -156,11 +156,11 @@ def _planned(scene: Scene, accuracy: Accuracy, *, clock: bool) -> tuple[_Plan, R
     if key not in scene.made:
         both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
         slow = both.slow if both else without_mass(scene, clock=clock)
-        both_unknowns = len(slow.unknowns), slow.states, len(both.fast.unknowns) if both else 0
+        counts = len(slow.unknowns), slow.states, len(both.fast.unknowns) if both else 0
         memory = _beginning(
             (("ends_by_fate", 1), ("has_clock", clock), ("strides", 1), ("anew", 1)),
             accuracy.solver,
-            both_unknowns,
+            counts,
         )
         scene.made[key] = _plan(memory, slow, both), both
     found: tuple[_Plan, Regimes | None] = scene.made[key]
