@@ -10,12 +10,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.contour import QuadContourSet
 from matplotlib.patheffects import withStroke
 
 from rsfstudy.status import Status
 
 #: Hatches of cells without a number, by the order in which their statuses are met.
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
+#: Part of a panel that a label needs around it.
+_ROOM = 0.06
 #: Fewest points of an axis along which lines of equal value are drawn.
 _FEWEST = 6
 _NAMES = {int(status): status.label for status in Status}
@@ -58,8 +61,25 @@ def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
         found = axes.contour(x, y, values, levels, colors="white", linewidths=0.6, linestyles="-")
-    for text in axes.clabel(found, fontsize=6, fmt="%.3g"):
+    for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_clear_places(axes, found)):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
+
+
+def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
+    """Where each line of equal value is farthest from all others and from the frame; nowhere where
+    that is too close for a label.
+    """
+    panel = axes.transData + axes.transAxes.inverted()
+    drawn = [np.concatenate([np.empty((0, 2)), *parts]) for parts in found.allsegs]
+    lines, places = [panel.transform(line) for line in drawn if line.size], []
+    for line in lines:
+        others = np.concatenate([np.empty((0, 2)), *(x for x in lines if x is not line)])
+        apart = np.linalg.norm(line[:, None] - others, axis=2).min(axis=1, initial=1.0)
+        room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
+        if room.max() > _ROOM:
+            x, y = panel.inverted().transform(line[room.argmax()]).tolist()
+            places.append((x, y))
+    return places
 
 
 def statuses(

@@ -78,6 +78,10 @@ def _map(
     here, everywhere = here.sortby(list(plane)), dataset[name].values.astype(float)
     y, x = (values[dimension].values.astype(float) for dimension in plane)
     at = edges(x, is_log_spaced(x)), edges(y, is_log_spaced(y))
+    axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
+    for which, points in (("x", x), ("y", y)):
+        if is_log_spaced(points):
+            log_scale(axes, which)
     if np.isfinite(everywhere).any():
         norm, levels = _scale(everywhere)
         drawn = colours(axes, at, values.values, norm=norm)
@@ -90,10 +94,6 @@ def _map(
         statuses(axes, at, status.transpose(*plane).values, unknown)
     axis_of(axes, dataset, plane[1], 40)
     axes.set_ylabel(label(quantity(plane[0], stated_by(dataset)), 34))
-    axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    for which, points in (("x", x), ("y", y)):
-        if is_log_spaced(points):
-            log_scale(axes, which)
     title = ", ".join(place(here, str(d)) for d in where if dataset.sizes[d] > 1)
     axes.set_title(wrapped(title or pretty(dataset.attrs.get("title", "")), 44))
     legend(axes)

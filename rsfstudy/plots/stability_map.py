@@ -53,6 +53,8 @@ def _mapped(dataset: xr.Dataset, axes: Axes, where: dict[str, int], softest: flo
     x, y = np.log10(case["load_velocity_ratio"].values), case["stiffness_ratio"].values
     peak = case[_PEAK].assign_coords(load_velocity_ratio=x)
     at = edges(x), edges(y)
+    softest = softest if y.min() < softest < y.max() else 0.0
+    axes.set(xlim=(at[0][0], at[0][-1]), ylim=(softest or at[1][0], at[1][-1]))
     statuses(axes, at, case["status"].values, peak.isnull().values)
     if bool(peak.notnull().any()):
         low, high = float(dataset[_PEAK].min()), float(dataset[_PEAK].max())
@@ -64,8 +66,6 @@ def _mapped(dataset: xr.Dataset, axes: Axes, where: dict[str, int], softest: flo
     if "cycling_edge_linear" in case:
         linear = case["cycling_edge_linear"]
         axes.plot(x, linear, "-", color=_LINEAR, linewidth=1.3, label="linear boundary")
-    softest = softest if y.min() < softest < y.max() else at[1][0]
-    axes.set(xlim=(at[0][0], at[0][-1]), ylim=(softest, at[1][-1]))
     _regimes(case, axes, peak)
     axes.set_xlabel(r"Load point velocity, $\log_{10}(V_0/V_*)$")
     axes.set_ylabel(f"Stiffness, {quantity('stiffness_ratio').symbol}")
