@@ -51,9 +51,14 @@ def run(study=SMALL, **options) -> xr.Dataset:
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
-#: claims speak of, and some between; of costs, the integrators that they turn on.
+#: claims speak of, and some between; of costs, the problems and integrators that they turn on.
 ENOUGH = {
     "accuracy_cost": {
+        "problem": [
+            "critical step",
+            "cycle, slip law: static drop",
+            "cycle, slowness law: recurrence",
+        ],
         "integrator": ["DOP853", "RK45", "DOP853 + Radau", "Radau (mass always)"],
         "requested_digits": [4, 6, 8, 9],
         "repeats": 1,

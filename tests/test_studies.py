@@ -150,6 +150,7 @@ def test_a_plot_outside_of_the_package_is_never_imported(result):
         plots.figure(dataset)
 
 
+@pytest.mark.parametrize("result", catalogue.names()[::3], indirect=True, scope="module")
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"
