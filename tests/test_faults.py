@@ -127,7 +127,8 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     from distributed import Client
 
     monkeypatch.setenv("FAULT_TAKES", "0.3")
-    with Client(processes=False, n_workers=1, dashboard_address=None) as client:
+    quiet = {"dashboard_address": ":0", "scheduler_kwargs": {"dashboard": False}}
+    with Client(processes=False, n_workers=1, **quiet) as client:
         dataset = run(declared(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
 
