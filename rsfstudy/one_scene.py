@@ -182,7 +182,8 @@ def _like(blank: xr.Dataset, numbers: Mapping[str, Value]) -> xr.Dataset:
     """A copy of a dataset with other numbers, where there are any."""
     data = {name: numbers.get(name) for name in map(str, blank)}
     kept = {name: blank[name].values.copy() for name, value in data.items() if value is None}
-    return blank.copy(data=data | kept)
+    # deep: an index that is renamed or written to is that of no other result
+    return blank.copy(deep=True, data=data | kept)
 
 
 @lru_cache(maxsize=32)

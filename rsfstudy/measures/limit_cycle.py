@@ -219,12 +219,12 @@ def _headlines(
 
     Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
     """
-    chance, scales = _BY_CHANCE * accuracy.rtol, numbers.copy()
-    scales[-2:] = 0.5 * (numbers[-1] - numbers[-2])
+    chance, scales = _BY_CHANCE * accuracy.rtol, np.abs(numbers)
+    scales[-2:] = np.maximum(scales[-2:], 0.5 * (numbers[-1] - numbers[-2]))
     values: dict[str, float | np.ndarray] = {}
     for name, number, again, scale in zip(_HEADLINES, numbers, refined, scales, strict=True):
         values[name] = float(number)
-        values[f"{name}_error"] = error_between(number, again, chance, scale)
+        values[f"{name}_error"] = error_between(number, again, chance, float(scale))
     return values
 
 

@@ -99,7 +99,7 @@ def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str, width: int = 45) ->
 
 
 def log_scale(axes: Axes, which: str) -> None:
-    """Have a log axis, with numbers that do not touch each other; call it after drawing.
+    """Have a log axis, with numbers that do not touch each other; call it where limits are known.
 
     Parameters
     ----------

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.contour import QuadContourSet
 from matplotlib.patheffects import withStroke
+from scipy.spatial import cKDTree
 
 from rsfstudy.status import Status
 
@@ -19,6 +20,8 @@ from rsfstudy.status import Status
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
 #: Part of a panel that a label needs around it.
 _ROOM = 0.06
+#: Part of a panel that a line has to go through for one.
+_LONG = 0.2
 #: Fewest points of an axis along which lines of equal value are drawn.
 _FEWEST = 6
 _NAMES = {int(status): status.label for status in Status}
@@ -66,17 +69,18 @@ def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
 
 
 def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
-    """Where each line of equal value is farthest from all others and from the frame; nowhere where
-    that is too close for a label.
+    """Where the longest line of each level is farthest from those of other levels and from the
+    frame; nowhere where that is too close for a label, or the line too short.
     """
     panel = axes.transData + axes.transAxes.inverted()
-    drawn = [np.concatenate([np.empty((0, 2)), *parts]) for parts in found.allsegs]
-    lines, places = [panel.transform(line) for line in drawn if line.size], []
-    for line in lines:
-        others = np.concatenate([np.empty((0, 2)), *(x for x in lines if x is not line)])
-        apart = np.linalg.norm(line[:, None] - others, axis=2).min(axis=1, initial=1.0)
+    levels = [[panel.transform(part) for part in parts if len(part)] for parts in found.allsegs]
+    places = []
+    for level in filter(None, levels):
+        others = [part for other in levels if other is not level for part in other]
+        line = max(level, key=len)
+        apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
         room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
-        if room.max() > _ROOM:
+        if room.max() > _ROOM and np.ptp(line, axis=0).max() > _LONG:
             x, y = panel.inverted().transform(line[room.argmax()]).tolist()
             places.append((x, y))
     return places
