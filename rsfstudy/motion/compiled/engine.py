@@ -143,7 +143,7 @@ def along(
     memory = _beginning(
         (("direction", direction), ("anew", not is_rigid), ("strides", not is_rigid)),
         tolerance,
-        (len(equations.unknowns), equations.states),
+        (len(equations.unknowns), equations.states, 0),
     )
     return _told(_plan(memory, equations), memory.copy(), state, meter, watches, samples)
 
@@ -180,20 +180,19 @@ def _plan(memory: np.ndarray, slow: Equations, both: Regimes | None = None) -> _
 
 @lru_cache(maxsize=256)
 def _beginning(
-    flags: tuple[tuple[str, float], ...], tolerance: float, counts: tuple[int, ...]
+    flags: tuple[tuple[str, float], ...], tolerance: float, counts: tuple[int, int, int]
 ) -> np.ndarray:
     """What motions remember at first, as bytes: records are copied one field after the other.
 
-    Counts are those of unknowns and states, and of unknowns in ruptures where there are any.
+    Counts are those of unknowns, of states, and of unknowns in ruptures (0 where mass is none).
     """
     memory = np.zeros(1, table.NOW)
     now, tolerance = memory[0], max(tolerance, TIGHTEST)
     now["tolerance"], now["direction"] = tolerance, 1.0
     now["finer"] = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
     now["lasts"], now["begins"] = math.inf, table.BEGIN
-    now["unknowns"], now["states"], *fast = counts
-    if fast and fast[0]:
-        now["has_mass"], now["unknowns_fast"] = 1, fast[0]
+    now["unknowns"], now["states"], now["unknowns_fast"] = counts
+    now["has_mass"] = counts[-1] > 0
     for name, value in flags:
         now[name] = value
     return memory.view(np.uint8)
