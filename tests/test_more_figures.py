@@ -59,3 +59,24 @@ def test_lines_of_equal_value_need_points_enough(points, drawn):
     contours(axes, values, [2.0, 4.0])
     assert len(axes.texts) == drawn
     assert all(text.get_path_effects() for text in axes.texts)
+
+
+def labelled(at, *coordinates: np.ndarray) -> list[str]:
+    """Labels of the lines at 1, 2 and 3 of values over x and y."""
+    axes = Figure().subplots()
+    axes.set(xlim=coordinates[0][[0, -1]], ylim=coordinates[1][[0, -1]])
+    values = at(*np.meshgrid(*coordinates))
+    points = dict(zip(("x", "y"), coordinates, strict=True))
+    contours(axes, xr.DataArray(values, points, ("y", "x")), [1.0, 2.0, 3.0])
+    return sorted(text.get_text() for text in axes.texts)
+
+
+def test_each_level_is_labelled_once_and_only_where_there_is_room():
+    plane = np.linspace(0.0, 4.0, 30), np.linspace(0.0, 4.0, 30)
+    assert labelled(lambda x, y: x, *plane) == ["1", "2", "3"]
+    # at x = 1, 1.01 and 1.02: a label of one would hide the others
+    assert labelled(lambda x, y: 1.0 + 100.0 * (x - 1.0), *plane) == []
+    # two lines of each level, at either side of y = 2
+    assert labelled(lambda x, y: np.abs(y - 2.0) * 2.0, *plane) == ["1", "2", "3"]
+    # a single cell
+    assert labelled(lambda x, y: 4.0 * (np.hypot(x - 2.0, y - 2.0) < 0.1), *plane) == []
