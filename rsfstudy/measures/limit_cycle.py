@@ -31,6 +31,7 @@ from rsfstudy.motion.recording import OBSERVED, Recording, along_path, row
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
+from rsfstudy.slider.equations import relation_of
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
@@ -129,7 +130,8 @@ class LimitCycle(Measure):
                 Status.UNVERIFIED,
                 message="with smaller tolerances the motion settles: ask for a smaller rtol",
             )
-        values = _headlines(accuracy, *map(approach.of_limit_cycle, (cycle, again)))
+        numbers, refined = map(approach.of_limit_cycle, (cycle, again))
+        values = _headlines(accuracy, numbers, refined, np.abs(numbers - cycle.numbers()))
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values |= _properties(scene, cycle)
         values["period_events"] = 1.0
@@ -164,7 +166,8 @@ class LimitCycle(Measure):
             return Outcome(Status.UNVERIFIED, message=why)
         cycle, begin, spent = one.events[0], again.events[0].begin, meter.spent
         _last, rows = recorded(scene, begin, accuracy.refined(), meter, orbit.period)
-        values = _headlines(accuracy, *(o.events[0].numbers_of_event() for o in (one, again)))
+        numbers, refined = (o.events[0].numbers_of_event() for o in (one, again))
+        values = _headlines(accuracy, numbers, refined, np.zeros_like(numbers))
         carried = (cycle.end.spring - cycle.begin.spring) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"] - carried
         values |= _properties(scene, cycle)
@@ -213,18 +216,19 @@ def _ends(scene: Scene, cycle: Cycle) -> dict[str, np.ndarray]:
 
 
 def _headlines(
-    accuracy: Accuracy, numbers: np.ndarray, refined: np.ndarray
+    accuracy: Accuracy, numbers: np.ndarray, refined: np.ndarray, implied: np.ndarray
 ) -> dict[str, float | np.ndarray]:
-    """The headline numbers with their errors, from two runs.
+    """The headline numbers with their errors, from two runs, and what of them is implied by
+    derivatives that both share.
 
     Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
     """
     chance, scales = _BY_CHANCE * accuracy.rtol, np.abs(numbers)
     scales[-2:] = np.maximum(scales[-2:], 0.5 * (numbers[-1] - numbers[-2]))
     values: dict[str, float | np.ndarray] = {}
-    for name, number, again, scale in zip(_HEADLINES, numbers, refined, scales, strict=True):
-        values[name] = float(number)
-        values[f"{name}_error"] = error_between(number, again, chance, float(scale))
+    for i, name in enumerate(_HEADLINES):
+        error = error_between(numbers[i], refined[i], chance, float(scales[i]))
+        values[name], values[f"{name}_error"] = float(numbers[i]), error + float(implied[i])
     return values
 
 
@@ -305,13 +309,13 @@ class Approach:
         return cycle.numbers() + self._slopes * self._ahead(cycle)
 
     def fixed_point(self) -> Point:
-        """Where the limit cycle begins, as the last cycle implies."""
-        cycle = self.seen[-1]
-        begin, end = ((point.spring, *point.psis) for point in (cycle.begin, cycle.end))
-        moves = end[0] - begin[0]
-        stride = self._ahead(cycle) / moves if moves else 0.0
-        spring, *psis = (x + stride * (y - x) for x, y in zip(begin, end, strict=True))
-        return on_slow_manifold(self._scene, spring, tuple(psis))
+        """Where the limit cycle begins, as the last cycle implies: at the slip rate of the load
+        point, from which time is counted.
+        """
+        scene, cycle = self._scene, self.seen[-1]
+        spring, load = cycle.begin.spring + self._ahead(cycle), scene.log_load_rate
+        strength = relation_of(scene)(spring - scene.dynamics.radiated(load))[0]
+        return on_slow_manifold(scene, spring, (strength - scene.a * load,))
 
     def _ahead(self, cycle: Cycle) -> float:
         """Stress from the beginning of a cycle to that of the limit cycle."""
