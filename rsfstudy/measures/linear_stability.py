@@ -31,7 +31,7 @@ from rsfstudy.status import Status
 #: balance there.
 _DIFFERENCE = 1e-4
 #: Slip rate norm from which growth is found from the full equations; below, double precision does
-#: not see mass in them, and the slow manifold, of first order in mass, is exact enough.
+#: not see mass in them, and the slow manifold, of second order in mass, is exact enough.
 _MASS_SHOWS = 1e-3
 #: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
 _LARGEST_RISE = 1e6

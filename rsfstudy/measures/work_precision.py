@@ -35,7 +35,7 @@ class _MassAlways(Accuracy):
     """The full equations all the way, for comparison."""
 
     @property
-    def switch_norm(self) -> float:
+    def switch_weight(self) -> float:
         """Below every slip rate."""
         return 1e-300
 

@@ -29,7 +29,7 @@ class Limits(NamedTuple):
     Attributes
     ----------
     norm : float
-        Slip rate norm at which to leave the slow manifold, which is a series in (K/a) w**2.
+        Slip rate norm w at which to leave the slow manifold, which is a series in (K/a) w**2.
     correction : float
         Change of ln V by inertia up to which the slow manifold may be used.
     landing : float
@@ -54,7 +54,7 @@ def limits(scene: Scene, accuracy: Accuracy) -> Limits:
     """The limits of a scene with mass, at an accuracy."""
     softness = scene.stiffness / scene.a
     return Limits(
-        accuracy.switch_norm / math.sqrt(min(1.0, softness)),
+        math.sqrt(accuracy.switch_weight / softness),
         accuracy.switch_correction,
         accuracy.landing,
         softness,

@@ -80,8 +80,8 @@ def motion(
     """Integrate a scene from a point, step by step, for as long as the caller asks.
 
     A scene without inertia is one quasi-static integration. With inertia, the slow manifold is
-    followed up to `Accuracy.switch_norm`, the full equations above it; each stretch has a clock of
-    its own that starts at zero, because a rupture is shorter than the spacing of floating-point
+    followed up to `Accuracy.switch_weight`, the full equations above it; each stretch has a clock
+    of its own that starts at zero, because a rupture is shorter than the spacing of floating-point
     numbers around the time at which it happens.
 
     Parameters

@@ -95,6 +95,7 @@ def _assembled(
     if fluid[0]:
         filled |= _of_fluid(filled, count, *fluid)
     filled["states_at"] = bound(states.states_at, **filled)
+    filled["moved"] = _moved(filled["STATES"])
     filled["pace"] = forms.pace
     filled["reading_growth"] = bound(forms.reading_growth, **filled)
     filled["point_at"] = bound(forms.point_at, **filled)
@@ -142,6 +143,12 @@ def _of_stress(
     filled["effective_stress"] = bound(forms.normal_stress_alone, **filled)
     filled["effective_stress_change"] = bound(forms.normal_stress_change, **filled)
     return filled
+
+
+def _moved(count: int) -> Function:
+    """What moves so many states."""
+    one: Function = states.only_moved
+    return one if count == 1 else bound(states.moved, others_moved=_moved(count - 1))
 
 
 def _both(effect: Function, other: Function) -> Function:
@@ -195,10 +202,13 @@ def of_part(function: Function, own: int, **names: Any) -> Function:
     assert isinstance(function, types.FunctionType)
     names["OWN"] = own
     beside = {
-        name: bound(value, **names)
+        name: bound(value)
         for name, value in function.__globals__.items()
         if isinstance(value, types.FunctionType)
         and value.__module__ == function.__module__
         and value.__closure__ is None
     }
-    return bound(function, **{**beside, **names})
+    known = {**beside, **names}
+    for copy in beside.values():
+        copy.__globals__.update(known)
+    return bound(function, **known)

@@ -74,6 +74,16 @@ def felt(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
     _open(changes, friction, psis, p)
 
 
+def moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+    """States after so many times their changes (see `states`)."""
+    _open(psis, changes, by)
+
+
+def others_moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+    """The same of all but the first."""
+    _open(psis, changes, by)
+
+
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state per unit slip, for a law of one state (see `laws`)."""
     _open(log_rate, state, p)

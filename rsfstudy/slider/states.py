@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import A
+from rsfstudy.slider.slots import A, others_moved
 
 
 def total(numbers: Numbers) -> float:
@@ -32,3 +32,13 @@ def felt_of_one(changes: Numbers, friction: float, psis: Numbers, p: Numbers) ->
 def states_at(value: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
     """All states, where friction has this strength: the first is what the others leave."""
     return (value - p[A] * log_rate - total((0.0, *others)), *others)
+
+
+def moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+    """States after so many times their changes."""
+    return (psis[0] + by * changes[0], *others_moved(psis[1:], changes[1:], by))
+
+
+def only_moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+    """The same, of one state."""
+    return (psis[0] + by * changes[0],)

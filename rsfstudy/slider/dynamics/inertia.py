@@ -20,6 +20,7 @@ from rsfstudy.slider.slots import (
     A,
     evolutions,
     felt,
+    moved,
     pace,
     point_at,
     reading_growth,
@@ -34,15 +35,19 @@ OWN = 0
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
+#: Weight (K/a) w (w + w_0) of mass below which its second order is nothing; and the displacement
+#: in D_c ahead over which the first order is differenced, and on either side over which all is.
+LIGHT, AHEAD, ASIDE = 1e-9, 1e-6, 3e-5
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
     """Slip rate on the slow manifold, frictional stress, and the state lost to normal stress.
 
-    Friction has the stress of the spring less what accelerates the mass, to first order in inertia:
-    ``K w (w + w_0) dx`` with dx the quasi-static growth of ln V per unit of combined displacement
-    (slip and load point), w = V T/(2 pi D_c) and w_0 the same of the load point velocity. The error
-    is of order w**4.
+    Friction has the stress of the spring less what accelerates the mass, ``K w (w + w_0) dx`` with
+    dx the growth of ln V per unit of combined displacement (slip and load point), w = V T/(2 pi
+    D_c) and w_0 the same of the load point velocity. The slip rate that trails by that of
+    quasi-static growth is right to first order in w**2, and with its growth friction is to second:
+    the error is of order w**6.
 
     Parameters
     ----------
@@ -53,31 +58,67 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
     p : tuple of float
         T V_*/(2 pi D_c) at OWN, and its logarithm.
     """
-    a = p[A]
-    x, change = without_mass(spring, psis, p)
-    norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
-    resistance = p[STIFFNESS] * norm * (norm + p[LOAD_VELOCITY] * p[OWN]) * change
-    # the bound is far more than the motion meets before it leaves the slow manifold, so that trial
-    # steps beyond keep their sense of direction
-    friction = spring - max(-a, min(resistance, a))
+    x, growing, slope = without_mass(spring, psis, p)
+    resistance = resisted(x, growing, p)
+    if weight(x, p) > LIGHT:
+        trailing = slope * resistance / p[A]
+        x, slower, share = pace(x - trailing, p)
+        shift = strength(spring - resistance, psis, p)[2]
+        loading = p[STIFFNESS] * (slower - 1.0) * share
+        changes = evolutions(x, psis, shift, share, p)
+        there = spring + AHEAD * loading, moved(psis, changes, AHEAD)
+        x_ahead, growing_ahead, slope_ahead = without_mass(there[0], there[1], p)
+        trailing_ahead = slope_ahead * resisted(x_ahead, growing_ahead, p) / p[A]
+        growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
+        resistance = resisted(x, growing - (trailing_ahead - trailing) / AHEAD, p)
+    friction = spring - resistance
     value, _slope, shift, _shift_slope = strength(friction, psis, p)
-    return (value - total(psis)) / a, friction, shift
+    return (value - total(psis)) / p[A], friction, shift
 
 
-def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-    """ln(V/V_*) and its growth, both quasi-static."""
+def resisted(x: float, growing: float, p: Numbers) -> float:
+    """The stress that accelerates the mass, over sigma_*: no more than a, which is far more than
+    the motion meets before it leaves the slow manifold, so that trial steps beyond keep their sense
+    of direction.
+    """
+    return max(-p[A], min(p[A] * weight(x, p) * growing, p[A]))
+
+
+def weight(x: float, p: Numbers) -> float:
+    """(K/a) w (w + w_0): how much ln V trails its quasi-static value per unit growth."""
+    norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
+    return p[STIFFNESS] / p[A] * norm * (norm + p[LOAD_VELOCITY] * p[OWN])
+
+
+def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    """ln(V/V_*) and its growth, both quasi-static, and the slope of strength."""
     a = p[A]
     value, slope, shift, _shift_slope = strength(spring, psis, p)
     x = (value - total(psis)) / a
     clamped, slower, share = pace(x, p)
     loading = p[STIFFNESS] * (slower - 1.0) * share
     changes = evolutions(clamped, psis, shift, share, p)
-    return x, (slope * loading - felt(changes, spring, psis, p)) / a
+    return x, (slope * loading - felt(changes, spring, psis, p)) / a, slope
+
+
+def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
+    """ln V on the slow manifold less its quasi-static value."""
+    return balance(spring, psis, p)[0] - without_mass(spring, psis, p)[0]
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
-    """The quasi-static one: mass does not act where ln V is at rest."""
-    return without_mass(state[0], state[1:], p)[1]
+    """The quasi-static one along the motion, and the change of what ln V differs by from its
+    quasi-static value: without that, slip would be fastest ``(K/a) w**2`` D_c too early.
+    """
+    spring, psis = state[0], state[1:]
+    slope = strength(spring, psis, p)[1]
+    quasi_static = (slope * rates[0] - felt(rates[1:], spring, psis, p)) / p[A]
+    if weight(x, p) <= LIGHT:
+        return quasi_static
+    aside = ASIDE * rates[0]
+    after = trailing(spring + aside, moved(psis, rates[1:], ASIDE), p)
+    before = trailing(spring - aside, moved(psis, rates[1:], -ASIDE), p)
+    return quasi_static + (after - before) / (2.0 * ASIDE)
 
 
 def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
