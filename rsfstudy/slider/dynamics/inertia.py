@@ -61,19 +61,29 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
     x, growing, slope = without_mass(spring, psis, p)
     resistance = resisted(x, growing, p)
     if weight(x, p) > LIGHT:
-        trailing = slope * resistance / p[A]
-        x, slower, share = pace(x - trailing, p)
-        shift = strength(spring - resistance, psis, p)[2]
-        loading = p[STIFFNESS] * (slower - 1.0) * share
-        changes = evolutions(x, psis, shift, share, p)
-        there = spring + AHEAD * loading, moved(psis, changes, AHEAD)
-        x_ahead, growing_ahead, slope_ahead = without_mass(there[0], there[1], p)
-        trailing_ahead = slope_ahead * resisted(x_ahead, growing_ahead, p) / p[A]
-        growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
-        resistance = resisted(x, growing - (trailing_ahead - trailing) / AHEAD, p)
+        resistance = resisted_by_trailing(spring, psis, x, slope, resistance, p)
     friction = spring - resistance
     value, _slope, shift, _shift_slope = strength(friction, psis, p)
     return (value - total(psis)) / p[A], friction, shift
+
+
+def resisted_by_trailing(
+    spring: float, psis: Numbers, x: float, slope: float, resistance: float, p: Numbers
+) -> float:
+    """The stress that accelerates the mass at the ln V that trails by what a first such stress
+    takes, whose own growth counts.
+    """
+    trails = slope * resistance / p[A]
+    slowed, slower, share = pace(x - trails, p)
+    shift = strength(spring - resistance, psis, p)[2]
+    loading = p[STIFFNESS] * (slower - 1.0) * share
+    changes = evolutions(slowed, psis, shift, share, p)
+    growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
+    x_ahead, growing_ahead, slope_ahead = without_mass(
+        spring + AHEAD * loading, moved(psis, changes, AHEAD), p
+    )
+    trails_ahead = slope_ahead * resisted(x_ahead, growing_ahead, p) / p[A]
+    return resisted(slowed, growing - (trails_ahead - trails) / AHEAD, p)
 
 
 def resisted(x: float, growing: float, p: Numbers) -> float:
