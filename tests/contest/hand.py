@@ -24,6 +24,7 @@ FLOATS = SimpleNamespace(
     expm1=lambda z: math.expm1(min(z, 700.0)),
     log=math.log,
     clamped=_clamped,
+    branches=True,
 )
 #: The same as functions that can be compiled.
 COMPILED = SimpleNamespace(
@@ -31,6 +32,7 @@ COMPILED = SimpleNamespace(
     expm1=lambda z: math.expm1(min(z, 700.0)),
     log=lambda z: math.log(z),
     clamped=lambda value, low, high: max(low, min(value, high)),
+    branches=True,
 )
 
 

@@ -24,6 +24,7 @@ from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
 
@@ -139,13 +140,14 @@ def _identity(function: Any) -> Any:
 
 
 def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _identity) -> Any:
-    """The equations of a law and a normal stress, in the functions of `m`, each made `ready`.
+    """The equations of a law and a normal stress, in the functions of `m`, each made `ready`; where
+    it `branches`, the slow manifold spares what mass does not show.
 
     ``slow(f, psi, p)`` gives the rates of both, and of time, over slip and load point displacement
     together; ``fast(f, x, g, p)`` the rates of all three in inertial time.
     """
     exp, log, expm1, clamped = (ready(of) for of in (m.exp, m.log, m.expm1, m.clamped))
-    is_slip = law == "slip"
+    is_slip, branches = law == "slip", getattr(m, "branches", False)
 
     @ready
     def strength(g: Any, p: Any) -> Any:
@@ -164,17 +166,37 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         return p[B] * expm1(-(theta / p[B] + x))
 
     @ready
-    def balance(f: Any, psi: Any, p: Any) -> Any:
-        value, slope, shift = strength(f, p)
-        x = (value - psi) / p[A]
+    def changes(x: Any, psi: Any, shift: Any, slope: Any, p: Any) -> Any:
         slower = exp(p[LOG_LOAD] - x)
         share = 1.0 / (1.0 + slower)
         loading = p[STIFFNESS] * (slower - 1.0) * share
-        change = (slope * loading - evolution(x, psi - shift, p) * share) / p[A]
+        evolving = evolution(x, psi - shift, p) * share
+        return loading, evolving, (slope * loading - evolving) / p[A]
+
+    @ready
+    def weight(x: Any, p: Any) -> Any:
         norm = exp(x + p[LOG_MASS])
-        resistance = p[STIFFNESS] * norm * (norm + p[LOAD] * p[MASS]) * change
-        g = f - clamped(resistance, -p[A], p[A])
-        value, slope, shift = strength(g, p)
+        return p[STIFFNESS] * norm * (norm + p[LOAD] * p[MASS])
+
+    @ready
+    def trailing(f: Any, psi: Any, p: Any) -> Any:
+        value, slope, shift = strength(f, p)
+        x = (value - psi) / p[A]
+        _loading, _evolving, growing = changes(x, psi, shift, slope, p)
+        resistance = clamped(weight(x, p) * growing, -p[A], p[A])
+        return x, slope, resistance, slope * resistance / p[A]
+
+    @ready
+    def balance(f: Any, psi: Any, p: Any) -> Any:
+        x, slope, resistance, trails = trailing(f, psi, p)
+        if not branches or weight(x, p) > LIGHT * p[A]:
+            _value, _slope, shift = strength(f - resistance, p)
+            loading, evolving, growing = changes(x - trails, psi, shift, slope, p)
+            ahead = trailing(f + AHEAD * loading, psi + AHEAD * evolving, p)[3]
+            growing = growing - (ahead - trails) / AHEAD
+            resistance = clamped(weight(x - trails, p) * growing, -p[A], p[A])
+        g = f - resistance
+        value, _slope, shift = strength(g, p)
         return (value - psi) / p[A], g, shift
 
     @ready

@@ -35,9 +35,9 @@ OWN = 0
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
-#: Weight (K/a) w (w + w_0) of mass below which its second order is nothing; and the displacement
-#: in D_c ahead over which the first order is differenced, and on either side over which all is.
-LIGHT, AHEAD, ASIDE = 1e-9, 1e-6, 3e-5
+#: Weight (K/a) w (w + w_0) of mass below which its second order is nothing, and the displacement
+#: in D_c over which the first is differenced.
+LIGHT, AHEAD = 1e-9, 1e-6
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
@@ -58,24 +58,20 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
     p : tuple of float
         T V_*/(2 pi D_c) at OWN, and its logarithm.
     """
-    x, growing, slope = without_mass(spring, psis, p)
-    resistance = resisted(x, growing, p)
-    if weight(x, p) > LIGHT:
-        resistance = resisted_by_trailing(spring, psis, x, slope, resistance, p)
-    friction = spring - resistance
+    friction = spring - resistance(spring, psis, p)
     value, _slope, shift, _shift_slope = strength(friction, psis, p)
     return (value - total(psis)) / p[A], friction, shift
 
 
-def resisted_by_trailing(
-    spring: float, psis: Numbers, x: float, slope: float, resistance: float, p: Numbers
-) -> float:
-    """The stress that accelerates the mass at the ln V that trails by what a first such stress
-    takes, whose own growth counts.
-    """
-    trails = slope * resistance / p[A]
+def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
+    """The stress that accelerates the mass, over sigma_*."""
+    x, growing, slope = without_mass(spring, psis, p)
+    first = resisted(x, growing, p)
+    if weight(x, p) <= LIGHT:
+        return first
+    trails = slope * first / p[A]
     slowed, slower, share = pace(x - trails, p)
-    shift = strength(spring - resistance, psis, p)[2]
+    shift = strength(spring - first, psis, p)[2]
     loading = p[STIFFNESS] * (slower - 1.0) * share
     changes = evolutions(slowed, psis, shift, share, p)
     growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
@@ -87,9 +83,8 @@ def resisted_by_trailing(
 
 
 def resisted(x: float, growing: float, p: Numbers) -> float:
-    """The stress that accelerates the mass, over sigma_*: no more than a, which is far more than
-    the motion meets before it leaves the slow manifold, so that trial steps beyond keep their sense
-    of direction.
+    """The same where ln V grows so: no more than a, which is far more than the motion meets before
+    it leaves the slow manifold, so that trial steps beyond keep their sense of direction.
     """
     return max(-p[A], min(p[A] * weight(x, p) * growing, p[A]))
 
@@ -112,8 +107,11 @@ def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float
 
 
 def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
-    """ln V on the slow manifold less its quasi-static value."""
-    return balance(spring, psis, p)[0] - without_mass(spring, psis, p)[0]
+    """ln V on the slow manifold less its quasi-static value; a difference of both would leave
+    rounding errors that show in its growth.
+    """
+    taken = resistance(spring, psis, p)
+    return -strength(spring - 0.5 * taken, psis, p)[1] * taken / p[A]
 
 
 def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
@@ -125,10 +123,8 @@ def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers
     quasi_static = (slope * rates[0] - felt(rates[1:], spring, psis, p)) / p[A]
     if weight(x, p) <= LIGHT:
         return quasi_static
-    aside = ASIDE * rates[0]
-    after = trailing(spring + aside, moved(psis, rates[1:], ASIDE), p)
-    before = trailing(spring - aside, moved(psis, rates[1:], -ASIDE), p)
-    return quasi_static + (after - before) / (2.0 * ASIDE)
+    ahead = trailing(spring + AHEAD * rates[0], moved(psis, rates[1:], AHEAD), p)
+    return quasi_static + (ahead - trailing(spring, psis, p)) / AHEAD
 
 
 def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
