@@ -124,6 +124,8 @@ def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
 
 #: What the equations of any scene call.
 ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
+#: What mass adds.
+OF_MASS = {"resistance", "resisted", "weight", "without_mass", "moved", "felt"}
 
 
 @pytest.mark.parametrize(
@@ -133,7 +135,7 @@ ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
         ({"alpha": 0.0}, {"normal_stress", "coefficient"}),
         ({}, {"normal_stress", "coefficient", "state_effect"}),
         ({"normal_stress": "constant", "radiation_damping": 0.1}, set()),
-        ({"normal_stress": "constant", "inertia": True}, {"without_mass", "felt"}),
+        ({"normal_stress": "constant", "inertia": True}, OF_MASS),
     ],
 )
 def test_an_absent_effect_is_out_of_reach(fields, more):

@@ -31,7 +31,7 @@ from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.regimes import check_start
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider import steady
+from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import Dilatant
@@ -86,7 +86,7 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     weakening = (0.76 + (a - b) * log_rate) * scene.dilatancy
     assume(weakening < 0.95 * (b - a))
     exact = closed_form(a, b, weakening, drainage * math.exp(-log_rate))
-    ours = steady.critical_stiffness(scene, log_rate)
+    ours = stability.critical_stiffness(scene, log_rate)
     # slopes of the law are differences of order eight, and roots of polynomials lose digits where
     # drainage is many times faster or slower than slip: up to c = 1.5e6 here
     assert ours == pytest.approx(exact, rel=1e-9)
@@ -121,12 +121,12 @@ def test_growth_rates_are_those_of_the_assembled_equations(
     """
     load = math.exp(log_rate)
     scene = dilatant(0.004, drainage, law=law, load_velocity_ratio=load, **stress, **dynamics)
-    scene = scene.with_(stiffness=0.9 * steady.critical_stiffness(scene, log_rate))
+    scene = scene.with_(stiffness=0.9 * stability.critical_stiffness(scene, log_rate))
     found = steady.steady_sliding(scene, log_rate)
     equations = between_ruptures(scene, clock=False)
     at = (found.spring, *found.psis)
     assert np.abs(equations.rates(at)).max() < 1e-13
-    theirs, ours = eigenvalues(equations, at), 0.5 * steady.growth_rates(scene, log_rate)
+    theirs, ours = eigenvalues(equations, at), 0.5 * stability.growth_rates(scene, log_rate)
     assert len(ours) == len(theirs) == 4
     assert ours[0].real > 0.0
     # pore pressure may drain twenty times as fast as states evolve: differences have its digits
@@ -140,7 +140,7 @@ def test_growth_rates_with_mass_are_those_of_the_full_equations(stress):
     scene = dilatant(inertia=True, period=1e8, stiffness_ratio=0.9, **stress)
     found = steady.steady_sliding(scene, 0.0)
     theirs = eigenvalues(in_rupture(scene), (found.spring, 0.0, found.friction, *found.psis[1:]))
-    ours = scene.inertial_time * steady.growth_rates(scene, 0.0)
+    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
 
 
@@ -151,7 +151,7 @@ def test_small_oscillations_grow_as_linear_theory_says(law, stress, dynamics):
     """From one maximum of ln V to the next by exp(2 pi Re p/Im p)."""
     scene = dilatant(law=law, stiffness_ratio=0.95, load_velocity_ratio=1.0 + 1e-7, **stress)
     scene, meter = scene.with_(**dynamics), Meter(100_000)
-    rates = steady.growth_rates(scene, scene.log_load_rate)
+    rates = stability.growth_rates(scene, scene.log_load_rate)
     turning = next(rate for rate in rates if rate.imag)
     expected = math.exp(2.0 * math.pi * turning.real / abs(turning.imag))
     heights = [
@@ -428,8 +428,8 @@ def test_several_states_and_a_fluid():
     one, two = dilatant(**fields), dilatant(law=TwoSlipStates, **fields)
     assert (one.states, two.states) == (3, 4)
     assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-9)
-    rates = steady.growth_rates(two, 0.7)
-    for rate in steady.growth_rates(one, 0.7):
+    rates = stability.growth_rates(two, 0.7)
+    for rate in stability.growth_rates(one, 0.7):
         assert np.abs(rates - rate).min() < 1e-6 * abs(rate)
     ends = [float(simulate(scene, duration=10.0)["shear_stress"][-1]) for scene in (one, two)]
     assert ends[1] == pytest.approx(ends[0], abs=1e-7)
@@ -504,7 +504,7 @@ def test_a_fluid_of_your_own(law):
     """
     scene = Scene(law=law, fluid=Tight, opening=0.004, **CONSTANT)
     assert scene.critical_stiffness == pytest.approx(0.0145 - 0.76 * 0.004, rel=1e-11)
-    assert np.abs(steady.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
+    assert np.abs(stability.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
     slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
     np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
 

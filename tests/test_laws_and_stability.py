@@ -14,7 +14,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider import steady
+from rsfstudy.slider import stability, steady
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.status import Status
 
@@ -46,7 +46,7 @@ def test_critical_stiffness_of_cut_offs(log_rate, log_cutoff, b_over_a):
         cutoff = math.exp(log_cutoff)
         scene = Scene(law=law, cutoff_velocity_ratio=cutoff, b_over_a=b_over_a, stiffness=1.0,
                       **CONSTANT)  # fmt: skip
-        ours = steady.critical_stiffness(scene, log_rate)
+        ours = stability.critical_stiffness(scene, log_rate)
         exact = max(formula(scene, log_rate), 0.0)
         assert ours == pytest.approx(exact, abs=1e-8 * scene.b)
 
@@ -62,7 +62,7 @@ def test_published_critical_stiffnesses():
     assert scene.critical_stiffness / weakening == pytest.approx(2.1138582, abs=6e-8)
     scene = Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=8.0, **CONSTANT)
     for log_rate, weakens in ((math.log(3.99), True), (math.log(4.01), False)):
-        assert (steady.critical_stiffness(scene, log_rate) > 0.0) is weakens
+        assert (stability.critical_stiffness(scene, log_rate) > 0.0) is weakens
 
 
 def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
@@ -158,7 +158,7 @@ def test_steps_up_to_a_rate_at_which_sliding_is_less_stable():
     to large ones finds too.
     """
     scene = Scene(law="composite", b_over_a=1.2, stiffness_ratio=1.2, **CONSTANT)
-    tops = [steady.critical_stiffness(scene, x) for x in (0.0, math.log(100.0), math.log(1e5))]
+    tops = [stability.critical_stiffness(scene, x) for x in (0.0, math.log(100.0), math.log(1e5))]
     assert tops[0] < scene.stiffness < tops[1]
     assert tops[2] < scene.stiffness
     measure, accuracy = CriticalStep(), Accuracy(1e-5)
@@ -191,7 +191,7 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     """
     small = {"load_velocity_ratio": 1.0, "displacement_step": 1e-5}
     scene = Scene(stiffness_ratio=ratio, **{**small, **fields})
-    fastest = steady.growth_rates(scene, 0.0)[0]
+    fastest = stability.growth_rates(scene, 0.0)[0]
     peaks = []
     for event in follow(scene, Accuracy(1e-9), Meter(10**6), [maximum("log_rate")], clock=True):
         if event.kind is Kind.MAXIMUM:

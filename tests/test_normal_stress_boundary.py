@@ -21,7 +21,7 @@ from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider import closed_forms, steady
+from rsfstudy.slider import closed_forms, stability, steady
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.status import Status
 
@@ -277,7 +277,7 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
     assert orbits_may_close(scene)
     assert not friction_acts_alone(Scene(alpha=0.5))
     stepped = scene.with_(normal_stress_step=0.25, stiffness_ratio=1.25)
-    after = steady.critical_stiffness(stepped, stepped.log_load_rate)
+    after = stability.critical_stiffness(stepped, stepped.log_load_rate)
     assert after == pytest.approx(1.25 * scene.critical_stiffness, rel=1e-9)
     law = {"law": "perrin_rice_zheng"}
     assert neutral(stepped.with_(**law), 1e-6)

@@ -13,7 +13,7 @@ from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.slider.steady import response_to_normal_stress
+from rsfstudy.slider.stability import response_to_normal_stress
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")

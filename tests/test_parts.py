@@ -12,7 +12,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import fields, laws, steady
+from rsfstudy.slider import fields, laws, stability, steady
 from rsfstudy.slider.equations import evolution_of, relation_of
 from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.slots import FIRST_OWN
@@ -109,7 +109,7 @@ def test_slopes_of_a_law_at_steady_sliding():
         scene = Scene(law=law)
         for log_rate in (-5.0, 0.0, 3.0):
             assert evolution_of(scene)(log_rate, -scene.b * log_rate) == pytest.approx(0, abs=1e-15)
-            slopes = steady.slopes_of_law(scene, steady.steady_sliding(scene, log_rate))
+            slopes = stability.slopes_of_law(scene, steady.steady_sliding(scene, log_rate))
             assert np.ravel(slopes[0]) == pytest.approx(-scene.b, rel=1e-12)
             assert np.ravel(slopes[1]) == pytest.approx(1.0, rel=1e-12)
             assert np.ravel(slopes[2]) == pytest.approx(-1.0, rel=1e-12)

@@ -14,7 +14,7 @@ from rsfstudy.measures.limit_cycle import Approach, LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider.steady import growth_rates
+from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 #: Slow oscillations of two slip states, started close to where they end (Gu et al. 1984).

@@ -17,7 +17,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum, settling
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider.steady import growth_rates
+from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}

@@ -13,7 +13,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import steady
+from rsfstudy.slider import stability
 from rsfstudy.slider.equations import relation_of
 from rsfstudy.status import Status
 
@@ -141,4 +141,6 @@ def test_steady_friction_stays_positive(stress, load):
     if stress == CONSTANT:
         # weakening of the arcsinh form: a factor tanh(mu_ss/a)
         weakens = (scene.b - scene.a) * math.tanh(exact / scene.a)
-        assert steady.critical_stiffness(scene, math.log(load)) == pytest.approx(weakens, rel=1e-9)
+        assert stability.critical_stiffness(scene, math.log(load)) == pytest.approx(
+            weakens, rel=1e-9
+        )

@@ -14,7 +14,7 @@ from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import laws, steady
+from rsfstudy.slider import laws, stability, steady
 from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.laws.slowness import SlownessLaw
@@ -139,8 +139,8 @@ def test_the_equations_add_up(law, fields):
 def test_critical_stiffness_and_growth(law, fields, inertia):
     one, two = both(law, inertia=inertia, stiffness=0.02, load_velocity_ratio=2.0, **fields)
     assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-11)
-    rates = steady.growth_rates(two, 0.7)
-    for rate in steady.growth_rates(one, 0.7):
+    rates = stability.growth_rates(two, 0.7)
+    for rate in stability.growth_rates(one, 0.7):
         assert np.abs(rates - rate).min() < 1e-7 * abs(rate)
     agree(LinearStability(), one.with_(stiffness_ratio=1.0), two.with_(stiffness_ratio=1.0))
 

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.slider import closed_forms, laws, steady
+from rsfstudy.slider import closed_forms, laws, stability, steady
 from rsfstudy.slider.equations import between_ruptures, in_rupture, normal_stress_at
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
@@ -39,7 +39,7 @@ def test_critical_stiffness_is_eq_7_and_eq_8(log_rate, phi, alpha, law):
     )
     assert explicit == pytest.approx(closed, rel=1e-12)
     # digits are lost where normal stress grows or vanishes, and in the arguments of the law
-    ours = steady.critical_stiffness(scene, log_rate)
+    ours = stability.critical_stiffness(scene, log_rate)
     assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_rate)))
 
 
@@ -47,7 +47,7 @@ def test_critical_stiffness_is_eq_7_and_eq_8(log_rate, phi, alpha, law):
 def test_constant_normal_stress_has_b_minus_a(law):
     scene = Scene(law=law, normal_stress="constant")
     for log_rate in (-20.0, 0.0, 5.0):
-        critical = steady.critical_stiffness(scene, log_rate)
+        critical = stability.critical_stiffness(scene, log_rate)
         assert critical == pytest.approx(scene.b - scene.a, rel=1e-12)
 
 
@@ -62,7 +62,7 @@ def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_rate, phi, alpha, l
     cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
     q = eq_7(scene, log_rate) * (1.0 - mu_ss * cot) * 10.0 ** (2.0 * log_norm) / (scene.a * sigma)
-    ours = steady.critical_stiffness(scene, log_rate)
+    ours = stability.critical_stiffness(scene, log_rate)
     if q < 0.99:
         assert ours == pytest.approx(eq_7(scene, log_rate) / (1.0 - q), rel=1e-11 / (1.0 - q))
     elif q > 1.01:
@@ -80,7 +80,7 @@ def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_rate, phi, alp
     share = (1.0 - mu_ss * cot) / (1.0 - mu_ss * cot + alpha * cot)
     undamped = eq_7(scene, log_rate)
     damped = undamped - damping * math.exp(log_rate) * share
-    ours = steady.critical_stiffness(scene, log_rate)
+    ours = stability.critical_stiffness(scene, log_rate)
     assert ours == pytest.approx(max(damped, 0.0), abs=1e-11 * undamped)
 
 
@@ -102,9 +102,9 @@ def test_no_steady_state_below_the_slowest_rate():
     assert mu_ss * cot_phi(scene) == pytest.approx(1.0, rel=1e-9)
     assert steady.steady_sliding(scene, slowest + 1e-6) is not None
     assert steady.steady_sliding(scene, slowest - 1e-6) is None
-    assert math.isnan(steady.critical_stiffness(scene, slowest - 1.0))
+    assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
     with pytest.raises(ValueError, match="no steady sliding"):
-        steady.growth_rates(scene, slowest - 1.0)
+        stability.growth_rates(scene, slowest - 1.0)
     assert steady.slowest_steady(Scene(normal_stress="constant")) == -math.inf
 
 
@@ -112,7 +112,7 @@ def test_faster_sliding_stabilises():
     """C2: a stiffness that is critical at V_* is above critical at any larger V."""
     scene = Scene()
     for log_rate in (0.5, 2.0, 8.0):
-        assert steady.critical_stiffness(scene, log_rate) < scene.critical_stiffness
+        assert stability.critical_stiffness(scene, log_rate) < scene.critical_stiffness
 
 
 def eigenvalues(equations, state) -> np.ndarray:
@@ -147,7 +147,7 @@ def test_growth_rates_are_those_of_the_assembled_equations(law, effects, log_rat
     equations = between_ruptures(scene, clock=False)
     assert np.abs(equations.rates((found.spring, *found.psis))).max() < 1e-13
     theirs = eigenvalues(equations, (found.spring, *found.psis))
-    ours = 0.5 * steady.growth_rates(scene, log_rate)
+    ours = 0.5 * stability.growth_rates(scene, log_rate)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-7)
 
 
@@ -156,7 +156,7 @@ def test_growth_rates_with_mass_are_those_of_the_full_equations():
     scene = Scene(inertia=True, period=1e8, stiffness_ratio=0.9)
     found = steady.steady_sliding(scene, 0.0)
     theirs = eigenvalues(in_rupture(scene), (found.spring, 0.0, found.friction))
-    ours = scene.inertial_time * steady.growth_rates(scene, 0.0)
+    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
 
 
@@ -164,9 +164,11 @@ def test_growth_rates_with_mass_are_those_of_the_full_equations():
 def test_growth_vanishes_at_critical_stiffness(effects):
     scene = Scene(load_velocity_ratio=2.0, period=1e6, **effects)
     log_rate = scene.log_load_rate
-    critical = steady.critical_stiffness(scene, log_rate) / scene.critical_stiffness
+    critical = stability.critical_stiffness(scene, log_rate) / scene.critical_stiffness
     for off, grows in ((-1e-6, True), (1e-6, False)):
-        rates = steady.growth_rates(scene.with_(stiffness_ratio=critical * (1.0 + off)), log_rate)
+        rates = stability.growth_rates(
+            scene.with_(stiffness_ratio=critical * (1.0 + off)), log_rate
+        )
         assert bool(rates[0].real > 0.0) is grows
         assert abs(rates[0].real) < 1e-5
 
@@ -175,6 +177,6 @@ def test_growth_vanishes_at_critical_stiffness(effects):
 def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
     """But for its own root, 1e9 to 1e24 of the others, they are those without it."""
     scene = Scene(law="slip", fluid="dilatant", drainage=1e-3, dilatancy=1e-3, stiffness=0.003)
-    heavy = steady.growth_rates(scene.with_(inertia=True, period=period), 0.0)
+    heavy = stability.growth_rates(scene.with_(inertia=True, period=period), 0.0)
     assert heavy[-1].real < -1e9
-    np.testing.assert_allclose(heavy[:-1].real, steady.growth_rates(scene, 0.0).real, rtol=1e-8)
+    np.testing.assert_allclose(heavy[:-1].real, stability.growth_rates(scene, 0.0).real, rtol=1e-8)

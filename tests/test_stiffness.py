@@ -13,7 +13,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import steady
+from rsfstudy.slider import stability, steady
 from rsfstudy.status import Status
 
 STRENGTHENING = {"b_over_a": 0.8, "stiffness": 0.05}
@@ -73,7 +73,7 @@ def test_without_rate_weakening_stiffness_is_given_by_itself():
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
 def test_without_rate_weakening_nothing_grows(law, b_over_a, effects):
     scene = Scene(law=law, b_over_a=b_over_a, stiffness=0.05, load_velocity_ratio=3.0, **effects)
-    assert steady.growth_rates(scene, scene.log_load_rate)[0].real < 0.0
+    assert stability.growth_rates(scene, scene.log_load_rate)[0].real < 0.0
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.STABLE_AT_ANY_STIFFNESS
     assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE

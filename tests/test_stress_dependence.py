@@ -16,7 +16,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import assembly, laws, steady
+from rsfstudy.slider import assembly, laws, stability
 from rsfstudy.slider.equations import relation_of
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.normal_stress import NormalStress
@@ -100,8 +100,8 @@ def test_critical_stiffness_is_that_over_one_plus_c(law, c):
     """At constant normal stress; steady friction is as it was."""
     scene = Scene(law=law, **CONSTANT)
     for log_rate in (-5.0, 0.0, 2.0):
-        ours = steady.critical_stiffness(scene.with_(stress_dependence=c), log_rate)
-        usual = steady.critical_stiffness(scene, log_rate)
+        ours = stability.critical_stiffness(scene.with_(stress_dependence=c), log_rate)
+        usual = stability.critical_stiffness(scene, log_rate)
         assert ours == pytest.approx(usual / (1.0 + c), rel=1e-11)
 
 
@@ -112,7 +112,7 @@ def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_rate,
     cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
     exact = (scene.b - scene.a) * sigma / (1.0 + c - cot * (mu_ss - alpha))
-    assert steady.critical_stiffness(scene, log_rate) == pytest.approx(exact, rel=1e-11)
+    assert stability.critical_stiffness(scene, log_rate) == pytest.approx(exact, rel=1e-11)
 
 
 def equivalent(scene: Scene) -> Scene:
@@ -137,7 +137,7 @@ def equivalent(scene: Scene) -> Scene:
 def test_small_steps_look_like_another_slider_without_it(law, c, ratio):
     """Growth rates per D_c are those per (1 + c) D_c, over 1 + c."""
     scene = Scene(law=law, stress_dependence=c, stiffness_ratio=ratio, **CONSTANT)
-    ours, theirs = (steady.growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
+    ours, theirs = (stability.growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
     assert (1.0 + c) * ours == pytest.approx(theirs, rel=1e-10)
 
 

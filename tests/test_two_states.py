@@ -23,7 +23,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider import laws, steady
+from rsfstudy.slider import laws, stability
 from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
 from rsfstudy.slider.parts import number
 from rsfstudy.status import Status
@@ -103,7 +103,7 @@ def test_two_of_one_length_are_one(law, stress):
 def test_motions_decay_as_eigenvalues_say(law, fields, numbers):
     """Peaks of a small oscillation: their intervals, and by how much they shrink."""
     scene = Scene(law=law, stiffness_ratio=1.05, displacement_step=1e-6, **numbers, **fields)
-    (fastest, *_) = steady.growth_rates(scene.with_(load_velocity_ratio=1.0), 0.0)
+    (fastest, *_) = stability.growth_rates(scene.with_(load_velocity_ratio=1.0), 0.0)
     times, heights = [], []
     small = scene.with_(load_velocity_ratio=1.0)
     for event in follow(small, Accuracy(1e-9), Meter(300_000), (maximum("log_rate"),), clock=True):
@@ -219,7 +219,7 @@ def test_what_grows_at_every_stiffness_is_not_called_stable(mass):
     fields = {"b1_over_a": 2.7, "b2_over_a": -1.4, "length_ratio": 60.0, "stress_dependence": 2.0}
     scene = Scene(law=Unbounded, stiffness=0.02, **fields, **mass)
     for stiffness in (1e-3, 0.1, 10.0):
-        assert steady.growth_rates(scene.with_(stiffness=stiffness), 0.0)[0].real > 1e-3
+        assert stability.growth_rates(scene.with_(stiffness=stiffness), 0.0)[0].real > 1e-3
     assert scene.critical_stiffness == math.inf
     assert scene.stiffness_ratio == 0.0
     assert LinearStability()(scene, Accuracy()).status is Status.UNSTABLE_AT_ANY_STIFFNESS
@@ -234,11 +234,11 @@ WINDOW = {"b1_over_a": 1.136, "b2_over_a": -0.5, "length_ratio": 10.0, **CONSTAN
 @pytest.mark.parametrize("mass", [{}, {"inertia": True}, {"radiation_damping": 1e-9}])
 def test_growth_confirms_a_threshold_close_to_another(mass):
     scene = Scene(law="two_slip_states", stiffness=0.01, **WINDOW, **mass)
-    first, second = steady.critical_stiffnesses(scene, 0.0)
+    first, second = stability.critical_stiffnesses(scene, 0.0)
     assert 0.5 * second < first < second
     assert second == pytest.approx(scene.critical_stiffness, rel=1e-4)
     for stiffness, grows in ((0.9 * first, False), (1.1 * first, True), (1.1 * second, False)):
-        rates = steady.growth_rates(scene.with_(stiffness=stiffness), 0.0)
+        rates = stability.growth_rates(scene.with_(stiffness=stiffness), 0.0)
         assert bool(rates[0].real > 0.0) is grows
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.OK

@@ -12,7 +12,7 @@ from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
 from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider import steady
+from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
@@ -323,7 +323,7 @@ def _steady(scene: Scene) -> _Steady:
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
-    critical = steady.critical_stiffness(scene, load)
+    critical = stability.critical_stiffness(scene, load)
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
     if margin < -_NEUTRAL and scene.states > 1 and _decays(scene):
         margin = -margin
@@ -334,4 +334,4 @@ def _decays(scene: Scene) -> bool:
     """Whether small changes of steady sliding decay, which those of several states may do below the
     critical stiffness.
     """
-    return bool(steady.growth_rates(scene, scene.log_load_rate)[0].real < -_NEUTRAL)
+    return bool(stability.growth_rates(scene, scene.log_load_rate)[0].real < -_NEUTRAL)

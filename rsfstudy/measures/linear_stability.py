@@ -18,13 +18,8 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import (
-    Steady,
-    critical_stiffness,
-    critical_stiffnesses,
-    steady_excess,
-    steady_sliding,
-)
+from rsfstudy.slider.stability import critical_stiffness, critical_stiffnesses
+from rsfstudy.slider.steady import Steady, steady_excess, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation

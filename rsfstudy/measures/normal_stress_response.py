@@ -21,7 +21,8 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading.oscillation import Oscillation
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import growth_rates, response_to_normal_stress, steady_sliding
+from rsfstudy.slider.stability import growth_rates, response_to_normal_stress
+from rsfstudy.slider.steady import steady_sliding
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for that is left of the transient where the record begins, by the

@@ -13,7 +13,8 @@ from matplotlib.axes import Axes
 from rsfstudy.plots._phase_plane import LN10, scene_of
 from rsfstudy.plots._style import legend, look, marker
 from rsfstudy.plots._text import number, pretty
-from rsfstudy.slider.steady import critical_stiffness, slowest_steady
+from rsfstudy.slider.stability import critical_stiffness
+from rsfstudy.slider.steady import slowest_steady
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.

@@ -16,7 +16,7 @@ from rsfstudy.plots._phase_plane import scene_of
 from rsfstudy.plots._style import legend, look, marker
 from rsfstudy.plots._text import number as written
 from rsfstudy.plots._text import stiffness
-from rsfstudy.slider.steady import response_to_normal_stress
+from rsfstudy.slider.stability import response_to_normal_stress
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.

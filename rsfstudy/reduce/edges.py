@@ -14,7 +14,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
 from rsfstudy.slider.fields import FIELDS, KINDS, SLOT_NAMES, without_meaning
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import critical_stiffness
+from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
 _STIFFNESS = "stiffness_ratio"

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import FrozenInstanceError
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Never, NoReturn
+from typing import Any, Never, NoReturn
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import assembly, dynamics, fluid, laws, loading, normal_stress, steady
+from rsfstudy.slider import assembly, loading, stability
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fields import (
     SLOT_NAMES,
@@ -22,23 +21,13 @@ from rsfstudy.slider.fields import (
     unnamed,
     without_meaning,
 )
+from rsfstudy.slider.following import Following, Parts
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import SPRING, with_spring
 from rsfstudy.slider.parts import Numbers, Part, checked, copier
-from rsfstudy.slider.shown import Shown
 
 
-class Parts(NamedTuple):
-    """What fills the slots of a scene."""
-
-    law: laws.LawOfStates
-    normal_stress: normal_stress.NormalStress
-    fluid: fluid.Fluid
-    dynamics: dynamics.Dynamics
-    loading: loading.Loading
-
-
-class Scene(Shown):
+class Scene(Following):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -142,19 +131,8 @@ class Scene(Shown):
         For a value that is wrong or means nothing, with the rule it breaks and the remedy.
     """
 
-    parts: Parts
     _slider: Part
     _layout: Layout
-    if TYPE_CHECKING:
-        a: float
-        mu_star: float
-        period: float
-        reference_rate: float
-        instability_norm: float
-        initial_stress: float
-        initial_state: float
-
-        def __getattr__(self, name: str) -> Any: ...
 
     def __init__(self, *nameless: Never, **given: Any) -> None:
         if nameless:
@@ -213,62 +191,24 @@ class Scene(Shown):
         """The law, the numbers that every slider has, and the other parts."""
         return self.parts.law, self._slider, *self.parts[1:]
 
-    # ---- what follows from the parameters -------------------------------------------------------
-
-    @property
-    def dynamics(self) -> dynamics.Dynamics:
-        """What balances the spring besides friction."""
-        return self.parts.dynamics
-
-    @property
-    def pressing(self) -> fluid.Fluid | loading.Loading:
-        """What has the unknowns of which the last takes from normal stress, if any has."""
-        return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
-
-    @property
-    def has_mass(self) -> bool:
-        """Whether mass acts in ruptures."""
-        return self.parts.dynamics.rupture_rate is not None
-
     def without_mass(self) -> Scene:
         """The same slider in quasi-static motion, if it has mass."""
         if not self.has_mass:
             return self
         return self._with_parts(self.parts._replace(dynamics=QuasiStatic()))
 
-    @property
-    def states(self) -> int:
-        """How many states there are: those of the law, and the unknowns of the fluid, or of a
-        loading that goes on changing normal stress.
-        """
-        return self.parts.law.states + len(self.pressing.unknowns)
-
-    @property
-    def b(self) -> float:
-        """Evolution effect parameter, of all states together."""
-        return float(self.a * self.parts.law.b_over_a)
-
     @cached_property
     def critical_stiffness(self) -> float:
         """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
-        (see `steady.critical_stiffness`).
+        (see `stability.critical_stiffness`).
         """
         before = self._with_parts(self.parts._replace(loading=Step())) if self._is_changed else self
-        return steady.critical_stiffness(before, 0.0, quasi_static=True)
+        return stability.critical_stiffness(before, 0.0, quasi_static=True)
 
     @property
     def _is_changed(self) -> bool:
         """Whether friction is another than before the loading."""
         return self.imposed_normal_stress != 0.0 or bool(self.parts.loading.unknowns)
-
-    @property
-    def unforced(self) -> Scene:
-        """The same slider under a load point that moves steadily, where its loading goes on
-        changing normal stress: what steady sliding and its stability are asked of.
-        """
-        if not self.parts.loading.unknowns:
-            return self
-        return self.under(loading.Segment(self.load_velocity))
 
     @cached_property
     def made(self) -> dict[tuple[Any, ...], Any]:
@@ -291,58 +231,13 @@ class Scene(Shown):
         return assembly.functions(self)
 
     @property
-    def stiffness(self) -> float:
-        """K = k D_c/sigma_*."""
-        given = self.__dict__["stiffness"]
-        return float(given) if given is not None else self._relative_stiffness
-
-    @cached_property
-    def _relative_stiffness(self) -> float:
-        ratio = self.__dict__["stiffness_ratio"]
-        if not 0.0 < self.critical_stiffness < math.inf:
-            rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
-            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
-        return float(ratio * self.critical_stiffness)
-
-    @property
-    def stiffness_ratio(self) -> float:
-        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough. One below 1
-        need not be unstable with several states, which may be so between two stiffnesses only.
+    def unforced(self) -> Scene:
+        """The same slider under a load point that moves steadily, where its loading goes on
+        changing normal stress: what steady sliding and its stability are asked of.
         """
-        given = self.__dict__["stiffness_ratio"]
-        if given is not None:
-            return float(given)
-        return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
-
-    @cached_property
-    def load_velocity(self) -> float:
-        """V_0/V_* after the last step."""
-        return self.parts.loading.segments[-1].load_velocity
-
-    @cached_property
-    def log_load_rate(self) -> float:
-        """ln(V_0/V_*), and -inf for a load point at rest."""
-        return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
-
-    @cached_property
-    def imposed_normal_stress(self) -> float:
-        """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
-        return self.parts.loading.segments[-1].normal_stress
-
-    @property
-    def is_disturbed(self) -> bool:
-        """Whether it does anything but slide on steadily at V_*."""
-        return self.begins_elsewhere or self.parts.loading.is_a_step
-
-    @property
-    def begins_elsewhere(self) -> bool:
-        """Whether it begins with other stress or state than those of steady sliding at V_*."""
-        return bool(self.initial_stress or self.initial_state)
-
-    @property
-    def spring_stress_step(self) -> float:
-        """Change of spring stress over sigma_* by the first displacement step, K d."""
-        return self.stiffness * self.parts.loading.segments[0].displacement
+        if not self.parts.loading.unknowns:
+            return self
+        return self.under(loading.Segment(self.load_velocity))
 
     @property
     def segments(self) -> tuple[tuple[Scene, float], ...]:
@@ -372,24 +267,6 @@ class Scene(Shown):
         scene = Scene.__new__(Scene)
         scene._fill(layout_of(tuple(type(part) for part in parts)), [self._slider, *parts])
         return scene
-
-    @cached_property
-    def inertial_time(self) -> float:
-        """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
-
-        Slip rate in V_* times this number is what the instability norm is compared with.
-        """
-        return self.period * self.reference_rate / (2.0 * math.pi)
-
-    @property
-    def log_norm_rate(self) -> float:
-        """ln(V/V_*) at which the instability norm is reached."""
-        return math.log(self.instability_norm / self.inertial_time)
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects that act in this scene."""
-        return tuple(effect for part in self.parts for effect in part.effects)
 
     def with_(self, **changes: Any) -> Scene:
         """A copy with some fields changed, checked anew.
