@@ -35,9 +35,9 @@ OWN = 0
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
-#: Weight (K/a) w (w + w_0) of mass below which its second order is nothing, and the displacement
-#: in D_c over which the first is differenced.
-LIGHT, AHEAD = 1e-9, 1e-6
+#: Weights (K/a) w (w + w_0) of mass below which its second order is nothing, and below which even
+#: the growth of the first is; and the displacement in D_c over which growth is differenced.
+LIGHT, LIGHTER, AHEAD = 1e-7, 1e-9, 1e-6
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
@@ -121,7 +121,7 @@ def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers
     spring, psis = state[0], state[1:]
     slope = strength(spring, psis, p)[1]
     quasi_static = (slope * rates[0] - felt(rates[1:], spring, psis, p)) / p[A]
-    if weight(x, p) <= LIGHT:
+    if weight(x, p) <= LIGHTER:
         return quasi_static
     ahead = trailing(spring + AHEAD * rates[0], moved(psis, rates[1:], AHEAD), p)
     return quasi_static + (ahead - trailing(spring, psis, p)) / AHEAD
