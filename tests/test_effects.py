@@ -125,7 +125,7 @@ def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
 #: What the equations of any scene call.
 ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
 #: What mass adds.
-OF_MASS = {"resistance", "resisted", "weight", "without_mass", "moved", "felt"}
+OF_MASS = {"resistance", "resisted", "weight_at", "without_mass", "moved", "felt"}
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,8 @@ def origin(part: type[Part]) -> tuple[str, str]:
 def _of_every_scene() -> set[str]:
     from rsfstudy.slider.scene import Scene  # which is made of parts itself
 
-    return {*dir(Scene), *Scene.__annotations__}
+    stated = (getattr(kind, "__annotations__", {}) for kind in Scene.__mro__)
+    return {*dir(Scene), *(name for names in stated for name in names)}
 
 
 def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]) -> None:

@@ -38,6 +38,8 @@ LARGEST_RATE = 1e30
 #: Weights (K/a) w (w + w_0) of mass below which its second order is nothing, and below which even
 #: the growth of the first is; and the displacement in D_c over which growth is differenced.
 LIGHT, LIGHTER, AHEAD = 1e-7, 1e-9, 1e-6
+#: V_0/V below which it says nothing of the slip rate: trial steps, and load points at rest.
+LEAST = 1e-60
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
@@ -65,9 +67,9 @@ def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, flo
 
 def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
     """The stress that accelerates the mass, over sigma_*."""
-    x, growing, slope = without_mass(spring, psis, p)
-    first = resisted(x, growing, p)
-    if weight(x, p) <= LIGHT:
+    x, growing, slope, weight = without_mass(spring, psis, p)
+    first = resisted(weight, growing, p)
+    if weight <= LIGHT:
         return first
     trails = slope * first / p[A]
     slowed, slower, share = pace(x - trails, p)
@@ -75,35 +77,41 @@ def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
     loading = p[STIFFNESS] * (slower - 1.0) * share
     changes = evolutions(slowed, psis, shift, share, p)
     growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
-    x_ahead, growing_ahead, slope_ahead = without_mass(
+    _x, growing_ahead, slope_ahead, weight_ahead = without_mass(
         spring + AHEAD * loading, moved(psis, changes, AHEAD), p
     )
-    trails_ahead = slope_ahead * resisted(x_ahead, growing_ahead, p) / p[A]
-    return resisted(slowed, growing - (trails_ahead - trails) / AHEAD, p)
+    trails_ahead = slope_ahead * resisted(weight_ahead, growing_ahead, p) / p[A]
+    return resisted(weight_at(slowed, slower, p), growing - (trails_ahead - trails) / AHEAD, p)
 
 
-def resisted(x: float, growing: float, p: Numbers) -> float:
+def resisted(weight: float, growing: float, p: Numbers) -> float:
     """The same where ln V grows so: no more than a, which is far more than the motion meets before
     it leaves the slow manifold, so that trial steps beyond keep their sense of direction.
     """
-    return max(-p[A], min(p[A] * weight(x, p) * growing, p[A]))
+    return max(-p[A], min(p[A] * weight * growing, p[A]))
 
 
-def weight(x: float, p: Numbers) -> float:
-    """(K/a) w (w + w_0): how much ln V trails its quasi-static value per unit growth."""
-    norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
-    return p[STIFFNESS] / p[A] * norm * (norm + p[LOAD_VELOCITY] * p[OWN])
+def weight_at(x: float, slower: float, p: Numbers) -> float:
+    """(K/a) w (w + w_0): how much ln V trails its quasi-static value per unit growth. Of the
+    exponentials, that of V_0/V serves where there is one.
+    """
+    load = p[LOAD_VELOCITY] * p[OWN]
+    norm = load / slower if slower > LEAST else math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4))
+    return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
-def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-    """ln(V/V_*) and its growth, both quasi-static, and the slope of strength."""
+def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+    """ln(V/V_*) and its growth, both quasi-static, the slope of strength, and the weight of mass
+    there.
+    """
     a = p[A]
     value, slope, shift, _shift_slope = strength(spring, psis, p)
     x = (value - total(psis)) / a
     clamped, slower, share = pace(x, p)
     loading = p[STIFFNESS] * (slower - 1.0) * share
     changes = evolutions(clamped, psis, shift, share, p)
-    return x, (slope * loading - felt(changes, spring, psis, p)) / a, slope
+    growing = (slope * loading - felt(changes, spring, psis, p)) / a
+    return x, growing, slope, weight_at(x, slower, p)
 
 
 def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
@@ -121,7 +129,7 @@ def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers
     spring, psis = state[0], state[1:]
     slope = strength(spring, psis, p)[1]
     quasi_static = (slope * rates[0] - felt(rates[1:], spring, psis, p)) / p[A]
-    if weight(x, p) <= LIGHTER:
+    if weight_at(x, pace(x, p)[1], p) <= LIGHTER:
         return quasi_static
     ahead = trailing(spring + AHEAD * rates[0], moved(psis, rates[1:], AHEAD), p)
     return quasi_static + (ahead - trailing(spring, psis, p)) / AHEAD
