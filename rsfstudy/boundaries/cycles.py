@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -152,7 +153,7 @@ def _dies_down(swings: list[float]) -> bool:
     Geometrically extrapolated from the last three; near the onset of stick-slip cycles shrink
     slowly to a finite limit.
     """
-    if len(swings) <= _SHRINKING or not (np.diff(swings[-_SHRINKING:]) < 0.0).all():
+    if len(swings) <= _SHRINKING or not all(y < x for x, y in pairwise(swings[-_SHRINKING:])):
         return False
     before, now = swings[-3] - swings[-2], swings[-2] - swings[-1]
     still_to_come = now * now / (before - now) if before > now else math.inf

@@ -84,13 +84,20 @@ def slip_of_rise(log_rate: float, after: float, given: Limits) -> float:
     return given.softness * norm**2 * abs(after - log_rate)
 
 
+def may_land(log_rate: float, given: Limits) -> bool:
+    """Whether ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
+    straight back in its turn.
+    """
+    return norm_at(log_rate, given) < 0.5 * given.norm
+
+
 def has_landed(log_rate: float, growth: float, below: float, missing: float, given: Limits) -> bool:
     """Whether the full equations have done their work at ln(V/V_*) and its growth, where the slow
     manifold has ln(V/V_*) `below`, and friction differs from spring stress by what is `missing`.
 
     The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
     (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
-    unnoticed. And the slow manifold must not hand straight back.
+    unnoticed; and see `may_land`.
 
     A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
     that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there.

@@ -59,6 +59,8 @@ class Regimes(NamedTuple):
 
     def has_landed(self, point: Point) -> bool:
         """Whether the full equations have done their work."""
+        if not handover.may_land(point.log_rate, self.limits):
+            return False
         below, missing = self.below(point)
         return handover.has_landed(point.log_rate, point.growth, below, missing, self.limits)
 

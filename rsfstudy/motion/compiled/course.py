@@ -42,7 +42,7 @@ from rsfstudy.motion.compiled.table import (
     SPRING,
 )
 from rsfstudy.motion.compiled.unrolled import STAGES, TOLERANCE
-from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed, room_left
+from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed, may_land, room_left
 from rsfstudy.motion.recording import SAMPLES
 from rsfstudy.slider.slots import LOAD_VELOCITY
 
@@ -199,7 +199,7 @@ def cut_short(now, place, limits):
 
 def lands(now, place, limits):
     """Whether the full equations have done their work."""
-    if now.regime == SLOW:
+    if now.regime == SLOW or not may_land(place.after[LOG_RATE], limits):
         return False
     columns, below = place.after, place.between
     place.within[0] = columns[SPRING]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -245,7 +245,7 @@ def _told(
     told = np.empty((max(_EVENTS, 2 * len(asked) + 3), _OF_STATES + states))
     rows = np.empty((0 if recording is None else _RECORDED, STATES + states))
     space = np.empty(room.size(len(y), states, len(asked)))
-    last, account = np.zeros(table.PSIS + states), _Account(meter, regimes)
+    last, charge = np.zeros(table.PSIS + states), _charging(meter, regimes)
     # a rigid slider has slip for its clock
     slips = table.CLOCK if regimes[0] == RIGID else table.SLIP
     arguments = plan.scales, plan.functions, space, last, asked, told, rows, plan.limits, plan.p
@@ -255,36 +255,31 @@ def _told(
         if recording is not None:
             _keep(recording, rows[: now["recorded"]], regimes)
         for line in told[: now["told"]].tolist():
-            account.charge(*line[table.STEPS : table.POINT])
+            charge(line[table.STEPS], line[table.SPENT_SLOW], line[table.SPENT_FAST])
             x, growth, spring, friction, *others = line[table.POINT : _OF_STATES]
             point = Point(x, growth, spring, friction, tuple(line[_OF_STATES:]), *others)
             kind, watch = meanings[int(line[table.CODE])]
             name = regimes[int(line[table.REGIME])]
             yield Event(kind, watch, line[table.TIME], line[slips], point, name, meter.spent)
         now["told"] = now["recorded"] = 0
-    account.charge(now["steps"], now["spent_slow"], now["spent_fast"])
+    charge(now["steps"], now["spent_slow"], now["spent_fast"])
     if end != table.ENDED:
         raise _halt(end, now, regimes)
 
 
-class _Account:
-    """Charges a meter with what a motion has spent since it was charged last."""
+def _charging(meter: Meter, names: tuple[str, ...]) -> Callable[[float, float, float], None]:
+    """What charges a meter with all that a motion has spent in its regimes since the last time."""
+    before = [0.0, 0.0, 0.0]
 
-    def __init__(self, meter: Meter, names: tuple[str, ...]) -> None:
-        self._meter, self._names = meter, names
-        self._steps = self._slow = self._fast = 0
+    def charge(steps: float, slow: float, fast: float) -> None:
+        meter.steps += int(steps - before[0])
+        if slow > before[1]:
+            meter.charge(names[0], int(slow - before[1]))
+        if fast > before[2]:
+            meter.charge(names[1], int(fast - before[2]))
+        before[:] = steps, slow, fast
 
-    def charge(self, steps: float, slow: float, fast: float) -> None:
-        """Charge what has been spent up to here."""
-        meter, names = self._meter, self._names
-        meter.steps += int(steps) - self._steps
-        self._steps = int(steps)
-        if slow > self._slow:
-            meter.charge(names[0], int(slow) - self._slow)
-            self._slow = int(slow)
-        if fast > self._fast:
-            meter.charge(names[1], int(fast) - self._fast)
-            self._fast = int(fast)
+    return charge
 
 
 @lru_cache(maxsize=256)
