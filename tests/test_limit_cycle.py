@@ -75,9 +75,9 @@ def test_a_slip_rate_near_the_unit_keeps_an_error():
     numbers = np.array([30.0, 0.5, 0.4, 0.0, 9.0])
     values = limit_cycle._headlines(Accuracy(1e-6), numbers, numbers, np.zeros(5))
     errors = [values[f"{name}_error"] for name in HEADLINES]
-    assert errors[3] == pytest.approx(0.015e-6 * 4.5, rel=1e-4)
-    assert errors[4] == pytest.approx(0.015e-6 * 9.0, rel=1e-4)
-    assert errors[0] == pytest.approx(0.015e-6 * 30.0, rel=1e-4)
+    assert errors[3] == pytest.approx(0.012e-6 * 4.5, rel=1e-4)
+    assert errors[4] == pytest.approx(0.012e-6 * 9.0, rel=1e-4)
+    assert errors[0] == pytest.approx(0.012e-6 * 30.0, rel=1e-4)
 
 
 def test_work_per_cycle():

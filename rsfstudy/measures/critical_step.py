@@ -51,7 +51,7 @@ DIRECTIONS = ("up", "down")
 _CAREFUL = 1e-8
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
-_BY_CHANCE = 0.005
+_BY_CHANCE = 0.004
 
 #: Widest bracket, over the size, that confirms a boundary.
 _WIDEST = 0.02

@@ -38,8 +38,9 @@ LARGEST_RATE = 1e30
 #: Weights (K/a) w (w + w_0) of mass below which its second order is nothing, and below which even
 #: the growth of the first is; and the displacement in D_c over which growth is differenced.
 LIGHT, LIGHTER, AHEAD = 1e-7, 1e-9, 1e-6
-#: V_0/V below which it says nothing of the slip rate: trial steps, and load points at rest.
-LEAST = 1e-60
+#: V_0/V between which it says what the slip rate is: not in trial steps far beyond, nor where the
+#: load point rests or contact is stationary.
+LEAST, MOST = 1e-60, 1e40
 
 
 def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
@@ -96,7 +97,10 @@ def weight_at(x: float, slower: float, p: Numbers) -> float:
     exponentials, that of V_0/V serves where there is one.
     """
     load = p[LOAD_VELOCITY] * p[OWN]
-    norm = load / slower if slower > LEAST else math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4))
+    if LEAST < slower < MOST:
+        norm = load / slower
+    else:
+        norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
