@@ -40,6 +40,8 @@ from rich.table import Table
 _LAST, _TIGHTEST_OF_OURS = 26, 22
 #: Rungs by which a search begins at a tolerance looser than the error asked for.
 _LOOSER = 3
+#: Rungs beyond the first that meets it, among which the cheapest is sought.
+_TIGHTER = 2
 #: Accuracies for which the package would set the marks, the loosest first.
 _MARKS = (1e-4, 1e-7, 1e-8, 1e-9, 1e-10)
 #: Shortest time to measure, in seconds.
@@ -68,8 +70,8 @@ class Entry:
         """The tolerance of the rung."""
         return float(10.0 ** (-self.rung / 2.0))
 
-    def choose(self, first: int, target: float) -> None:
-        """Find the cheapest tolerance that meets the target: of the loosest that does, and two
+    def choose(self, first: int, target: float, more: int) -> None:
+        """Find the cheapest tolerance that meets the target: of the loosest that does, and some
         more, because too loose a tolerance may cost more steps.
         """
         last = _TIGHTEST_OF_OURS if isinstance(self.contestant, Ours) else _LAST
@@ -80,7 +82,7 @@ class Entry:
             error, seconds = self.tried(rung)
             if error <= target:
                 meeting.append((seconds, rung, error))
-            if meeting and (rung >= meeting[0][1] + 2 or seconds > _SLOW):
+            if meeting and (rung >= meeting[0][1] + more or seconds > _SLOW):
                 break
         if meeting:
             self.failed = ""
@@ -164,9 +166,9 @@ def raced(
         if not entry.failed:
             like = entries.get(_LIKE.get(contestant.name, ""))
             with silence():
-                entry.choose(
-                    like.rung if like else round(-2.0 * math.log10(target)) - _LOOSER, target
-                )
+                # the same steps are cheapest for both
+                first = like.rung if like else round(-2.0 * math.log10(target)) - _LOOSER
+                entry.choose(first, target, 0 if like else _TIGHTER)
         entries[contestant.name] = entry
     for _ in range(rounds):
         for entry in entries.values():
