@@ -156,21 +156,24 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
     assert 4.0 < errors[2e-3] / errors[1e-3] < 16.0
 
 
-def test_slip_is_fastest_where_the_full_equations_say():
-    """A peak below the switch, and the full equations from where mass is 1e-6 of it, integrated
-    implicitly: without the growth of what mass takes, spring stress there would be off by 8.7e-6.
+def peaks(displacement, accuracy):
+    """A peak on the slow manifold, its weight of mass, and (f, ln V) where the full equations peak,
+    integrated implicitly from where mass is 1e-6 of that.
     """
-    scene = Scene(law="slowness", stiffness_ratio=0.95, load_velocity_ratio=1.5, inertia=True)
-    full, seen = in_rupture(scene), []
-
-    def until(step):
-        seen.append(step)
-        return step.before.growth > 0.0 >= step.after.growth
-
-    meter = follow(scene.with_(displacement_step=2.0), 1e-8, until)
+    scene = Scene(
+        law="slowness",
+        stiffness_ratio=0.95,
+        load_velocity_ratio=1.5,
+        inertia=True,
+        displacement_step=displacement,
+    )
+    full, meter, begin = in_rupture(scene), Meter(10**6), None
+    for step in motion(scene, accuracy, meter, starting(scene)):
+        begin = step.after if begin is None and step.after.log_rate > 10.0 else begin
+        if step.before.growth > 0.0 >= step.after.growth:
+            break
     assert set(meter.by_regime) == {"slow_manifold"}
-    top = seen[-1].point_at(seen[-1].locate(lambda point: point.growth))
-    begin = next(step.after for step in seen if step.after.log_rate > 10.0)
+    top = step.point_at(step.locate(lambda point: point.growth))
     stops = [lambda _t, y: full.rates(tuple(y))[1]]
     stops[0].terminal, stops[0].direction = True, -1.0
     theirs = solve_ivp(
@@ -178,13 +181,31 @@ def test_slip_is_fastest_where_the_full_equations_say():
         (0.0, 1e9),
         [begin.spring, begin.log_rate, begin.friction],
         method="Radau",
-        rtol=1e-11,
-        atol=1e-13,
+        rtol=1e-12,
+        atol=1e-14,
         events=stops,
     )
-    spring, log_rate, _friction = theirs.y_events[0][0]
+    norm = scene.inertial_time * math.exp(top.log_rate)
+    return top, scene.stiffness / scene.a * norm**2, theirs.y_events[0][0][:2]
+
+
+def test_slip_is_fastest_where_the_full_equations_say():
+    """Without the growth of what mass takes, spring stress there would be off by 8.7e-6."""
+    top, _weight, (spring, log_rate) = peaks(2.0, Accuracy(1e-8))
     assert top.log_rate == pytest.approx(log_rate, abs=2e-8)
     assert top.spring == pytest.approx(spring, abs=1e-9)
+
+
+@pytest.mark.parametrize("displacement", [2.05, 2.08])
+def test_error_where_slip_peaks_goes_with_the_third_power_of_the_weight(displacement):
+    """What `Accuracy.switch_weight` rests on, at weights of 0.004 and 0.016."""
+
+    class Never(Accuracy):
+        switch_weight = property(lambda _self: 1.0)
+        switch_correction = property(lambda _self: math.inf)
+
+    top, weight, (_spring, log_rate) = peaks(displacement, Never(1e-10))
+    assert top.log_rate - log_rate == pytest.approx(-1.55 * weight**3, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -90,8 +90,9 @@ class Accuracy:
     def switch_weight(self) -> float:
         """Weight (K/a) w**2 of mass up to which the slow manifold stands in for the full equations.
 
-        The manifold is of second order in it. Where slip peaks at a weight, its error is up to 0.4
-        of the third power (the tests measure it).
+        The manifold is of second order in it. Where slip peaks at a weight, ln V is off by 1.6
+        times its third power, and over random scenes a stress drop by up to 0.4 times (the tests
+        measure the first).
         """
         return math.cbrt(0.75 * min(self.rtol, _LOOSEST_SWITCH) * self.refinement)
 
@@ -100,8 +101,8 @@ class Accuracy:
         """Change d of ln V by inertia up to which the slow manifold may be used: this bound comes
         first where slip weakens strongly.
 
-        Leaving it at d costs up to 0.07 d**3 over random scenes, and 0.0003 d**3 of the paper's
-        slider.
+        Leaving it at d costs a cycle up to 0.07 d**3 over random scenes, and 0.0014 d**3 of the
+        paper's slider (the tests measure it).
         """
         return math.cbrt(15.0 * min(self.rtol, _LOOSEST_SWITCH) * self.refinement)
 
