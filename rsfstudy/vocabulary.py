@@ -180,20 +180,7 @@ _QUANTITIES = (
     ),
     Quantity("unstable", "", "1", "whether the step triggers instability"),
     Quantity("slip_per_event", r"$\delta/D_c$", "1", "slip per stick-slip cycle", "D_c"),
-    Quantity(
-        "healing_exponent",
-        "",
-        "1",
-        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
-    ),
     Quantity("residual_friction", r"$\tau/\sigma$", "1", "friction coefficient at peak slip rate"),
-    Quantity(
-        "drop_asymmetry",
-        "",
-        "1",
-        "stress drop while slip accelerates over that while it decelerates",
-    ),
-    Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Quantity("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
     Quantity("phase", "", "1", "fraction of the path along a cycle"),
     Quantity(

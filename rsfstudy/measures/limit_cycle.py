@@ -102,7 +102,7 @@ class LimitCycle(Measure):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        return (PERIOD,)
+        return _QUANTITIES
 
     @property
     def typical_work(self) -> int:
@@ -179,6 +179,23 @@ class LimitCycle(Measure):
 
 #: How many events a motion takes to repeat itself.
 PERIOD = Quantity("period_events", "", "1", "number of events after which a motion repeats itself")
+#: What only a limit cycle has.
+_QUANTITIES = (
+    PERIOD,
+    Quantity(
+        "healing_exponent",
+        "",
+        "1",
+        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
+    ),
+    Quantity(
+        "drop_asymmetry",
+        "",
+        "1",
+        "stress drop while slip accelerates over that while it decelerates",
+    ),
+    Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
+)
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
 

@@ -248,10 +248,7 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
         Where there is no steady sliding.
     """
     scene = scene.unforced
-    steady = steady_sliding(scene, log_rate)
-    if steady is None:
-        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
-    return _rates(_around(scene, steady), scene.stiffness)
+    return _rates(_around(scene, _sliding(scene, log_rate)), scene.stiffness)
 
 
 def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -> complex:
@@ -276,9 +273,7 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
         Where there is no steady sliding.
     """
     still = scene.unforced
-    steady = steady_sliding(still, log_rate)
-    if steady is None:
-        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
+    steady = _sliding(still, log_rate)
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressing.unknowns))
     by_pressure, p = scene.functions["strength_of_pressure"], scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
@@ -295,6 +290,14 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
         for polynomial in (forced, around.above, around.below, spring)
     )
     return stiffness * left / (balance * below + at * above)
+
+
+def _sliding(scene: Scene, log_rate: float) -> Steady:
+    """Steady sliding, which there must be."""
+    steady = steady_sliding(scene, log_rate)
+    if steady is None:
+        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
+    return steady
 
 
 def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
