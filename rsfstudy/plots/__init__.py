@@ -214,6 +214,7 @@ def save(
         raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURES)
     try:
         drawn = figure(dataset, own, variable=variable, style=style)
+        drawn.set_layout_engine(None)  # everything has its place
         with styled(style):
             drawn.savefig(image, format=form, metadata=_DATES.get(form))
     except RsfStudyError:

@@ -203,6 +203,8 @@ def settle(figure: Figure) -> None:
     need is known only then.
     """
     layout = figure.get_layout_engine()
-    if layout is not None:  # a figure of the user's own may have taken it away
-        layout.execute(figure)
-    figure.draw_without_rendering()
+    if layout is None:  # a figure of the user's own may have taken it away
+        figure.draw_without_rendering()
+        return
+    layout.execute(figure)
+    layout.execute(figure)
