@@ -137,7 +137,8 @@ def told(scene: Scene, by: str, **options) -> tuple[list, Meter]:
     try:
         for event in follow(scene, Accuracy(ALIKE), meter, watches, clock=True, **options):
             events.append(event)
-            if len(events) == 24:
+            # what went before an event that can wait may be told, and its work counted, later
+            if len(events) >= 24 and event.watch is not None and not event.watch.waits:
                 break
     except Halt as halt:
         events.append(halt.status)

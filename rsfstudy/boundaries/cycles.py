@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,7 @@ _STEADY, _SHRINKING = 1e-3, 30
 _AT_REST = 1e-6
 
 
-@dataclass(frozen=True)
-class Cycle:
+class Cycle(NamedTuple):
     """One cycle, in the units of the scene.
 
     Attributes
@@ -100,8 +100,8 @@ def cycles(
     maximum of spring stress is left out.
     """
     watch, ahead = _Watch(start), 0 if start else len(scene.segments) - 1
-    swings: list[float] = []
-    for event in follow(scene, accuracy, meter, _asked(scene), start=start, clock=True):
+    swings, asked = list[float](), _asked(scene.log_load_rate)
+    for event in follow(scene, accuracy, meter, asked, start=start, clock=True):
         if event.kind is Kind.SEGMENT:
             watch, ahead = _Watch(None), ahead - 1
         if ahead:
@@ -125,7 +125,7 @@ def recorded(
     settles instead.
     """
     watch, recording = _Watch(start), Recording()
-    asked = _asked(scene)
+    asked = _asked(scene.log_load_rate)
     motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
     for event in motion:
         cycle = watch.see(event)
@@ -135,9 +135,9 @@ def recorded(
     raise AssertionError("a motion never ends by itself")
 
 
-def _asked(scene: Scene) -> tuple[Watch, ...]:
-    """What a motion has to tell for its cycles to be seen."""
-    load = scene.log_load_rate
+@lru_cache(maxsize=256)
+def _asked(load: float) -> tuple[Watch, ...]:
+    """What a motion has to tell for its cycles to be seen, at ln(V_0/V_*)."""
     return (
         maximum("log_rate", waits=True),
         minimum("log_rate", waits=True),

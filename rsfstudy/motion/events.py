@@ -48,8 +48,9 @@ class Kind(StrEnum):
 
 
 class Watch(NamedTuple):
-    """What to be told of; whether the motion ends there; and whether whoever asks can wait for it
-    until something else has happened, so that an engine may tell several events at once.
+    """What to be told of; whether the motion ends there; and whether whoever asks can wait for it,
+    and for the beginning, until something else has happened: an engine may then tell several events
+    at once.
     """
 
     kind: Kind

@@ -84,6 +84,15 @@ def slip_of_rise(log_rate: float, after: float, given: Limits) -> float:
     return given.softness * norm**2 * abs(after - log_rate)
 
 
+def begins_slow(log_rate: float, below: float, missing: float, given: Limits) -> bool:
+    """Whether a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
+    `below`, and friction differs from spring stress by what is `missing` there.
+    """
+    rate = norm_at(log_rate, given) / given.norm
+    slow = max(weight_of_mass(below, missing, given), rate) < 1.0
+    return slow and slip_of_rise(log_rate, below, given) <= given.landing
+
+
 def may_land(log_rate: float, given: Limits) -> bool:
     """Whether ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
     straight back in its turn.

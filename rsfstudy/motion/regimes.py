@@ -39,10 +39,7 @@ class Regimes(NamedTuple):
     def begins_slow(self, start: Point) -> bool:
         """Whether a motion begins on the slow manifold."""
         below, missing = self.below(start)
-        rate = handover.norm_at(start.log_rate, self.limits) / self.limits.norm
-        slow = max(handover.weight_of_mass(below, missing, self.limits), rate) < 1.0
-        rise = handover.slip_of_rise(start.log_rate, below, self.limits)
-        return slow and rise <= self.limits.landing
+        return handover.begins_slow(start.log_rate, below, missing, self.limits)
 
     def below(self, point: Point) -> tuple[float, float]:
         """ln(V/V_*) on the slow manifold with the same spring stress and states, and the stress by

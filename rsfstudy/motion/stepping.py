@@ -77,8 +77,16 @@ class Meter:
 
     def charge(self, regime: str, evaluations: int) -> None:
         """Add evaluations; raises `Halt` once more than the budget is spent."""
+        self.add(regime, evaluations)
+        self.check()
+
+    def add(self, regime: str, evaluations: int) -> None:
+        """Add evaluations."""
         self.by_regime[regime] = self.by_regime.get(regime, 0) + evaluations
         self.spent += evaluations
+
+    def check(self) -> None:
+        """Raise `Halt` where more than the budget is spent."""
         if self.spent > self.budget:
             raise Halt(
                 Status.WORK_BUDGET_SPENT,

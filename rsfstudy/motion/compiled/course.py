@@ -20,17 +20,20 @@ from rsfstudy.motion.compiled.happenings import (
     tell,
     tell_beginning,
     tell_watched,
+    waits,
 )
 from rsfstudy.motion.compiled.order_eight import copy
 from rsfstudy.motion.compiled.room import room
 from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, take_step
 from rsfstudy.motion.compiled.table import (
+    BEGIN,
     CHANGE,
     CHANGES,
     END,
     ENDED,
     FAST,
     FRICTION,
+    FUNCTIONS,
     GROWTH,
     HALTED,
     HANDS_OVER,
@@ -42,7 +45,15 @@ from rsfstudy.motion.compiled.table import (
     SPRING,
 )
 from rsfstudy.motion.compiled.unrolled import STAGES, TOLERANCE
-from rsfstudy.motion.handover import GOES_ON, Limits, fate, has_landed, may_land, room_left
+from rsfstudy.motion.handover import (
+    GOES_ON,
+    Limits,
+    begins_slow,
+    fate,
+    has_landed,
+    may_land,
+    room_left,
+)
 from rsfstudy.motion.recording import SAMPLES
 from rsfstudy.slider.slots import LOAD_VELOCITY
 
@@ -62,7 +73,7 @@ def advance(memory, y, scales, functions, space, last, watches, told, rows, numb
     space : ndarray
         Room for the arrays of a regime.
     last : ndarray
-        The last point of the regime before.
+        The last point of the regime before; at first, the point at which to begin.
     watches, told, rows : ndarray
         What is watched for, what happens, and what is recorded.
     numbers : tuple of float
@@ -76,15 +87,19 @@ def advance(memory, y, scales, functions, space, last, watches, told, rows, numb
         Why it returns.
     """
     now = memory[0]
+    now.told = now.recorded = 0
     y, scales, space = first_of(y), first_of(scales), first_of(space)
     last, p = first_of(last), first_of(p)
     limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
+    if now.at_point:
+        begin_at(now, y, last, functions, space, limits, p)
     end = CHANGES
     while end == CHANGES:
         place = begun(now, y, scales, functions, space, watches, p)
         end = through_regime(now, place, last, told, rows, limits)
         if end == CHANGES:
-            change_regime(now, y, last)
+            now.regime, now.begins = FAST - now.regime, CHANGE
+            enter(now, y, last)
             if is_full(now, len(watches), told, rows):
                 end = HANDS_OVER
     return end
@@ -96,10 +111,21 @@ def is_full(now, watched, told, rows):
     return full or (len(rows) > 0 and len(rows) - now.recorded < 2 * SAMPLES)
 
 
-def change_regime(now, y, last):
-    """Begin the other regime at the last point of one."""
+def begin_at(now, y, last, functions, below, limits, p):
+    """Begin in the regime that a point is for; `below` takes in the slow manifold there."""
+    now.at_point, now.regime = 0, SLOW
+    enter(now, y, last)
+    if now.has_mass:
+        evaluate(functions[SLOW, FUNCTIONS - 1], y, y, p, below)
+        if not begins_slow(last[LOG_RATE], below[0], last[SPRING] - below[1], limits):
+            now.regime = FAST
+            enter(now, y, last)
+
+
+def enter(now, y, last):
+    """Begin a regime at the last point of one before."""
     y[0] = last[SPRING]
-    if now.regime == SLOW:
+    if now.regime == FAST:
         y[1], y[2] = last[LOG_RATE], last[FRICTION]
         for i in range(1, now.states):
             y[2 + i] = last[PSIS + i]
@@ -107,7 +133,6 @@ def change_regime(now, y, last):
         for i in range(now.states):
             y[1 + i] = last[PSIS + i]
         y[1 + now.states] = 0.0
-    now.regime, now.begins = FAST - now.regime, CHANGE
 
 
 def begun(now, y, scales, functions, space, watches, p):
@@ -152,8 +177,9 @@ def through_regime(now, place, last, told, rows, limits):
         if recording:
             record(now, place, rows, limits)
         urgent = tell_watched(now, place, told, limits)
-        if now.begins:
-            urgent, now.begins = max(urgent, 2 if now.begins != CHANGE else 1), 0
+        if now.begins == BEGIN and not waits(place):
+            urgent = max(urgent, 2)
+        now.begins = 0
         if urgent == 3:
             return ENDED
         if over:

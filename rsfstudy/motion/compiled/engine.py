@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from rsfstudy.motion.compiled import machine, room, table
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.recording import REGIME, STATES, Recording
-from rsfstudy.motion.regimes import Regimes, fast_state, halted, slow_state
+from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.motion.stepping import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.slider.equations import RIGID, Equations, between_ruptures, in_rupture, without_mass
@@ -52,6 +52,10 @@ _BESIDE = [(Kind.END, None), (Kind.REGIME, None), (Kind.START, None)]
 #: Where the states of a point begin in a line of the table of events.
 _OF_STATES = table.POINT + table.PSIS
 _NO_MASS = (math.nan,) * len(Limits._fields)
+#: How segments of loading are followed.
+_OF_SEGMENTS = ("at_point", 1), ("ends_by_fate", 1), ("strides", 1), ("anew", 1)
+#: How long paths last that have no time, and where they begin.
+_FOR_EVER = math.inf, 0.0, 0.0, 0.0
 
 
 class _Plan(NamedTuple):
@@ -59,7 +63,7 @@ class _Plan(NamedTuple):
 
     Attributes
     ----------
-    memory : ndarray of bytes
+    memory : bytes
         What they remember at first, one NOW.
     scales, functions : ndarray
         Scales of the unknowns of all regimes, and addresses of the equations of each.
@@ -68,14 +72,17 @@ class _Plan(NamedTuple):
         The numbers of the scene.
     regimes : tuple of str
         Names of those they go through.
+    unknowns : int
+        The most that a regime has.
     """
 
-    memory: np.ndarray
+    memory: bytes
     scales: np.ndarray
     functions: np.ndarray
     limits: Numbers
     p: np.ndarray
     regimes: tuple[str, ...]
+    unknowns: int
 
 
 def prepare(scene: Scene) -> None:
@@ -118,14 +125,9 @@ def segment(
     lasts : float
         How long it lasts.
     """
-    plan, both = _planned(scene, accuracy, clock=clock)
-    memory, state = plan.memory.copy(), slow_state(start, clock)
-    now = memory.view(table.NOW)[0]
-    now["time"], now["slip"], now["spring"] = origin
-    now["lasts"] = lasts
-    if both is not None and not both.begins_slow(start):
-        now["regime"], state = table.FAST, fast_state(start)
-    return _told(plan, memory, state, meter, watches, recording=recording)
+    plan = _planned(scene, accuracy, clock=clock)
+    begins = np.empty(2 * plan.unknowns), _columns_of(start)
+    return _told(plan, (lasts, *origin), begins, meter, watches, recording=recording)
 
 
 def along(
@@ -145,43 +147,41 @@ def along(
         tolerance,
         (len(equations.unknowns), equations.states, 0),
     )
-    return _told(_plan(memory, equations), memory.copy(), state, meter, watches, samples)
+    begins = np.array((*state, *state)), np.empty(table.PSIS + equations.states)
+    return _told(_plan(memory, equations), _FOR_EVER, begins, meter, watches, samples)
 
 
-def _planned(scene: Scene, accuracy: Accuracy, *, clock: bool) -> tuple[_Plan, Regimes | None]:
-    """What all motions of a scene at an accuracy have in common, and its regimes where it has
-    mass; found once.
-    """
+def _planned(scene: Scene, accuracy: Accuracy, *, clock: bool) -> _Plan:
+    """What all motions of a scene at an accuracy have in common; found once."""
     key = "compiled", accuracy.rtol, accuracy.refinement, clock
     if key not in scene.made:
         both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
         slow = both.slow if both else without_mass(scene, clock=clock)
         counts = len(slow.unknowns), slow.states, len(both.fast.unknowns) if both else 0
-        memory = _beginning(
-            (("ends_by_fate", 1), ("has_clock", clock), ("strides", 1), ("anew", 1)),
-            accuracy.solver,
-            counts,
-        )
-        scene.made[key] = _plan(memory, slow, both), both
-    found: tuple[_Plan, Regimes | None] = scene.made[key]
+        memory = _beginning((*_OF_SEGMENTS, ("has_clock", clock)), accuracy.solver, counts)
+        scene.made[key] = _plan(memory, slow, both)
+    found: _Plan = scene.made[key]
     return found
 
 
-def _plan(memory: np.ndarray, slow: Equations, both: Regimes | None = None) -> _Plan:
+def _plan(memory: bytes, slow: Equations, both: Regimes | None = None) -> _Plan:
     """A plan of motions by equations, and by those of another regime."""
-    p = np.array(slow.p)
-    if both is None:
-        functions = _table(_addresses(slow))
-        return _Plan(memory, np.array(slow.scales), functions, _NO_MASS, p, (slow.regime,))
-    functions = _table(_addresses(slow), _addresses(both.fast))
-    names, scales = (slow.regime, both.fast.regime), np.array((*slow.scales, *both.fast.scales))
-    return _Plan(memory, scales, functions, tuple(both.limits), p, names)
+    systems = (slow,) if both is None else (slow, both.fast)
+    return _Plan(
+        memory,
+        scales=np.array([scale for system in systems for scale in system.scales]),
+        functions=_table(*(_addresses(system) for system in systems)),
+        limits=_NO_MASS if both is None else tuple(both.limits),
+        p=np.array(slow.p),
+        regimes=tuple(system.regime for system in systems),
+        unknowns=max(len(system.unknowns) for system in systems),
+    )
 
 
 @lru_cache(maxsize=256)
 def _beginning(
     flags: tuple[tuple[str, float], ...], tolerance: float, counts: tuple[int, int, int]
-) -> np.ndarray:
+) -> bytes:
     """What motions remember at first, as bytes: records are copied one field after the other.
 
     Counts are those of unknowns, of states, and of unknowns in ruptures (0 where mass is none).
@@ -190,12 +190,12 @@ def _beginning(
     now, tolerance = memory[0], max(tolerance, TIGHTEST)
     now["tolerance"], now["direction"] = tolerance, 1.0
     now["finer"] = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
-    now["lasts"], now["begins"] = math.inf, table.BEGIN
+    now["begins"] = table.BEGIN
     now["unknowns"], now["states"], now["unknowns_fast"] = counts
     now["has_mass"] = counts[-1] > 0
     for name, value in flags:
         now[name] = value
-    return memory.view(np.uint8)
+    return memory.tobytes()
 
 
 def _addresses(equations: Equations) -> tuple[int, ...]:
@@ -221,65 +221,77 @@ def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
 
 def _told(
     plan: _Plan,
-    memory: np.ndarray,
-    state: Numbers,
+    times: tuple[float, ...],
+    begins: tuple[np.ndarray, np.ndarray],
     meter: Meter,
     watches: Sequence[Watch],
     samples: Sequence[float] = (),
     recording: Recording | None = None,
 ) -> Iterator[Event]:
-    """Events of a motion from a state, a table of them by each call of the compiled motion.
+    """Events of a motion, a table of them by each call of the compiled one.
+
+    Parameters
+    ----------
+    times : tuple of float
+        How long it lasts, and time, slip and spring stress where it begins.
+    begins : tuple of ndarray
+        The unknowns with which it begins, behind which is room for as many; and the columns of the
+        point at which it begins, if it is that which the plan begins with.
 
     Raises
     ------
     Halt
         Where it cannot go on.
     """
-    memory = memory.view(table.NOW)
-    now, regimes, states = memory[0], plan.regimes, int(memory[0]["states"])
-    # room for one more unknown in another regime, and for their rates
-    y = np.array((*state, *[0.0] * (len(state) + 2)))
+    regimes, (y, last) = plan.regimes, begins
+    memory, states = bytearray(plan.memory), len(last) - table.PSIS
+    table.CALLED_WITH.pack_into(memory, 0, *times, meter.budget - meter.spent)
+    now = np.frombuffer(memory, table.NOW)
     asked, meanings = _asked(tuple(watches), tuple(samples))
     asked = asked.copy()
-    now["budget"] = meter.budget - meter.spent
     told = np.empty((max(_EVENTS, 2 * len(asked) + 3), _OF_STATES + states))
     rows = np.empty((0 if recording is None else _RECORDED, STATES + states))
-    space = np.empty(room.size(len(y), states, len(asked)))
-    last, charge = np.zeros(table.PSIS + states), _charging(meter, regimes)
+    space = np.empty(room.size(len(y) // 2, states, len(asked)))
     # a rigid slider has slip for its clock
     slips = table.CLOCK if regimes[0] == RIGID else table.SLIP
     arguments = plan.scales, plan.functions, space, last, asked, told, rows, plan.limits, plan.p
-    advance, end = machine.course(), table.HANDS_OVER
+    advance, end, account = machine.course(), table.HANDS_OVER, _Account(meter, regimes)
     while end == table.HANDS_OVER:
-        end = advance(memory, y, *arguments)
+        end = advance(now, y, *arguments)
+        *spent, happened, recorded = table.SAYS.unpack_from(memory, table.CALLED_WITH.size)
+        before = account.settle(*spent)
         if recording is not None:
-            _keep(recording, rows[: now["recorded"]], regimes)
-        for line in told[: now["told"]].tolist():
-            charge(line[table.STEPS], line[table.SPENT_SLOW], line[table.SPENT_FAST])
+            _keep(recording, rows[:recorded], regimes)
+        for line in told[:happened].tolist():
             x, growth, spring, friction, *others = line[table.POINT : _OF_STATES]
             point = Point(x, growth, spring, friction, tuple(line[_OF_STATES:]), *others)
             kind, watch = meanings[int(line[table.CODE])]
             name = regimes[int(line[table.REGIME])]
-            yield Event(kind, watch, line[table.TIME], line[slips], point, name, meter.spent)
-        now["told"] = now["recorded"] = 0
-    charge(now["steps"], now["spent_slow"], now["spent_fast"])
+            work = before + int(line[table.SPENT])
+            yield Event(kind, watch, line[table.TIME], line[slips], point, name, work)
+        meter.check()
     if end != table.ENDED:
-        raise _halt(end, now, regimes)
+        raise _halt(end, now[0], regimes)
 
 
-def _charging(meter: Meter, names: tuple[str, ...]) -> Callable[[float, float, float], None]:
-    """What charges a meter with all that a motion has spent in its regimes since the last time."""
-    before = [0.0, 0.0, 0.0]
+class _Account:
+    """What a motion has spent in its regimes, and a meter has been told of."""
 
-    def charge(steps: float, slow: float, fast: float) -> None:
-        meter.steps += int(steps - before[0])
-        if slow > before[1]:
-            meter.charge(names[0], int(slow - before[1]))
-        if fast > before[2]:
-            meter.charge(names[1], int(fast - before[2]))
-        before[:] = steps, slow, fast
+    def __init__(self, meter: Meter, regimes: tuple[str, ...]) -> None:
+        self._meter, self._regimes = meter, regimes
+        self._slow = self._fast = self._steps = 0
 
-    return charge
+    def settle(self, slow: int, fast: int, steps: int) -> int:
+        """Add what it has spent since the last time to the meter; returns what else is on that."""
+        meter = self._meter
+        before = meter.spent - self._slow - self._fast
+        if slow > self._slow:
+            meter.add(self._regimes[0], slow - self._slow)
+        if fast > self._fast:
+            meter.add(self._regimes[1], fast - self._fast)
+        meter.steps += steps - self._steps
+        self._slow, self._fast, self._steps = slow, fast, steps
+        return before
 
 
 @lru_cache(maxsize=256)
@@ -305,6 +317,12 @@ def _keep(recording: Recording, rows: np.ndarray, names: tuple[str, ...]) -> Non
     kept = rows.copy()
     kept[:, REGIME] = numbers[kept[:, REGIME].astype(int)]
     recording.add(kept)
+
+
+def _columns_of(point: Point) -> np.ndarray:
+    """A point as the compiled motion has it."""
+    log_rate, growth, spring, friction, psis, *others = point
+    return np.array((log_rate, growth, spring, friction, *others, *psis))
 
 
 def _halt(end: int, now: Any, regimes: tuple[str, ...]) -> Halt:

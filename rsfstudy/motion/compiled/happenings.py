@@ -31,11 +31,9 @@ from rsfstudy.motion.compiled.table import (
     SETTLED,
     SLIP,
     SLOW,
-    SPENT_FAST,
-    SPENT_SLOW,
+    SPENT,
     SPRING,
     STATE,
-    STEPS,
     TIME,
     UNREST,
     WAITS,
@@ -68,6 +66,14 @@ def quantity(watch, columns, p):
 def watch_of(room, number):
     """One of the watches."""
     return moved(room.watches, len(WATCHED) * number)
+
+
+def waits(room):
+    """Whether the asker can wait for anything; for the beginning then, too."""
+    found = False
+    for w in range(room.asked):
+        found = found or watch_of(room, w)[WAITS] != 0.0
+    return found
 
 
 def excess(now, columns, limits):
@@ -152,8 +158,7 @@ def tell(now, told, code, clock, passed, columns, p):
     told[n, CODE], told[n, REGIME], told[n, CLOCK] = code, now.regime, clock
     told[n, TIME] = now.time + passed
     told[n, SLIP] = now.slip + slipped(now, passed, columns[SPRING], p)
-    told[n, STEPS] = now.steps
-    told[n, SPENT_SLOW], told[n, SPENT_FAST] = now.spent_slow, now.spent_fast
+    told[n, SPENT] = now.spent_slow + now.spent_fast
     for i in range(told.shape[1] - POINT):
         told[n, POINT + i] = columns[i]
     now.told = n + 1
