@@ -59,7 +59,7 @@ ENOUGH = {
             "cycle, slip law: static drop",
             "cycle, slowness law: recurrence",
         ],
-        "integrator": ["DOP853", "RK45", "DOP853 + Radau", "Radau (mass always)"],
+        "integrator": ["DOP853", "RK45", "DOP853 + Radau"],
         "requested_digits": [4, 6, 8, 9],
         "repeats": 1,
     },

@@ -86,7 +86,7 @@ def test_an_accuracy_out_of_reach_is_an_answer():
     assert not {"run_time", "relative_time", "measured_error"} & set(found.values)
 
 
-@pytest.mark.parametrize("integrator", ["DOP853 + Radau", "DOP853 + LSODA", "Radau (mass always)"])
+@pytest.mark.parametrize("integrator", ["DOP853 + Radau", "DOP853 + LSODA"])
 def test_what_is_for_mass_does_not_apply_without_it(integrator):
     found = solved(integrator, 4.0)
     assert found.status is Status.NOT_APPLICABLE

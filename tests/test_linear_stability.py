@@ -12,7 +12,7 @@ from rsfstudy import Scene
 from rsfstudy.measures.linear_stability import LinearStability, growth, jacobian
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import between_ruptures, in_rupture, relation_of
+from rsfstudy.slider.equations import by_displacement, by_inertial_time, relation_of
 from rsfstudy.status import Status
 
 
@@ -53,7 +53,7 @@ def test_mass_shifts_the_threshold(effects):
     steadiness = 1.0 - scene.mu_star * cot_phi(scene)
 
     def growth(ratio: float) -> float:
-        system = in_rupture(scene.with_(stiffness_ratio=ratio))
+        system = by_inertial_time(scene.with_(stiffness_ratio=ratio))
         columns = []
         for unit, scale in zip(np.eye(3), system.scales, strict=True):
             step = 1e-5 * scale * unit
@@ -112,7 +112,7 @@ def test_growth_close_to_critical_stiffness(off, effects):
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
     # central differences are right to 6e-10 of rates of order one
-    grows = growth(jacobian(between_ruptures(scene, clock=False), (0.0, 0.0)))
+    grows = growth(jacobian(by_displacement(scene), (0.0, 0.0)))
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
 

@@ -245,8 +245,8 @@ def test_healing_is_read_off_friction_not_off_the_spring(fields):
         between_ruptures(Scene(**APART[0], load_velocity_ratio=3.0), clock=True),
         between_ruptures(Scene(**APART[2], load_velocity_ratio=3.0), clock=False),
         between_ruptures(Scene(**APART[4], law="two_slip_states", b1_over_a=1.5), clock=False),
-        in_rupture(Scene(inertia=True, stiffness_ratio=0.5)),
-        in_rupture(Scene(**DILATANT, inertia=True, stiffness_ratio=0.5)),
+        in_rupture(Scene(inertia=True, stiffness_ratio=0.5, period=1e7)),
+        in_rupture(Scene(**DILATANT, inertia=True, stiffness_ratio=0.5, period=1e7)),
         rigid(Scene(fluid="dilatant", law="two_slowness_states", b1_over_a=1.5), 1.0),
     ],
 )

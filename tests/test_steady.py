@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.slider import closed_forms, laws, stability, steady
-from rsfstudy.slider.equations import between_ruptures, in_rupture, normal_stress_at
+from rsfstudy.slider.equations import by_displacement, by_inertial_time, normal_stress_at
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
 WITH_ONE_B = {name: law for name, law in laws.PARTS.items() if issubclass(law, laws.Law)}
@@ -144,7 +144,7 @@ def test_growth_rates_are_those_of_the_assembled_equations(law, effects, log_rat
     scene = Scene(law=law, load_velocity_ratio=math.exp(log_rate), **effects)
     scene = scene.with_(stiffness_ratio=ratio)
     found = steady.steady_sliding(scene, log_rate)
-    equations = between_ruptures(scene, clock=False)
+    equations = by_displacement(scene)
     assert np.abs(equations.rates((found.spring, *found.psis))).max() < 1e-13
     theirs = eigenvalues(equations, (found.spring, *found.psis))
     ours = 0.5 * stability.growth_rates(scene, log_rate)
@@ -155,7 +155,7 @@ def test_growth_rates_with_mass_are_those_of_the_full_equations():
     """In inertial time: w times as much. At T = 1e8 s double precision sees mass in all three."""
     scene = Scene(inertia=True, period=1e8, stiffness_ratio=0.9)
     found = steady.steady_sliding(scene, 0.0)
-    theirs = eigenvalues(in_rupture(scene), (found.spring, 0.0, found.friction))
+    theirs = eigenvalues(by_inertial_time(scene), (found.spring, 0.0, found.friction))
     ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
 

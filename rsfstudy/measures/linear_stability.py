@@ -16,7 +16,12 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import closed_forms
-from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, normal_stress_at
+from rsfstudy.slider.equations import (
+    Equations,
+    by_displacement,
+    by_inertial_time,
+    normal_stress_at,
+)
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness, critical_stiffnesses
 from rsfstudy.slider.steady import Steady, steady_excess, steady_sliding
@@ -154,10 +159,10 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
-            equations = in_rupture(changed)
+            equations = by_inertial_time(changed)
             state = (steady.spring, steady.log_rate, steady.spring, *steady.psis[1:])
         else:
-            equations = between_ruptures(changed, clock=False)
+            equations = by_displacement(changed)
             state = (steady.spring, *steady.psis)
         meter.charge(equations.regime, 2 * len(state))
         return growth(jacobian(equations, state))

@@ -31,34 +31,20 @@ _YARDSTICK = Accuracy(1e-3)
 _SLOW = ("quasi_static", "quasi_dynamic", "slow_manifold", "rigid")
 
 
-class _MassAlways(Accuracy):
-    """The full equations all the way, for comparison."""
-
-    @property
-    def switch_weight(self) -> float:
-        """Below every slip rate."""
-        return 1e-300
-
-
 Methods = tuple[tuple[str, str], ...]
 
 #: One integrator throughout.
-_ALONE: Mapping[str, tuple[type[Accuracy], Methods]] = {
-    name: (Accuracy, tuple((regime, name) for regime in (*_SLOW, "inertial"))) for name in METHODS
+_ALONE: Mapping[str, Methods] = {
+    name: tuple((regime, name) for regime in (*_SLOW, "inertial")) for name in METHODS
 }
-#: For motions with mass: another integrator where mass acts, and mass throughout.
-_WITH_MASS: Mapping[str, tuple[type[Accuracy], Methods]] = {
-    "DOP853 + Radau": (Accuracy, (("inertial", "Radau"),)),
-    "DOP853 + LSODA": (Accuracy, (("inertial", "LSODA"),)),
-    "Radau (mass always)": (_MassAlways, (("inertial", "Radau"),)),
+#: For motions with mass: another integrator where mass acts.
+_WITH_MASS: Mapping[str, Methods] = {
+    "DOP853 + Radau": (("inertial", "Radau"),),
+    "DOP853 + LSODA": (("inertial", "LSODA"),),
 }
 #: The same method, compiled.
 _COMPILED = "DOP853 (compiled)"
-_CHOICES: Mapping[str, tuple[type[Accuracy], Methods]] = {
-    **_ALONE,
-    **_WITH_MASS,
-    _COMPILED: (Accuracy, ()),
-}
+_CHOICES: Mapping[str, Methods] = {**_ALONE, **_WITH_MASS, _COMPILED: ()}
 
 #: Names of the integrators, and of the ways to combine them, that are installed here.
 INTEGRATORS = tuple(name for name in _CHOICES if name != _COMPILED or is_installed(COMPILED))
@@ -87,9 +73,8 @@ class WorkPrecision(Measure):
     problems : tuple of Problem
         One for each scene of the lattice.
     integrator : str
-        One of SciPy's names; two of them, between ruptures and where mass acts; "Radau (mass
-        always)", which leaves the slow manifold out (those are for scenes with mass); or "DOP853
-        (compiled)", the compiled engine.
+        One of SciPy's names; two of them, between ruptures and where mass acts (for scenes with
+        mass); or "DOP853 (compiled)", the compiled engine.
     requested_digits : float
         The accuracy asked for, rtol = 10**-requested_digits.
     repeats : int
@@ -102,7 +87,7 @@ class WorkPrecision(Measure):
     integrator: str = "DOP853"
     requested_digits: float = 6.0
     repeats: int = 5
-    run_budget: int = 41_000
+    run_budget: int = 30_000
     name: ClassVar[str] = "work_precision"
 
     def __post_init__(self) -> None:
@@ -122,9 +107,9 @@ class WorkPrecision(Measure):
     @property
     def _asked(self) -> Accuracy:
         """The accuracy and the integrators that the run is made with."""
-        kind, methods = _CHOICES[self.integrator]
         engine = COMPILED if self.integrator == _COMPILED else SCIPY
-        return kind(10.0**-self.requested_digits, self.run_budget, methods, engine)
+        methods = _CHOICES[self.integrator]
+        return Accuracy(10.0**-self.requested_digits, self.run_budget, methods, engine)
 
     @property
     def headline(self) -> str:

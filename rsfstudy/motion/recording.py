@@ -28,7 +28,7 @@ REGIME, STATES = len(OBSERVED), len(OBSERVED) + 1
 #: they still differ in other units, where each is rounded anew.
 _APART, _LEAST = 4, 1e-290
 #: Samples within each integration step of a recorded motion: enough for a smooth curve.
-SAMPLES = 4
+SAMPLES = 6
 
 
 @dataclass

@@ -64,7 +64,7 @@ class Regimes(NamedTuple):
 
 def regimes(scene: Scene, accuracy: Accuracy, *, clock: bool) -> Regimes:
     """The regimes of a scene with mass."""
-    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene)
+    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene, clock=clock)
     return Regimes(slow, fast, handover.limits(scene, accuracy))
 
 
@@ -79,7 +79,7 @@ def motion(
     """Integrate a scene from a point, step by step, for as long as the caller asks.
 
     A scene without inertia is one quasi-static integration. With inertia, the slow manifold is
-    followed up to `Accuracy.switch_weight`, the full equations above it; each stretch has a clock
+    followed up to `Accuracy.switch_weight`, the full equations above it; each stretch has a time
     of its own that starts at zero, because a rupture is shorter than the spacing of floating-point
     numbers around the time at which it happens.
 
@@ -92,7 +92,7 @@ def motion(
     start : Point
         Where to start; see `starting` and `on_slow_manifold`.
     clock : bool
-        Carry time along in the quasi-static stretches (the inertial clock is time).
+        Carry time along.
 
     Yields
     ------
@@ -115,7 +115,7 @@ def motion(
     if both.begins_slow(start):
         point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
     while True:
-        point = yield from _rupture(both, guarded(both.fast, fast_state(point)))
+        point = yield from _rupture(both, guarded(both.fast, fast_state(point, clock)))
         point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
 
 
@@ -124,9 +124,10 @@ def slow_state(point: Point, clock: bool) -> Numbers:
     return (point.spring, *point.psis, 0.0) if clock else (point.spring, *point.psis)
 
 
-def fast_state(point: Point) -> Numbers:
+def fast_state(point: Point, clock: bool) -> Numbers:
     """Unknowns at a point of a rupture."""
-    return (point.spring, point.log_rate, point.friction, *point.psis[1:])
+    unknowns = (point.spring, point.log_rate, point.friction, *point.psis[1:])
+    return (*unknowns, 0.0) if clock else unknowns
 
 
 def starting(scene: Scene) -> Point:

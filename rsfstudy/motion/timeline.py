@@ -1,4 +1,4 @@
-"""One time for a motion whose regimes have clocks of their own."""
+"""One time for a motion whose regimes have times of their own."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ def timed(scene: Scene, moving: Iterator[Step]) -> Iterator[tuple[Step, float]]:
     begin = latest = 0.0
     equations = None
     for step in moving:
-        # the inertial clock is time: where it starts anew, so does the count
-        if step.equations is not equations or (_tells_time(step) and step.start == 0.0):
+        if step.equations is not equations:
             equations, begin = step.equations, latest
         yield step, begin
         latest = begin + elapsed(scene, step, step.end)
@@ -26,24 +25,18 @@ def timed(scene: Scene, moving: Iterator[Step]) -> Iterator[tuple[Step, float]]:
 
 def elapsed(scene: Scene, step: Step, clock: float) -> float:
     """Time in D_c/V_* since the regime of a step began; NaN where nothing tells it."""
-    if _tells_time(step):
-        return clock * scene.inertial_time
     if step.equations.unknowns[-1] != "time":
         return math.nan
-    return float(step.state_at(clock)[-1])
+    unit = scene.inertial_time if step.equations.regime == IN_RUPTURE else 1.0
+    return float(step.state_at(clock)[-1]) * unit
 
 
 def moment_in(scene: Scene, step: Step, time: float) -> float:
     """Clock at which a step is this long after its regime began; its end at the latest."""
     if elapsed(scene, step, step.end) <= time:
         return step.end
-    # clocks of slip are as short as slip is slow
     finest = 1e-15 * abs(step.end - step.start)
     clock = brentq(
         lambda c: elapsed(scene, step, c) - time, step.start, step.end, xtol=finest, rtol=1e-15
     )
     return float(clock)
-
-
-def _tells_time(step: Step) -> bool:
-    return step.equations.regime == IN_RUPTURE

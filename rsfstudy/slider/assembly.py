@@ -103,18 +103,34 @@ def _assembled(
     for name, function in zip(_OF_DYNAMICS, supplied, strict=True):
         if function is not None:
             filled[name] = of_part(function, own, **filled)
-    for name in ("rate", "rate_with_time", "point", "rigid_rate", "rigid_point"):
+    for name in ("point", "point_in_rupture", "rigid_rate", "rigid_point"):
         filled[name] = bound(getattr(forms, name), **filled)
-    if reverses:
-        for name in ("rate", "rate_with_time"):
-            forward = {**filled, "rate": filled[name]}
-            filled[name] = bound(forms.rate_either_way, **forward)
-    return types.MappingProxyType(filled)
+    return types.MappingProxyType({**filled, **_along_path(filled, reverses=reverses)})
+
+
+def _along_path(known: Mapping[str, Any], *, reverses: bool) -> dict[str, Function]:
+    """The rates of all unknowns along the path, and against displacement."""
+    made, count = dict[str, Function](), known["BEYOND"]
+    for name, form, unknowns in (
+        ("rate", forms.by_displacement, count),
+        ("rate_with_time", forms.by_displacement_with_time, count + 1),
+    ):
+        by = bound(form, **known)
+        if reverses:
+            by = bound(forms.by_displacement_either_way, **{**known, "changes": by})
+        filled = {**known, "changes": by, "scaled": _scaled(unknowns)}
+        made[form.__name__], made[name] = by, bound(forms.along_path, **filled)
+    for name, form, unknowns in (
+        ("full_rate", forms.rupture_along_path, count + 1),
+        ("full_rate_with_time", forms.rupture_along_path_with_time, count + 2),
+    ):
+        made[name] = bound(form, **{**known, "scaled": _scaled(unknowns)})
+    return made
 
 
 def _of_law(count: int, of_law: tuple[Any, ...], own: int) -> dict[str, Any]:
     """How the states of a law evolve, and add up."""
-    filled: dict[str, Any] = {"STATES": count, "BEYOND": 1 + count}
+    filled = _places(count)
     for name, function in zip(_OF_LAW, of_law, strict=True):
         if function is not None:
             filled[name] = of_part(function, own)
@@ -124,6 +140,11 @@ def _of_law(count: int, of_law: tuple[Any, ...], own: int) -> dict[str, Any]:
     filled["total"] = states.only if alone else states.total
     filled["felt"] = states.felt_of_one if alone else states.felt
     return filled
+
+
+def _places(states: int) -> dict[str, Any]:
+    """Where the unknowns of so many states are (see `forms`)."""
+    return {"STATES": states, "BEYOND": 1 + states, "BEYOND_FULL": 2 + states}
 
 
 def _of_stress(
@@ -151,6 +172,13 @@ def _moved(count: int) -> Function:
     return one if count == 1 else bound(states.moved, others_moved=_moved(count - 1))
 
 
+@cache
+def _scaled(count: int) -> Function:
+    """What scales so many numbers."""
+    one: Function = states.only_scaled
+    return one if count == 1 else bound(states.scaled, others_scaled=_scaled(count - 1))
+
+
 def _both(effect: Function, other: Function) -> Function:
     """Two effects of stress on the state as one."""
     return bound(friction.both_state_effects, state_effect=effect, other_state_effect=other)
@@ -164,8 +192,7 @@ def _of_fluid(
     """
     filled = {
         **known,
-        "STATES": of_law + count,
-        "BEYOND": 1 + of_law + count,
+        **_places(of_law + count),
         "OF_LAW": of_law,
         "evolutions_of_law": known["evolutions"],
         "resting_of_law": known["resting"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +22,9 @@ IN_RUPTURE, RIGID = "inertial", "rigid"
 #: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
 LONGEST_STEP = 1e9
 
-#: Longest step in slip plus load point displacement, over D_c: longer ones may pass a turn of the
-#: motion that none of their stages sees. Stationary contact has no turns, up to a few units of ln V
-#: before slip takes up again; and normal stress stretches them all.
+#: Longest step along the path, as far as slip of D_c is: longer ones may pass a turn of the motion
+#: that none of their stages sees. Stationary contact has no turns, up to a few units of ln V before
+#: slip takes up again; and normal stress stretches them all.
 LONGEST_STRIDE, FEW = 3.0, 10.0
 
 
@@ -34,7 +34,7 @@ def any_step(log_rate: float, normal_stress: float, log_load_rate: float) -> flo
 
 
 def stride(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
-    """Longest step of a form whose clock is slip plus load point displacement."""
+    """Longest step of a form whose clock is length along the path."""
     stationary = max(1.0, (log_load_rate - log_rate) / FEW)
     return min(LONGEST_STRIDE * stationary * max(1.0, normal_stress), LONGEST_STEP)
 
@@ -137,14 +137,31 @@ def _states(scene: Scene) -> tuple[str, ...]:
 
 
 @_once
-def in_rupture(scene: Scene) -> Equations:
-    """The full equations of a scene with mass, in inertial time T/(2 pi): f, ln(V/V_*) and g, and
-    the states but the first.
+def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
+    """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
+    and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
     forms, a, others = scene.functions, scene.a, _states(scene)[1:]
-    rate, point = forms["rupture_rate"], forms["rupture_point"]
-    unknowns, scales = ("spring", "log_rate", "friction", *others), (a, 1.0, a, *[a] * len(others))
-    return Equations(IN_RUPTURE, unknowns, scales, rate, point, scene.numbers, states=scene.states)
+    unknowns: tuple[str, ...] = ("spring", "log_rate", "friction", *others)
+    scales, rate = (a, 1.0, a, *[a] * len(others)), forms["full_rate"]
+    if clock:
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms["full_rate_with_time"]
+    point, p = forms["point_in_rupture"], scene.numbers
+    return Equations(IN_RUPTURE, unknowns, scales, rate, point, p, stride, scene.states)
+
+
+def by_displacement(scene: Scene) -> Equations:
+    """The form between ruptures against slip plus load point displacement: differences of its rates
+    are linear in departures farther from steady sliding than those along the path.
+    """
+    along = between_ruptures(scene, clock=False)
+    return replace(along, rate=scene.functions["by_displacement"])
+
+
+def by_inertial_time(scene: Scene) -> Equations:
+    """The same of the full equations, in inertial time T/(2 pi)."""
+    along = in_rupture(scene)
+    return replace(along, rate=scene.functions["rupture_rate"])
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:

@@ -1,12 +1,19 @@
-"""Forms of the equations of motion, which share one clock, one friction relation and one point.
+"""Forms of the equations of motion, which share one friction relation and one point.
 
 Between ruptures spring stress f and the state Psi (or the states of a law that has several) are all
-that changes, against slip plus load point displacement, ds = (V + V_0) dt, in which every rate is
-of order one from arrest to rupture:
+that changes, against slip plus load point displacement, ds = (V + V_0) dt:
 
     df/ds = K (V_0 - V)/(V + V_0),   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
 
 with x = ln(V/V_*) and x_0 = ln(V_0/V_*). How x follows from f and Psi is for the dynamics to say.
+In ruptures, the full equations tell all changes against inertial time.
+
+Both are integrated along the path in displacement, or inertial time, and ln V together,
+d(sigma)**2 = ds**2 + (dx/6)**2, with K (V_0 - V)/(V + V_0) - dPsi/ds over a for dx/ds. While
+contact heals, or slip comes to its end after a rupture, ln V falls as the logarithm of s or of what
+is left of the time: a step in either would have to be a part of all that has passed, or is to come;
+along the path it is a few units of ln V. Where slip is fastest, a path that bends within one unit
+of ln V would cost more steps than one that bends within six (four to twelve do as well).
 
 They are functions of floats in which `assembly` fills in the parts of a scene, and the number of
 its states.
@@ -15,7 +22,7 @@ its states.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.slots import (
@@ -26,6 +33,7 @@ from rsfstudy.slider.slots import (
     A,
     B,
     balance,
+    changes,
     effective_stress,
     effective_stress_change,
     evolution,
@@ -34,6 +42,9 @@ from rsfstudy.slider.slots import (
     growth,
     normal_stress,
     resting,
+    rupture_point,
+    rupture_rate,
+    scaled,
     strength,
 )
 from rsfstudy.slider.states import states_at, total
@@ -45,8 +56,13 @@ SLOWEST = -290.0 * math.log(10.0)
 #: less than exp(-100) of itself over all the slip there is.
 STATIONARY = 100.0
 
-#: How many states there are, and where unknowns begin that are none.
-STATES, BEYOND = 1, 2
+#: Units of ln V that are as long a way as slip of D_c, or inertial time.
+UNITS = 6.0
+#: From where on the square of a slant, and 1 more than that, are the same number.
+STEEP = 1e9
+#: How many states there are, where unknowns begin that are none, and where those of the full
+#: equations do.
+STATES, BEYOND, BEYOND_FULL = 1, 2, 3
 
 
 class Point(NamedTuple):
@@ -57,7 +73,7 @@ class Point(NamedTuple):
     log_rate : float
         ln(V/V_*).
     growth : float
-        Its derivative with respect to the clock of the equations.
+        Its derivative with respect to the clock of the equations, length along the path.
     spring, friction : float
         Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
     psis : tuple of float
@@ -157,8 +173,8 @@ def duration(x: float, slower: float, share: float, p: Numbers) -> float:
     return math.exp(-max(x, SLOWEST))
 
 
-def rate(state: Numbers, p: Numbers) -> Numbers:
-    """Derivatives of f and Psi between ruptures."""
+def by_displacement(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives of f and Psi between ruptures, against slip and load point displacement."""
     psis = state[1:BEYOND]
     log_rate, _friction, shift = balance(state[0], psis, p)
     x, slower, share = pace(log_rate, p)
@@ -166,7 +182,7 @@ def rate(state: Numbers, p: Numbers) -> Numbers:
     return (loading, *evolutions(x, psis, shift, share, p))
 
 
-def rate_with_time(state: Numbers, p: Numbers) -> Numbers:
+def by_displacement_with_time(state: Numbers, p: Numbers) -> Numbers:
     """The same, and time as a passenger."""
     psis = state[1:BEYOND]
     log_rate, _friction, shift = balance(state[0], psis, p)
@@ -175,15 +191,45 @@ def rate_with_time(state: Numbers, p: Numbers) -> Numbers:
     return (loading, *evolutions(x, psis, shift, share, p), duration(x, slower, share, p))
 
 
-def rate_either_way(state: Numbers, p: Numbers) -> Numbers:
-    """Derivatives between ruptures where slip may reverse: it then loads the spring, and the clock
-    is its magnitude plus load point displacement.
+def by_displacement_either_way(state: Numbers, p: Numbers) -> Numbers:
+    """Either of them where slip may reverse: it then loads the spring, and displacement is its
+    magnitude plus that of the load point.
     """
-    changes = rate(state, p)
+    forward = changes(state, p)
     if p[MU_STAR] + state[0] >= 0.0:
-        return changes
+        return forward
     _x, _slower, share = pace(balance(state[0], state[1:BEYOND], p)[0], p)
-    return (changes[0] + 2.0 * p[STIFFNESS] * share, *changes[1:])
+    return (forward[0] + 2.0 * p[STIFFNESS] * share, *forward[1:])
+
+
+def advance(slant: float) -> float:
+    """Displacement along a path that is so steep: its square may overflow where slip stops."""
+    if abs(slant) > STEEP:
+        return 1.0 / abs(slant)
+    return 1.0 / math.sqrt(1.0 + slant * slant)
+
+
+def along_path(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives between ruptures, along the path."""
+    by = changes(state, p)
+    return scaled(by, advance((by[0] - total(by[1:BEYOND])) / (UNITS * p[A])))
+
+
+def rupture_along_path(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives in a rupture, along the path."""
+    by = rupture_rate(state, p)
+    return scaled(by, advance(by[1] / UNITS))
+
+
+def rupture_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+    """The same, and inertial time as a passenger."""
+    by = rupture_rate(state[:BEYOND_FULL], p)
+    return scaled((*by, 1.0), advance(by[1] / UNITS))
+
+
+def point_in_rupture(state: Numbers, rates: Numbers, p: Numbers) -> Any:
+    """What the slider does in a rupture."""
+    return rupture_point(state[:BEYOND_FULL], rates[:BEYOND_FULL], p)
 
 
 def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:

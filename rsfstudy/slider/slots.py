@@ -84,6 +84,31 @@ def others_moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
     _open(psis, changes, by)
 
 
+def scaled(numbers: Numbers, by: float) -> Numbers:
+    """So many times each of some numbers (see `states`)."""
+    _open(numbers, by)
+
+
+def others_scaled(numbers: Numbers, by: float) -> Numbers:
+    """The same of all but the first."""
+    _open(numbers, by)
+
+
+def changes(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives of the unknowns in the clock of a form (see `forms`)."""
+    _open(state, p)
+
+
+def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
+    """Derivatives of the unknowns of the full equations, in inertial time (see `dynamics`)."""
+    _open(state, p)
+
+
+def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[Any, ...]:
+    """What the slider does where mass acts (see `dynamics`)."""
+    _open(state, rates, p)
+
+
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state per unit slip, for a law of one state (see `laws`)."""
     _open(log_rate, state, p)

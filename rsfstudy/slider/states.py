@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import A, others_moved
+from rsfstudy.slider.slots import A, others_moved, others_scaled
 
 
 def total(numbers: Numbers) -> float:
@@ -42,3 +42,13 @@ def moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
 def only_moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
     """The same, of one state."""
     return (psis[0] + by * changes[0],)
+
+
+def scaled(numbers: Numbers, by: float) -> Numbers:
+    """So many times each of some numbers."""
+    return (by * numbers[0], *others_scaled(numbers[1:], by))
+
+
+def only_scaled(numbers: Numbers, by: float) -> Numbers:
+    """The same, of one number."""
+    return (by * numbers[0],)

@@ -23,6 +23,7 @@ FLOATS = SimpleNamespace(
     exp=lambda z: math.exp(min(z, 700.0)),
     expm1=lambda z: math.expm1(min(z, 700.0)),
     log=math.log,
+    sqrt=math.sqrt,
     clamped=_clamped,
     branches=True,
 )
@@ -31,6 +32,7 @@ COMPILED = SimpleNamespace(
     exp=lambda z: math.exp(min(z, 700.0)),
     expm1=lambda z: math.expm1(min(z, 700.0)),
     log=lambda z: math.log(z),
+    sqrt=lambda z: math.sqrt(z),
     clamped=lambda value, low, high: max(low, min(value, high)),
     branches=True,
 )

@@ -190,6 +190,7 @@ class Heyoka:
         symbols = SimpleNamespace(
             exp=hy.exp,
             log=hy.log,
+            sqrt=hy.sqrt,
             expm1=lambda z: hy.exp(z) - 1.0,
             clamped=lambda value, _low, _high: value,
         )
@@ -204,7 +205,9 @@ class Heyoka:
         ]
         self._wide = hy.recommended_simd_size()
         self._known: dict[Any, Any] = {}
-        floats = SimpleNamespace(exp=np.exp, log=np.log, expm1=np.expm1, clamped=np.clip)
+        floats = SimpleNamespace(
+            exp=np.exp, log=np.log, sqrt=np.sqrt, expm1=np.expm1, clamped=np.clip
+        )
         plain = equations(floats, law, variable)
 
         def integrating(system: int) -> Any:
@@ -257,7 +260,9 @@ class Diffrax:
         import jax.numpy as jnp
 
         jax.config.update("jax_enable_x64", True)
-        numbers = SimpleNamespace(exp=jnp.exp, log=jnp.log, expm1=jnp.expm1, clamped=jnp.clip)
+        numbers = SimpleNamespace(
+            exp=jnp.exp, log=jnp.log, sqrt=jnp.sqrt, expm1=jnp.expm1, clamped=jnp.clip
+        )
         made = equations(numbers, law, variable)
 
         def integrating(rate: Any, of: int) -> Any:

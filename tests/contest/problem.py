@@ -23,10 +23,11 @@ from rsfstudy.measures.limit_cycle import Approach
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind
+from rsfstudy.motion.regimes import motion
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
-from rsfstudy.slider.equations import IN_RUPTURE
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.equations import IN_RUPTURE, between_ruptures
+from rsfstudy.slider.forms import UNITS, Point
 
 BUDGET = 10**9
 #: Places of the numbers of a scene.
@@ -44,13 +45,13 @@ class Problem:
     p : tuple of float
         Numbers of the scene.
     rises : float
-        Derivative of ln V there, along slip and load point displacement together.
-    span : float
-        That displacement over all the cycle.
+        Derivative of ln V there, over slip and load point displacement together.
     interval, drop : float
         The truth.
-    leave, rupture : float
-        The marks: that displacement until the rupture begins, and its duration in inertial time.
+    leave, rupture, rest : float
+        The marks: length of the path until the rupture begins, of that, and of what follows it.
+    lasts : float
+        Duration of the rupture.
     fall, creep : float
         Time of the minimum of spring stress, and what slip takes from the spring between it and the
         mark that ends the rupture.
@@ -60,18 +61,20 @@ class Problem:
     begin: Point
     p: tuple[float, ...]
     rises: float
-    span: float
     interval: float
     drop: float
     leave: float = math.nan
     rupture: float = math.nan
+    rest: float = math.nan
+    lasts: float = math.nan
     fall: float = math.nan
     creep: float = math.nan
 
     @property
     def marks(self) -> tuple[float, ...]:
         """What `through` has to know."""
-        return self.rises, self.leave, self.rupture, self.span, self.fall, self.creep
+        paths = self.leave, self.rupture, self.rest
+        return self.rises, *paths, self.lasts, self.fall, self.creep
 
     def error(self, found: tuple[float, float]) -> float:
         """Largest relative error of the recurrence interval and of the static stress drop."""
@@ -93,12 +96,13 @@ def problem(scene: Scene) -> Problem:
     assert coupling is not None
     mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_rate
     common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
+    slow = between_ruptures(scene, clock=True)
+    passing = slow.rates((begin.spring, *begin.psis, 0.0))[-1]
     return Problem(
         scene=scene,
         begin=begin,
         p=(*common, mass, math.log(mass), *coupling),
-        rises=begin.growth,
-        span=2.0 * scene.load_velocity * truth.interval,
+        rises=begin.growth / passing / (2.0 * scene.load_velocity),
         interval=truth.interval,
         drop=truth.highest - truth.lowest,
     )
@@ -114,20 +118,35 @@ def marked(it: Problem, rtol: float) -> Problem:
             entering = event.regime == IN_RUPTURE
             passed["leave" if entering else "land"] = event.time
             passed["landed"] = event.point.spring
-            if entering:
-                passed["displacement"] = scene.load_velocity * event.time + event.slip
         elif event.kind is Kind.FALL and event.time > 0.0:
             passed["fall"], passed["lowest"] = event.time, event.point.spring
         elif event.kind is Kind.RISE and "fall" in passed:
             break
     loaded = scene.stiffness * scene.load_velocity * (passed["land"] - passed["fall"])
+    leave, rupture, rest = paths(scene, Accuracy(rtol), it.begin)
     return replace(
         it,
-        leave=passed["displacement"],
-        rupture=(passed["land"] - passed["leave"]) / scene.inertial_time,
+        leave=leave,
+        rupture=rupture,
+        rest=rest,
+        lasts=passed["land"] - passed["leave"],
         fall=passed["fall"],
         creep=passed["landed"] - passed["lowest"] - loaded,
     )
+
+
+def paths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
+    """How long the path is in each of the three stretches of a cycle."""
+    lengths, regime, load = list[float](), "", scene.log_load_rate
+    for step in motion(scene, accuracy, meter("scipy"), begin, clock=True):
+        if step.equations.regime != regime:
+            regime = step.equations.regime
+            lengths.append(0.0)
+        lengths[-1] = step.end
+        if len(lengths) == 3 and step.before.log_rate < load <= step.after.log_rate:
+            lengths[-1] = step.locate(lambda point: point.log_rate - load)
+            break
+    return lengths
 
 
 def meter(engine: str) -> Meter:
@@ -143,10 +162,12 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
     """The equations of a law and a normal stress, in the functions of `m`, each made `ready`; where
     it `branches`, the slow manifold spares what mass does not show.
 
-    ``slow(f, psi, p)`` gives the rates of both, and of time, over slip and load point displacement
-    together; ``fast(f, x, g, p)`` the rates of all three in inertial time.
+    ``slow(f, psi, p)`` gives the rates of both, and of time, along the path in slip and load point
+    displacement and ln V; ``fast(f, x, g, p)`` the rates of all three along that in inertial time
+    and ln V.
     """
     exp, log, expm1, clamped = (ready(of) for of in (m.exp, m.log, m.expm1, m.clamped))
+    sqrt = ready(m.sqrt)
     is_slip, branches = law == "slip", getattr(m, "branches", False)
 
     @ready
@@ -205,7 +226,10 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         slower = exp(p[LOG_LOAD] - x)
         share = 1.0 / (1.0 + slower)
         loading = p[STIFFNESS] * (slower - 1.0) * share
-        return loading, evolution(x, psi - shift, p) * share, slower * share / p[LOAD]
+        evolving = evolution(x, psi - shift, p) * share
+        slant = (loading - evolving) / (UNITS * p[A])
+        part = 1.0 / sqrt(1.0 + slant * slant)
+        return part * loading, part * evolving, part * slower * share / p[LOAD]
 
     @ready
     def fast(f: Any, x: Any, g: Any, p: Any) -> Any:
@@ -214,7 +238,9 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         faster = clamped((f - g) / (p[STIFFNESS] * norm), -1e30, 1e30)
         changes = evolution(x, value - p[A] * x - shift, p) * norm
         loading = p[STIFFNESS] * (p[LOAD] * p[MASS] - norm)
-        return loading, faster, (p[A] * faster + changes) / slope
+        slant = faster / UNITS
+        part = 1.0 / sqrt(1.0 + slant * slant)
+        return part * loading, part * faster, part * (p[A] * faster + changes) / slope
 
     return SimpleNamespace(strength=strength, balance=balance, slow=slow, fast=fast)
 
@@ -229,17 +255,16 @@ def through(
 
     @ready
     def cycle(f0: Any, psi: Any, p: Any, marks: Any, tolerance: Any) -> Any:
-        rises, leave, rupture, span = marks[0], marks[1], marks[2], marks[3]
-        fall, creep = marks[4], marks[5]
+        rises, leave, rupture, rest = marks[0], marks[1], marks[2], marks[3]
+        lasts, fall, creep = marks[4], marks[5], marks[6]
         f, psi, t = slow(f0, psi, 0.0 * f0, leave, p, tolerance)
         x, g, _shift = balance(f, psi, p)
         f, x, g = fast(f, x, g, rupture, p, tolerance)
-        t = t + rupture * p[MASS]
+        t = t + lasts
         psi = strength(g, p)[0] - p[A] * x
         # from the minimum to the mark, the load point and creep have changed the spring
         drop = f0 - f + p[STIFFNESS] * p[LOAD] * (t - fall) + creep
-        done = 2.0 * p[LOAD] * t - (f - f0) / p[STIFFNESS]
-        f, psi, t = slow(f, psi, t, span - done, p, tolerance)
+        f, psi, t = slow(f, psi, t, rest, p, tolerance)
         x, g, _shift = balance(f, psi, p)
         return t + (p[LOG_LOAD] - x) / rises / (2.0 * p[LOAD]), drop
 

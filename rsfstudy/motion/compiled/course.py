@@ -129,6 +129,7 @@ def enter(now, y, last):
         y[1], y[2] = last[LOG_RATE], last[FRICTION]
         for i in range(1, now.states):
             y[2 + i] = last[PSIS + i]
+        y[2 + now.states] = 0.0
     else:
         for i in range(now.states):
             y[1 + i] = last[PSIS + i]
@@ -157,7 +158,7 @@ def through_regime(now, place, last, told, rows, limits):
     evaluate(place.point, place.y, place.stages, p, place.before)
     rates_at_end = moved(place.stages, STAGES * unknowns)
     while True:
-        taken = take_step(now, place, limits)
+        taken = take_step(now, place)
         if taken != TAKEN:
             return taken
         evaluate(place.point, place.new, rates_at_end, p, place.after)
@@ -217,7 +218,7 @@ def cut_short(now, place, limits):
         cut(now, place, located(EXCESS, before, after, now, place, limits))
     over = passed_at_end(now, place, limits) >= now.lasts
     if over:
-        at_begin = now.started + elapsed(now, now.clock, place.y, limits) - now.lasts
+        at_begin = now.started + elapsed(now, place, place.y, limits) - now.lasts
         at_end = passed_at_end(now, place, limits) - now.lasts
         cut(now, place, located(PASSED, at_begin, at_end, now, place, limits))
     return leaves, over

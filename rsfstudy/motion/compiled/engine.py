@@ -98,8 +98,7 @@ def prepare(scene: Scene) -> None:
         _addresses(without_mass(scene, clock=clock))
         if scene.has_mass:
             _addresses(between_ruptures(scene, clock=clock))
-    if scene.has_mass:
-        _addresses(in_rupture(scene))
+            _addresses(in_rupture(scene, clock=clock))
 
 
 def segment(

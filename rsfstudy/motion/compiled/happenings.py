@@ -99,7 +99,7 @@ def reading(what, clock, now, room, limits):
     """The quantity of a watch, `EXCESS`, `PASSED` or `ROOM`, at a clock within the step."""
     if what == PASSED:
         unknowns_at(now, room, clock)
-        return now.started + elapsed(now, clock, room.within, limits) - now.lasts
+        return now.started + elapsed(now, room, room.within, limits) - now.lasts
     point_within(now, room, clock)
     if what == EXCESS:
         return excess(now, room.between, limits)
@@ -174,7 +174,7 @@ def tell_beginning(now, room, last, told, limits):
     one before: at the more extreme of both, or at the first beyond a level. Returns whether that
     ends the motion.
     """
-    p, passed = room.p, now.started + elapsed(now, now.clock, room.y, limits)
+    p, passed = room.p, now.started + elapsed(now, room, room.y, limits)
     tell(now, told, float(now.begins), now.clock, passed, room.before, p)
     if now.begins != CHANGE:
         return False
@@ -234,7 +234,7 @@ def tell_watched(now, room, told, limits):
             tell(now, told, float(first), clock, passed_at_end(now, room, limits), room.after, p)
         else:
             point_within(now, room, clock)
-            passed = now.started + elapsed(now, clock, room.within, limits)
+            passed = now.started + elapsed(now, room, room.within, limits)
             tell(now, told, float(first), clock, passed, room.between, p)
         watch = watch_of(room, first)
         urgent = max(urgent, 1 if watch[WAITS] else 2)
@@ -245,7 +245,7 @@ def tell_watched(now, room, told, limits):
 
 def passed_at_end(now, room, limits):
     """Time since the start, at the end of the step."""
-    return now.started + elapsed(now, now.end, room.new, limits)
+    return now.started + elapsed(now, room, room.new, limits)
 
 
 def record(now, room, rows, limits):
@@ -253,7 +253,7 @@ def record(now, room, rows, limits):
     for sample in range(1, SAMPLES):
         clock = now.clock + (now.end - now.clock) * (sample / SAMPLES)
         point_within(now, room, clock)
-        passed = now.started + elapsed(now, clock, room.within, limits)
+        passed = now.started + elapsed(now, room, room.within, limits)
         record_point(now, rows, passed, room.between, room.p)
     record_point(now, rows, passed_at_end(now, room, limits), room.after, room.p)
 

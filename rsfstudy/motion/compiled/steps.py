@@ -24,7 +24,6 @@ from rsfstudy.motion.compiled.table import (
     NO_STEP,
     PSIS,
     RATIO,
-    SLOW,
 )
 from rsfstudy.motion.compiled.unrolled import ERROR, EXTRA, LENGTH, STAGES
 from rsfstudy.slider.equations import LONGEST_STEP, stride
@@ -34,11 +33,12 @@ from rsfstudy.slider.slots import LOG_LOAD_RATE
 TAKEN = -1
 
 
-def elapsed(now, clock, y, limits):
-    """Time since the regime began; NaN where nothing tells it."""
-    if now.regime == FAST:
-        return clock * limits.inertial_time
-    return y[now.unknowns - 1] if now.has_clock else math.nan
+def elapsed(now, room, y, limits):
+    """Time since the regime began, at some unknowns; NaN where nothing tells it."""
+    if not now.has_clock:
+        return math.nan
+    unit = limits.inertial_time if now.regime == FAST else 1.0
+    return unit * y[room.unknowns - 1]
 
 
 def begin(now, room):
@@ -49,14 +49,14 @@ def begin(now, room):
     spend(now, 2)
 
 
-def take_step(now, room, limits):
+def take_step(now, room):
     """Take a step whose local error is allowed; why not, where there is none.
 
     Where steps become shorter than the spacing of floating-point numbers around it, the clock
     starts anew.
     """
     longest = LONGEST_STEP
-    if now.regime == SLOW and now.strides:
+    if now.strides:
         longest = stride(room.before[LOG_RATE], room.before[RATIO], room.p[LOG_LOAD_RATE])
     longest *= now.finer
     while True:
@@ -69,7 +69,6 @@ def take_step(now, room, limits):
             return BUDGET_SPENT
         if now.clock == 0.0 or not now.anew:
             return NO_STEP
-        now.started += elapsed(now, now.clock, room.y, limits)
         begin(now, room)
     total = 0.0
     for i in range(room.unknowns):
