@@ -125,7 +125,7 @@ def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
 #: What the equations of any scene call.
 ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
 #: What takes them along the path.
-ALWAYS |= {"changes", "scaled", "others_scaled"}
+ALWAYS |= {"changes", "scaled", "others_scaled", "advance"}
 #: What mass adds.
 OF_MASS = {"resistance", "resisted", "weight_at", "without_mass", "moved", "felt"}
 
