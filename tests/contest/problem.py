@@ -112,7 +112,9 @@ def marked(it: Problem, rtol: float) -> Problem:
     """A problem with marks where the package sets them for an accuracy."""
     scene, passed = it.scene, dict[str, float]()
     allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
-    moving = follow(scene, allowed, meter("compiled"), _asked(scene), start=it.begin, clock=True)
+    moving = follow(
+        scene, allowed, meter("compiled"), _asked(scene.log_load_rate), start=it.begin, clock=True
+    )
     for event in moving:
         if event.kind is Kind.REGIME:
             entering = event.regime == IN_RUPTURE
