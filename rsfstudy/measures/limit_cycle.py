@@ -106,7 +106,7 @@ class LimitCycle(Measure):
 
     @property
     def typical_work(self) -> int:
-        return 15_000
+        return 9_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events until one repeats, then go round once more with smaller tolerances: for the

@@ -102,7 +102,7 @@ def follow(
                 if event.watch is not None and event.watch.ends:
                     return
         if last.kind is Kind.END:
-            # clocks of slip tell time the worse the longer the load point is held
+            # it was located to the spacing of numbers around the clock
             last = last._replace(time=end)
             if recording is not None:
                 recording.ends_at(end)

@@ -29,7 +29,7 @@ LONGEST_STRIDE, FEW = 3.0, 10.0
 
 
 def any_step(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
-    """Steps of a clock that is not slip."""
+    """Steps of a rigid slider, whose motion has no turns."""
     return LONGEST_STEP
 
 

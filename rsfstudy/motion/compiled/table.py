@@ -32,8 +32,8 @@ NOW = np.dtype(
         ("begins", "i8"),  # what to tell before the first event of a regime
         ("ends_by_fate", "i8"),  # whether the motion ends where it cannot go on
         ("has_mass", "i8"),  # whether there are two regimes
-        ("has_clock", "i8"),  # whether time is an unknown between ruptures
-        ("strides", "i8"),  # whether the clock between ruptures is slip, which limits steps
+        ("has_clock", "i8"),  # whether time is an unknown
+        ("strides", "i8"),  # whether the clock is length along the path, which limits steps
         ("anew", "i8"),  # whether the clock may start anew
         ("at_point", "i8"),  # whether it begins at the last point of one before, not where y is
         ("is_dense", "i8"),  # whether dense output of the step is there
