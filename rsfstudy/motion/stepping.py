@@ -11,7 +11,7 @@ from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
 from scipy.optimize import brentq
 
 from rsfstudy.motion.engines import SCIPY
-from rsfstudy.slider.equations import LONGEST_STEP, RIGID, Equations
+from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.slots import LOG_LOAD_RATE
@@ -151,9 +151,6 @@ def steps(
 ) -> Iterator[Step]:
     """Integrate from clock zero, step by step, for as long as the caller asks.
 
-    The equations do not depend on the clock. Where steps become shorter than the spacing of
-    floating-point numbers around it, the clock starts anew at zero.
-
     Parameters
     ----------
     equations : Equations
@@ -186,22 +183,19 @@ def steps(
         changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
         return changes
 
-    def started(unknowns: Vector) -> OdeSolver:
-        # how long a first step may be is asked of a trial step too
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return method(
-                rate,
-                0.0,
-                unknowns,
-                -math.inf if backward else math.inf,
-                rtol=tolerance,
-                atol=tolerance * np.asarray(equations.scales),
-                max_step=LONGEST_STEP,
-            )
-
+    # how long a first step may be is asked of a trial step too
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        solver = method(
+            rate,
+            0.0,
+            np.asarray(state, dtype=float),
+            -math.inf if backward else math.inf,
+            rtol=tolerance,
+            atol=tolerance * np.asarray(equations.scales),
+            max_step=LONGEST_STEP,
+        )
     # what limits a step must differ between two tolerances whose results are to tell errors
-    finer = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125
-    solver, jacobians = started(np.asarray(state, dtype=float)), 0
+    finer, jacobians = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125, 0
     before = equations.point(tuple(solver.y.tolist()), _rates(solver, rate), p)
     while True:
         # trial steps may leave the domain, and the solver then rejects them; what it accepts is
@@ -214,10 +208,7 @@ def steps(
         meter.jacobians += solver.njev - jacobians
         jacobians = solver.njev
         if solver.status == "failed":
-            if solver.t == 0.0 or regime == RIGID:  # whose clock is slip
-                raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
-            solver, jacobians = started(solver.y), 0
-            continue
+            raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
         unknowns = tuple(solver.y.tolist())
         if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
             raise Halt(

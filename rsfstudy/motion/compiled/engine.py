@@ -53,7 +53,7 @@ _BESIDE = [(Kind.END, None), (Kind.REGIME, None), (Kind.START, None)]
 _OF_STATES = table.POINT + table.PSIS
 _NO_MASS = (math.nan,) * len(Limits._fields)
 #: How segments of loading are followed.
-_OF_SEGMENTS = ("at_point", 1), ("ends_by_fate", 1), ("strides", 1), ("anew", 1)
+_OF_SEGMENTS = ("at_point", 1), ("ends_by_fate", 1), ("strides", 1)
 #: How long paths last that have no time, and where they begin.
 _FOR_EVER = math.inf, 0.0, 0.0, 0.0
 
@@ -140,12 +140,9 @@ def along(
     samples: Sequence[float],
 ) -> Iterator[Event]:
     """Events along one system of equations; the arguments are those of `course.along`."""
-    is_rigid, direction = equations.regime == RIGID, -1.0 if backward else 1.0
-    memory = _beginning(
-        (("direction", direction), ("anew", not is_rigid), ("strides", not is_rigid)),
-        tolerance,
-        (len(equations.unknowns), equations.states, 0),
-    )
+    counts = len(equations.unknowns), equations.states, 0
+    flags = ("direction", -1.0 if backward else 1.0), ("strides", equations.regime != RIGID)
+    memory = _beginning(flags, tolerance, counts)
     begins = np.array((*state, *state)), np.empty(table.PSIS + equations.states)
     return _told(_plan(memory, equations), _FOR_EVER, begins, meter, watches, samples)
 

@@ -50,26 +50,16 @@ def begin(now, room):
 
 
 def take_step(now, room):
-    """Take a step whose local error is allowed; why not, where there is none.
-
-    Where steps become shorter than the spacing of floating-point numbers around it, the clock
-    starts anew.
-    """
+    """Take a step whose local error is allowed; why not, where there is none."""
     longest = LONGEST_STEP
     if now.strides:
         longest = stride(room.before[LOG_RATE], room.before[RATIO], room.p[LOG_LOAD_RATE])
     longest *= now.finer
-    while True:
-        shortest = 10.0 * abs(np.nextafter(now.clock, now.direction * np.inf) - now.clock)
-        length = attempted(now, room, longest, shortest)
-        now.steps += 1
-        if length > 0.0:
-            break
-        if length < 0.0:
-            return BUDGET_SPENT
-        if now.clock == 0.0 or not now.anew:
-            return NO_STEP
-        begin(now, room)
+    shortest = 10.0 * abs(np.nextafter(now.clock, now.direction * np.inf) - now.clock)
+    length = attempted(now, room, longest, shortest)
+    now.steps += 1
+    if length <= 0.0:
+        return NO_STEP if length == 0.0 else BUDGET_SPENT
     total = 0.0
     for i in range(room.unknowns):
         total += room.new[i]

@@ -34,7 +34,6 @@ NOW = np.dtype(
         ("has_mass", "i8"),  # whether there are two regimes
         ("has_clock", "i8"),  # whether time is an unknown
         ("strides", "i8"),  # whether the clock is length along the path, which limits steps
-        ("anew", "i8"),  # whether the clock may start anew
         ("at_point", "i8"),  # whether it begins at the last point of one before, not where y is
         ("is_dense", "i8"),  # whether dense output of the step is there
         ("fate", "i8"),  # why the motion cannot go on, and normal stress there
