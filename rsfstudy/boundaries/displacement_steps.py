@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 
 from rsfstudy.boundaries.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
 from rsfstudy.boundaries.touching import displacement_on_path
@@ -61,17 +61,15 @@ class DisplacementSteps(Steps):
         critical = math.nan if math.isnan(size) else after(self.value(size))
         return dict(zip(self.beside, (critical, closed_form), strict=True))
 
-    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+    def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """One integration each: a displacement step starts wherever the critical path has Psi =
         0.
         """
-        sizes = []
         for tolerance in tolerances:
             step = displacement_on_path(self.scene, tolerance, meter, self.sign)
             if step is None:
-                return None
-            sizes.append(abs(step))
-        return sizes
+                return
+            yield abs(step)
 
     def _largest(self) -> float:
         """Up: the step that itself takes the slip rate to the norm, and somewhat farther with mass,

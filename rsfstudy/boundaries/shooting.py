@@ -5,7 +5,7 @@ step is found by shooting.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 
 from scipy.optimize import brentq
 
@@ -30,24 +30,21 @@ class ShotSteps(Steps):
     for: those that change what friction balances, or what moves the spring.
     """
 
-    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+    def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Shoot: find the step whose critical path comes from the state before it.
 
         A loose root and its slope come first; from there the tighter tolerances take one to three
         paths each. With several states there are no such paths.
         """
-        if self.scene.states > 1:
-            return None
-        loose = self._loose_root(meter)
-        if loose is None:
-            return None
-        return _refined(
-            *loose,
-            tolerances,
-            lambda size, tolerance: rate_step_misfit(self.scene_at(size), tolerance, meter),
-        )
+        loose = self._loose_root(meter) if self.scene.states == 1 else None
+        if loose is not None:
+            yield from _refined(
+                *loose,
+                tolerances,
+                lambda size, tolerance: rate_step_misfit(self.scene_at(size), tolerance, meter),
+            )
 
-    def sizes_of_cycle(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+    def sizes_of_cycle(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Find the step whose limit cycle touches the norm, from one orbit each: the smallest after
         which that orbit stops shrinking.
         """
@@ -63,11 +60,14 @@ class ShotSteps(Steps):
             now = misfit(larger)
             if before < 0.0 <= now:
                 found = _root(misfit, smaller, larger)
-                return found and _refined(
-                    *found, tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
-                )
+                if found is not None:
+                    yield from _refined(
+                        *found,
+                        tolerances,
+                        lambda size, tolerance: misfit(math.log(size), tolerance),
+                    )
+                return
             smaller, larger, before = larger, larger + stride, now
-        return None
 
     def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
         """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
@@ -143,22 +143,21 @@ def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, flo
 def _refined(
     log_size: float,
     slope: float,
-    tolerances: Sequence[float],
+    tolerances: Iterable[float],
     misfit: Callable[[float, float], float | None],
-) -> list[float] | None:
-    """Sizes at which a misfit vanishes, by each local tolerance, from a loose root and its slope,
-    by the secant method; None where it leads nowhere.
+) -> Iterator[float]:
+    """Sizes at which a misfit vanishes, by one local tolerance after the other, from a loose root
+    and its slope, by the secant method; none from where that leads nowhere.
     """
     if not math.isfinite(slope) or slope == 0.0:
-        return None
-    sizes = []
+        return
     for tolerance in tolerances:
         before: tuple[float, float] | None = None
         for _ in range(_MOST_CORRECTIONS):
             # the error of V_0 itself is that of its logarithm times V_0
             value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
             if value is None or not math.isfinite(value):
-                return None
+                return
             if before is not None and value != before[1]:
                 slope = (value - before[1]) / (log_size - before[0])
             before = log_size, value
@@ -166,6 +165,5 @@ def _refined(
             if min(abs(value), abs(value / slope)) < 30.0 * tolerance:
                 break
         else:
-            return None
-        sizes.append(math.exp(log_size))
-    return sizes
+            return
+        yield math.exp(log_size)

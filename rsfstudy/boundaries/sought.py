@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
 from rsfstudy.motion.stepping import Meter
@@ -65,17 +65,17 @@ class Steps:
         """
         return {}
 
-    def sizes_on_path(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
-        """Size of the step that starts the critical path, by each local tolerance; None where there
-        is no such path.
+    def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
+        """Size of the step that starts the critical path, by one local tolerance after the other,
+        each found when it is asked for; none where there is no such path.
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def sizes_of_cycle(self, tolerances: Sequence[float], meter: Meter) -> list[float] | None:
+    def sizes_of_cycle(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Size of the step after which the motion ends in a limit cycle that touches the norm, by
-        each local tolerance; None where there is none.
+        one local tolerance after the other; none where there is no such step.
         """
-        return None
+        return iter(())
 
     def mass_delays(self, size: float, rtol: float) -> bool:
         """Whether the critical size is not that of the critical path's start, because slip rate

@@ -10,8 +10,9 @@ see `swing`. Either way the answer counts only once a motion on each side of it 
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -36,7 +37,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
 from rsfstudy.motion.regimes import error_of_slow_manifold, mass_acts
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.stepping import TIGHTEST, Halt, Meter
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -52,6 +53,9 @@ _CAREFUL = 1e-8
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _BY_CHANCE = 0.004
+
+#: Most local tolerances by which a path is followed.
+_MOST_PATHS = 5
 
 #: Widest bracket, over the size, that confirms a boundary.
 _WIDEST = 0.02
@@ -338,20 +342,32 @@ def _from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boun
 
 def _boundary(
     steps: Steps,
-    sizes_by: Callable[[Sequence[float], Meter], list[float] | None],
+    sizes_by: Callable[[Iterable[float], Meter], Iterator[float]],
     accuracy: Accuracy,
     meter: Meter,
 ) -> Boundary | None:
-    """A boundary with the error that a second, smaller tolerance tells; None where there is none
-    within the steps of the search.
+    """A boundary with the error that a second, smaller tolerance tells, and a third where that is
+    more than asked for: a path takes so few steps that one whose error is taken for too small
+    decides. None where there is none within the steps of the search.
     """
-    sizes = sizes_by((accuracy.solver, accuracy.refined().solver), meter)
-    if sizes is None or not steps.smallest <= sizes[0] <= steps.largest:
-        return None
-    error = error_between(sizes[0], sizes[1], _BY_CHANCE * accuracy.rtol) / sizes[0]
-    if steps.scene.has_mass:
-        error += error_of_slow_manifold(steps.scene)
-    return Boundary(sizes[0], error)
+    boundary = None
+    of_path = error_of_slow_manifold(steps.scene) if steps.scene.has_mass else 0.0
+    for size, refined in itertools.pairwise(sizes_by(_tolerances(accuracy), meter)):
+        if not steps.smallest <= size <= steps.largest:
+            break
+        error = error_between(size, refined, _BY_CHANCE * accuracy.rtol) / size
+        boundary = Boundary(size, error + of_path)
+        if error <= accuracy.rtol:
+            break
+    return boundary
+
+
+def _tolerances(accuracy: Accuracy) -> Iterator[float]:
+    """Local tolerances of paths, one a tenth of the other."""
+    for _ in range(_MOST_PATHS):
+        if accuracy.solver > TIGHTEST:
+            yield accuracy.solver
+        accuracy = accuracy.refined()
 
 
 def _smaller_steps_decay(steps: Steps, size: float) -> bool:
@@ -372,8 +388,7 @@ def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
     massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
     if massless.largest <= massless.smallest or not massless.scene.critical_stiffness:
         return None
-    sizes = massless.sizes_on_path((1e-6,), meter)
-    return None if sizes is None else sizes[0]
+    return next(massless.sizes_on_path((1e-6,), meter), None)
 
 
 def _neighbours(
