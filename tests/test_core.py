@@ -8,14 +8,22 @@ import math
 import numpy as np
 import pytest
 from conftest import cot_phi, follow
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.regimes import motion, starting
 from rsfstudy.motion.stepping import Halt, Meter, steps
-from rsfstudy.slider.equations import Equations, between_ruptures, by_inertial_time, log_rate_at
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.equations import (
+    Equations,
+    between_ruptures,
+    by_displacement,
+    by_inertial_time,
+    log_rate_at,
+)
+from rsfstudy.slider.forms import Point, advance
 from rsfstudy.status import Status
 
 
@@ -232,6 +240,31 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     assert point.growth == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5)
     # without the growth of what mass takes
     assert abs(point.growth - (point.spring - point.friction) / (scene.a * 1e-3)) > 1e-9
+
+
+@given(st.floats(-1e12, 1e12))
+def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
+    """d(sigma)**2 = ds**2 + (slant ds)**2."""
+    assert advance(slant) * math.hypot(1.0, slant) == pytest.approx(1.0, rel=1e-15)
+
+
+def test_no_slant_is_too_steep():
+    assert advance(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("log_rate", [-12.0, 1.0, 9.0])
+def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log_rate):
+    """One unit of ln V is a sixth of the way that slip of D_c is; without mass and at constant
+    normal stress, dx/ds is the growth of ln V.
+    """
+    scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
+    state = (0.01, 0.01 - scene.a * log_rate)
+    by = by_displacement(scene)
+    growth = by.at(state).growth
+    along = between_ruptures(scene, clock=False).rates(state)
+    for ours, theirs in zip(along, by.rates(state), strict=True):
+        assert ours * math.sqrt(1.0 + (growth / 6.0) ** 2) == pytest.approx(theirs, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])

@@ -53,6 +53,21 @@ def test_a_runaway_is_followed_to_its_end(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+def test_slip_that_nothing_loads_is_followed_to_its_end(engine):
+    """By the slowness law ln V falls as state grows, to 10^-290 V_*: evolution over what slip there
+    is has a square beyond all numbers.
+    """
+    scene = Scene(
+        law="slowness", normal_stress="constant", b_over_a=5.0, stiffness_ratio=0.5,
+        inertia=True, displacement_step=3.0,
+    )  # fmt: skip
+    meter = Meter(5_000, engine=engine)
+    with pytest.raises(Halt) as halt:
+        list(follow(scene, Accuracy(1e-4, engine=engine), meter))
+    assert halt.value.status is Status.SLIP_STOPPED
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_norm_is_met_before_normal_stress_is_lost(engine):
     """sigma_3 below zero: slip rate grows without bound as normal stress vanishes."""
     scene = Scene(
