@@ -38,7 +38,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.012
+_BY_CHANCE = 0.06
 #: Displacement in D_c that sets off a motion where the scene has no step.
 NUDGE = 0.1
 #: Part of their distance to the limit that cycles keep each time: above the first they are leapt
