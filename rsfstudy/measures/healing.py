@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.readings import (
-    FRICTION,
-    LOAD_POINT,
     friction_at,
     friction_of,
     load_point_of,
@@ -67,7 +65,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Healing(Measure):
+class Healing(Reading):
     """What the first hold of a loading shows, by the definitions of the laboratory.
 
     With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
@@ -88,6 +86,8 @@ class Healing(Measure):
     record: float = 10.0
     phases: int = 300
     name: ClassVar[str] = "healing"
+    read = _READ
+    kept = ("time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
 
     def __post_init__(self) -> None:
         if not 0.0 < self.record < math.inf:
@@ -98,22 +98,6 @@ class Healing(Measure):
     @property
     def headline(self) -> str:
         return "healing"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        read = [about.name for about in _READ]
-        profiles = ("time", "load_point_displacement", "slip", "friction_coefficient")
-        return dict.fromkeys((*read, *(f"{name}_error" for name in read)), ()) | dict.fromkeys(
-            (*profiles, "log10_slip_rate"), ("phase",)
-        )
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return (*_READ, FRICTION, LOAD_POINT)
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.phases)}
 
     @property
     def typical_work(self) -> int:

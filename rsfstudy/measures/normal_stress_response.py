@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
-from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_at
+from rsfstudy.motion.readings import friction_at
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
@@ -73,8 +74,6 @@ _OTHERS = (
         "lead of spring stress in small oscillations, by linear theory",
     ),
     Quantity("settled", "", "1", "whether one period of the response is as another later on"),
-    FRICTION,
-    LOAD_POINT,
 )
 _SERIES = (
     "time",
@@ -116,7 +115,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NormalStressResponse(Measure):
+class NormalStressResponse(Reading):
     """What an oscillation of imposed normal stress makes of spring stress, once transients have
     decayed: Fourier's projection over one period.
 
@@ -139,6 +138,9 @@ class NormalStressResponse(Measure):
 
     samples: int = 64
     name: ClassVar[str] = "normal_stress_response"
+    read = _READ
+    beside = _OTHERS
+    kept = _SERIES
 
     def __post_init__(self) -> None:
         if self.samples < 8 or self.samples % 2:
@@ -150,19 +152,8 @@ class NormalStressResponse(Measure):
         return "gain"
 
     @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        read = [about.name for about in _READ]
-        scalars = (*read, *(f"{name}_error" for name in read))
-        others = ("linear_gain", "linear_phase_lead", "settled")
-        return dict.fromkeys((*scalars, *others), ()) | dict.fromkeys(_SERIES, ("phase",))
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return (*_READ, *_OTHERS)
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.samples + 1)}
+    def points(self) -> int:
+        return self.samples + 1
 
     @property
     def typical_work(self) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -11,12 +10,13 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._reading import Reading
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
-from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of
+from rsfstudy.motion.readings import friction_of
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -64,8 +64,6 @@ _OTHERS = (
         "1",
         "largest departure of friction, where it is read, from that of a stiff slider",
     ),
-    FRICTION,
-    LOAD_POINT,
 )
 _SERIES = (
     "time",
@@ -102,7 +100,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NormalStressTransient(Measure):
+class NormalStressTransient(Reading):
     """What friction does after a step of imposed normal stress by a ratio r, while the load point
     moves on at V_*.
 
@@ -131,6 +129,9 @@ class NormalStressTransient(Measure):
     record: float = 30.0
     phases: int = 300
     name: ClassVar[str] = "normal_stress_transient"
+    read = _READ
+    beside = _OTHERS
+    kept = _SERIES
 
     def __post_init__(self) -> None:
         if not 0.0 < self.fit_from < self.fit_to:
@@ -145,21 +146,6 @@ class NormalStressTransient(Measure):
     @property
     def headline(self) -> str:
         return "apparent_alpha"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        read = [about.name for about in _READ]
-        scalars = (*read, *(f"{name}_error" for name in read))
-        others = ("direct_change", "settled", "closed_form_departure")
-        return dict.fromkeys((*scalars, *others), ()) | dict.fromkeys(_SERIES, ("phase",))
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return (*_READ, *_OTHERS)
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.phases)}
 
     @property
     def typical_work(self) -> int:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._reading import Reading
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
-from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_at, friction_of, watched
+from rsfstudy.motion.readings import friction_at, friction_of, watched
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -61,8 +62,6 @@ _OTHERS = (
         "1",
         "largest departure of friction, from the peak on, from that of a stiff slider",
     ),
-    FRICTION,
-    LOAD_POINT,
 )
 
 
@@ -92,7 +91,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class VelocityStep(Measure):
+class VelocityStep(Reading):
     """What one step of load point velocity shows, by the definitions of the laboratory.
 
     With mu_0 before the step by a factor r, mu_p at the first extremum after it (a peak of a step
@@ -124,6 +123,9 @@ class VelocityStep(Measure):
     record: float = 20.0
     phases: int = 400
     name: ClassVar[str] = "velocity_step"
+    read = _READ
+    beside = _OTHERS
+    kept = ("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
 
     def __post_init__(self) -> None:
         if self.step_number < 1:
@@ -136,22 +138,6 @@ class VelocityStep(Measure):
     @property
     def headline(self) -> str:
         return "apparent_a_minus_b"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        read = [about.name for about in _READ]
-        scalars = (*read, *(f"{name}_error" for name in read))
-        others = ("settled", "closed_form_departure")
-        profiles = ("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
-        return dict.fromkeys((*scalars, *others), ()) | dict.fromkeys(profiles, ("phase",))
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return (*_READ, *_OTHERS)
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.phases)}
 
     @property
     def typical_work(self) -> int:
