@@ -22,7 +22,14 @@ class Reading(Measure):
     #: What is read; what is told beside it; and names of what is kept.
     read: ClassVar[Sequence[Quantity]]
     beside: ClassVar[Sequence[Quantity]] = ()
-    kept: ClassVar[Sequence[str]]
+    kept: ClassVar[Sequence[str]] = (
+        "time",
+        "load_point_displacement",
+        "slip",
+        "friction_coefficient",
+        "normal_stress_ratio",
+        "log10_slip_rate",
+    )
 
     @property
     def points(self) -> int:

@@ -75,14 +75,6 @@ _OTHERS = (
     ),
     Quantity("settled", "", "1", "whether one period of the response is as another later on"),
 )
-_SERIES = (
-    "time",
-    "load_point_displacement",
-    "slip",
-    "friction_coefficient",
-    "normal_stress_ratio",
-    "log10_slip_rate",
-)
 
 
 class _Record(NamedTuple):
@@ -140,7 +132,6 @@ class NormalStressResponse(Reading):
     name: ClassVar[str] = "normal_stress_response"
     read = _READ
     beside = _OTHERS
-    kept = _SERIES
 
     def __post_init__(self) -> None:
         if self.samples < 8 or self.samples % 2:

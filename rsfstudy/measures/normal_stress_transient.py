@@ -65,14 +65,6 @@ _OTHERS = (
         "largest departure of friction, where it is read, from that of a stiff slider",
     ),
 )
-_SERIES = (
-    "time",
-    "load_point_displacement",
-    "slip",
-    "friction_coefficient",
-    "normal_stress_ratio",
-    "log10_slip_rate",
-)
 
 
 class _Record(NamedTuple):
@@ -131,7 +123,6 @@ class NormalStressTransient(Reading):
     name: ClassVar[str] = "normal_stress_transient"
     read = _READ
     beside = _OTHERS
-    kept = _SERIES
 
     def __post_init__(self) -> None:
         if not 0.0 < self.fit_from < self.fit_to:
