@@ -161,6 +161,19 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
         assert loose.values[f"{name}_stable"] < value < loose.values[f"{name}_unstable"]
 
 
+def test_a_large_step_that_motions_find_is_as_accurate_as_asked_for():
+    """They find its logarithm, whose error is four times as large in the ratio of velocities."""
+    scene = Scene(
+        law="slowness", b_over_a=1.21, stiffness_ratio=0.97, radiation_damping=1e-6,
+        alpha=0.4, phi=55.0,
+    )  # fmt: skip
+    exact, its_error, _outcome = found(scene, rtol=1e-6)
+    value, error, _outcome = found(scene, rtol=1e-4)
+    assert exact > 57.0
+    assert error < 1e-4 * (value - 1.0)
+    assert abs(value - exact) <= error + its_error
+
+
 # ---- a second formulation
 # ---------------------------------------------------------------------------
 

@@ -59,6 +59,13 @@ class Steps:
         """Error of `value` where the size has this relative error."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
+    def allowed(self, size: float, rtol: float) -> float:
+        """Relative error of a size at which `value`, less what it is without a step, has this one;
+        no more than that.
+        """
+        change = abs(self.value(size) - self.value(0.0))
+        return min(rtol, rtol * change / self.error(size, 1.0))
+
     def values_beside(self, size: float) -> dict[str, float]:
         """The numbers named in `beside`, for a critical step of this size (NaN where there is
         none).

@@ -35,7 +35,7 @@ from rsfstudy.boundaries.swing import (
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
-from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
+from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy, error_between
 from rsfstudy.motion.regimes import error_of_slow_manifold, mass_acts
 from rsfstudy.motion.stepping import TIGHTEST, Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -52,7 +52,7 @@ DIRECTIONS = ("up", "down")
 _CAREFUL = 1e-8
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
-_BY_CHANCE = 0.004
+_BY_CHANCE = 0.016
 
 #: Most local tolerances by which a path is followed.
 _MOST_PATHS = 5
@@ -258,6 +258,8 @@ class CriticalStep(Measure):
         changes sign; the middle of what is left where a motion in between cannot go on.
         """
         stable, unstable = bracket
+        rtol = max(steps.allowed(math.exp(unstable), accuracy.rtol), TIGHTEST_RTOL)
+        accuracy = replace(accuracy, rtol=rtol)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
@@ -357,7 +359,7 @@ def _boundary(
             break
         error = error_between(size, refined, _BY_CHANCE * accuracy.rtol) / size
         boundary = Boundary(size, error + of_path)
-        if error <= accuracy.rtol:
+        if error <= steps.allowed(size, accuracy.rtol):
             break
     return boundary
 
