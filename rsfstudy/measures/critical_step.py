@@ -52,7 +52,7 @@ DIRECTIONS = ("up", "down")
 _CAREFUL = 1e-8
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
-_BY_CHANCE = 0.016
+_BY_CHANCE = 0.004
 
 #: Most local tolerances by which a path is followed.
 _MOST_PATHS = 5
