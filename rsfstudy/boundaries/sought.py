@@ -6,6 +6,9 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
+import numpy as np
+
+from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene
@@ -16,6 +19,8 @@ SMALLEST_STEP = 1e-3
 RISE_OF_MASS = 5.0
 #: Part of the accuracy asked for to which what mass delays goes unseen.
 UNSEEN = 0.01
+#: Sizes that are looked at where stability may come and go between them.
+_SIZES_BETWEEN = 24
 
 
 class Steps:
@@ -95,6 +100,18 @@ class Steps:
         they take it for a little on either side.
         """
         return 0.0
+
+    def smaller_ones_decay(self, size: float) -> bool:
+        """Whether steady sliding is linearly stable after every smaller step.
+
+        Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
+        stiffness falls with the load point velocity, so the ends of the range decide, unless the
+        law has a slip rate of its own: then it may rise between them.
+        """
+        sizes = [self.smallest, size]
+        if self.scene.parts.law.resting is not None:
+            sizes = np.geomspace(self.smallest, size, _SIZES_BETWEEN).tolist()
+        return all(settles(self.scene_at(each)) for each in sizes)
 
     def _largest(self) -> float:
         raise TypeError(f"{type(self).__name__} steps nothing")

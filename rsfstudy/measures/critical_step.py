@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-import numpy as np
 from scipy.optimize import toms748
 
 from rsfstudy.boundaries.displacement_steps import DisplacementSteps
@@ -28,7 +27,6 @@ from rsfstudy.boundaries.swing import (
     neutral,
     orbits_may_close,
     ratio_after,
-    settles,
     stability_margin,
     swing,
 )
@@ -59,9 +57,6 @@ _MOST_PATHS = 5
 
 #: Widest bracket, over the size, that confirms a boundary.
 _WIDEST = 0.02
-
-#: Sizes of smaller steps that are looked at where stability may come and go between them.
-_SIZES_BETWEEN = 24
 
 #: Excess of a motion whose first peak is beyond a limit cycle that touches the norm.
 _AT_ONCE = 0.1
@@ -168,7 +163,7 @@ class CriticalStep(Measure):
                         return outcome
             return self._surveyed(steps, accuracy, meter)
         near = _at_light_norm(steps, meter)
-        if near is not None and _smaller_steps_decay(steps, near):
+        if near is not None and steps.smaller_ones_decay(near):
             bracket = _neighbours(steps, near, accuracy, meter)
             if bracket is not None:
                 return self._closed_in(steps, bracket, accuracy, meter)
@@ -322,7 +317,7 @@ def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Bound
     such path.
     """
     boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
-    if boundary is None or not _smaller_steps_decay(steps, boundary.size):
+    if boundary is None or not steps.smaller_ones_decay(boundary.size):
         return None
     return boundary
 
@@ -370,18 +365,6 @@ def _tolerances(accuracy: Accuracy) -> Iterator[float]:
         if accuracy.solver > TIGHTEST:
             yield accuracy.solver
         accuracy = accuracy.refined()
-
-
-def _smaller_steps_decay(steps: Steps, size: float) -> bool:
-    """Whether steady sliding is linearly stable after every smaller step.
-
-    Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
-    stiffness falls with the load point velocity, so the ends of the range decide, unless the law
-    has a slip rate of its own: then it may rise between them.
-    """
-    own_rate = steps.scene.parts.law.resting is not None
-    between = np.geomspace(steps.smallest, size, _SIZES_BETWEEN)[1:-1].tolist() if own_rate else []
-    return all(settles(steps.scene_at(end)) for end in (steps.smallest, *between, size))
 
 
 def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
