@@ -49,7 +49,11 @@ def touching_point(scene: Scene) -> tuple[float, float] | None:
         return slope * pull - evolution(x, value - shift - a * x)
 
     reach = 2.0 * scene.b * abs(x) + scene.stiffness * max(1.0, relation(0.0)[1])
-    lowest = max(-reach, (1.0 - 1e-6) * scene.parts.normal_stress.weakest(scene))
+    weakest = (1.0 - 1e-6) * scene.parts.normal_stress.weakest(scene)
+    lowest = max(-reach, weakest)
+    if acceleration(lowest) >= 0.0 and math.isfinite(weakest):
+        # where normal stress all but follows shear stress, the law asks for more than its own fall
+        lowest = weakest
     if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
         return None
     friction = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
