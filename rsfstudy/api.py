@@ -154,7 +154,7 @@ def prepared(
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
-            compile_with_notice(ready.plan.examples, progress)
+            compile_with_notice(ready.plan.examples, study.measure.clocks, progress)
         with shown(study.name, progress) as show:
             return ready(workers.mapper(ready.worker_log), show)
 

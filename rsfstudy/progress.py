@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -69,12 +70,14 @@ def _lines(name: str, console: Console) -> Progress:
     return update
 
 
-def compile_with_notice(examples: Sequence[Scene], show: bool) -> None:
-    """Compile what such scenes need, before any cell is timed, and say how long it took."""
+def compile_with_notice(examples: Sequence[Scene], clocks: Sequence[bool], show: bool) -> None:
+    """Compile what such scenes need, with time or without it, before any cell is timed, and say how
+    long it took.
+    """
     console, before = Console(stderr=True, quiet=not show), replace(compiling)
     with console.status("compiling the equations ..."):
-        for scene in examples:
-            compiled_engine().prepare(scene)
+        for scene, clock in itertools.product(examples, clocks):
+            compiled_engine().prepare(scene, clock=clock)
     programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
     if programs:
         console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")

@@ -14,10 +14,11 @@ import agreement
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
-from running import SMALL, run
+from running import LEFT_TO_COMPILED, SMALL, enough, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
 from rsfstudy.compute import cells
+from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import DataError, InvalidValue
@@ -328,7 +329,7 @@ class Tabulated(Law):
 def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
-        engine.prepare(Scene(law=Tabulated))
+        engine.prepare(Scene(law=Tabulated), clock=True)
     assert (
         simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
         == "ok"
@@ -415,6 +416,27 @@ class Compiles(Measure):
     def find(self, scene, accuracy, meter):
         compiling.seconds += 1_000.0
         return Outcome(Status.OK, {"answer": 42.0})
+
+
+@pytest.mark.parametrize("name", LEFT_TO_COMPILED)
+def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
+    """By what their measure says of time."""
+    wanted, addresses = list[tuple[str, ...]](), engine._addresses
+
+    def asked(equations):
+        wanted.append((equations.regime, *equations.unknowns))
+        return addresses(equations)
+
+    study = enough(name)
+    scene = Plan(study).examples[0]
+    monkeypatch.setattr(engine, "_addresses", asked)
+    for clock in study.measure.clocks:
+        engine.prepare(scene, clock=clock)
+    prepared = set(wanted)
+    wanted.clear()
+    study.measure(scene, study.accuracy)
+    assert set(wanted)
+    assert set(wanted) <= prepared
 
 
 def test_compiling_is_not_in_the_time_of_a_cell(monkeypatch):

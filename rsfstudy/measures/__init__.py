@@ -68,6 +68,8 @@ class Measure:
 
     #: File and registry name.
     name: ClassVar[str]
+    #: Whether its motions carry time along: what is compiled before any cell is.
+    clocks: ClassVar[tuple[bool, ...]] = (True,)
 
     @property
     def headline(self) -> str:

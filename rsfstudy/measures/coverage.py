@@ -72,6 +72,7 @@ class Coverage(Measure):
     sample: int = 0
     requested_digits: int = 7
     name: ClassVar[str] = "coverage"
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
         if self.question not in QUESTIONS:

@@ -95,6 +95,7 @@ class CriticalStep(Measure):
     of: str = "load_velocity_ratio"
     direction: str = "up"
     name: ClassVar[str] = "critical_step"
+    clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
         if self.of not in KINDS:

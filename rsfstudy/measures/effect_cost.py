@@ -70,6 +70,7 @@ class EffectCost(Measure):
     """
 
     name: ClassVar[str] = "effect_cost"
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     @property
     def headline(self) -> str:

@@ -34,6 +34,7 @@ class HardCase(Measure):
 
     problems: tuple[Problem, ...] = ()
     name: ClassVar[str] = "hard_case"
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     @property
     def headline(self) -> str:

@@ -48,6 +48,7 @@ class LinearStability(Measure):
     """
 
     name: ClassVar[str] = "linear_stability"
+    clocks: ClassVar[tuple[bool, ...]] = ()
 
     @property
     def headline(self) -> str:

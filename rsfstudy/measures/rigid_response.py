@@ -39,6 +39,7 @@ class RigidResponse(Measure):
     slip: float = 10.0
     points: int = 201
     name: ClassVar[str] = "rigid_response"
+    clocks: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.slip < math.inf:

@@ -24,6 +24,7 @@ class Triggered(Measure):
     """
 
     name: ClassVar[str] = "triggered"
+    clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     @property
     def headline(self) -> str:

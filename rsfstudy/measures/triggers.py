@@ -91,6 +91,7 @@ class Triggers(Measure):
     """
 
     name: ClassVar[str] = "triggers"
+    clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     @property
     def headline(self) -> str:

@@ -89,6 +89,7 @@ class WorkPrecision(Measure):
     repeats: int = 5
     run_budget: int = 30_000
     name: ClassVar[str] = "work_precision"
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
         if self.integrator not in _CHOICES:

@@ -85,8 +85,9 @@ class _Plan(NamedTuple):
     unknowns: int
 
 
-def prepare(scene: Scene) -> None:
-    """Compile what motions of such a scene need, or find it in the cache.
+def prepare(scene: Scene, *, clock: bool) -> None:
+    """Compile what motions of such a scene need, with time or without it, or find it in the cache.
+    What carries no time may also be a path that leaves mass out.
 
     Raises
     ------
@@ -94,11 +95,11 @@ def prepare(scene: Scene) -> None:
         Where a part of the scene cannot be compiled.
     """
     machine.course()
-    for clock in (False, True):
+    if scene.has_mass:
+        _addresses(between_ruptures(scene, clock=clock))
+        _addresses(in_rupture(scene, clock=clock))
+    if not (scene.has_mass and clock):
         _addresses(without_mass(scene, clock=clock))
-        if scene.has_mass:
-            _addresses(between_ruptures(scene, clock=clock))
-            _addresses(in_rupture(scene, clock=clock))
 
 
 def segment(

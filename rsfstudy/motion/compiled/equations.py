@@ -75,18 +75,7 @@ def fill_rates(y, rates, p, result):
 def fill_point(y, rates, p, result):
     """The columns of a point."""
     result[LOG_RATE] = math.nan
-    fill_columns(point_of(unknowns(y), unknowns(rates), numbers(p)), result)
-
-
-def fill_whole_point(y, rates, p, result):
-    """The same where rates are not known."""
-    result[LOG_RATE] = math.nan
-    state, of_scene = unknowns(y), numbers(p)
-    fill_columns(point_of(state, rate_of(state, of_scene), of_scene), result)
-
-
-def fill_columns(point, result):
-    """The columns of what the slider does."""
+    point = point_of(unknowns(y), unknowns(rates), numbers(p))
     result[LOG_RATE] = point.log_rate
     result[GROWTH] = point.growth
     result[SPRING] = point.spring

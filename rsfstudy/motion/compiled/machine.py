@@ -58,8 +58,7 @@ def addresses(
     for function in (rate, point):
         check_raises_nothing(function)
     places = equations.places(rate, point, balance, unknowns, states, numbers)
-    wanted = [equations.fill_rates, equations.fill_point, equations.fill_whole_point]
-    wanted += [unrolled.attempt(unknowns)]
+    wanted = [equations.fill_rates, equations.fill_point, unrolled.attempt(unknowns)]
     wanted += [equations.fill_balance] if balance is not None else []
     try:
         return called_by_address(wanted, places)

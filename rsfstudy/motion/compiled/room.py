@@ -14,15 +14,17 @@ Pointer = Any
 
 class Room(NamedTuple):
     """How many unknowns there are. Pointers to them at the beginning of a step, at its end and
-    within; to its stages; to a block of what else is known of it, and of this to the scales and
-    the rows of dense output; to the points there; to when events happen; and to what stays: the
-    addresses of the equations, the watches and how many they are, and the numbers of the scene.
+    within, and to their rates there; to its stages; to a block of what else is known of it, and of
+    this to the scales and the rows of dense output; to the points there; to when events happen; and
+    to what stays: the addresses of the equations, the watches and how many they are, and the
+    numbers of the scene.
     """
 
     unknowns: int
     y: Pointer
     new: Pointer
     within: Pointer
+    rates_within: Pointer
     stages: Pointer
     step: Pointer
     scales: Pointer
@@ -33,7 +35,6 @@ class Room(NamedTuple):
     when: Pointer
     rates: int
     point: int
-    whole_point: int
     attempt: int
     balance: int
     watches: Pointer
@@ -43,7 +44,7 @@ class Room(NamedTuple):
 
 def size(unknowns: int, states: int, watches: int) -> int:
     """How many numbers it takes."""
-    return SIZES + (1 + ROWS + 1 + ALL_STAGES + 1) * unknowns + 3 * (PSIS + states) + watches
+    return SIZES + (1 + ROWS + 1 + ALL_STAGES + 1 + 1) * unknowns + 3 * (PSIS + states) + watches
 
 
 def room(space, y, unknowns, scales, states, functions, watches, watched, p):
@@ -53,7 +54,8 @@ def room(space, y, unknowns, scales, states, functions, watches, watched, p):
     dense = moved(own, unknowns)
     stages = moved(dense, ROWS * unknowns)
     within = moved(stages, ALL_STAGES * unknowns)
-    before = moved(within, unknowns)
+    rates_within = moved(within, unknowns)
+    before = moved(rates_within, unknowns)
     after = moved(before, PSIS + states)
     between = moved(after, PSIS + states)
     when = moved(between, PSIS + states)
@@ -63,6 +65,7 @@ def room(space, y, unknowns, scales, states, functions, watches, watched, p):
         y,
         new,
         within,
+        rates_within,
         stages,
         space,
         own,
@@ -74,7 +77,6 @@ def room(space, y, unknowns, scales, states, functions, watches, watched, p):
         functions[0],
         functions[1],
         functions[2],
-        functions[3],
         functions[FUNCTIONS - 1],
         watches,
         watched,

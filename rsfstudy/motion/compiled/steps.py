@@ -105,7 +105,8 @@ def point_within(now, room, clock):
     """Fill in what the slider does at a clock within the step."""
     unknowns_at(now, room, clock)
     spend(now, 1)
-    evaluate(room.whole_point, room.within, room.within, room.p, room.between)
+    evaluate(room.rates, room.within, room.within, room.p, room.rates_within)
+    evaluate(room.point, room.within, room.rates_within, room.p, room.between)
 
 
 def cut(now, room, clock):

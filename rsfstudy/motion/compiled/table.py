@@ -48,7 +48,7 @@ CALLED_WITH, SAYS = struct.Struct("=4dq"), struct.Struct("=5q")
 #: Rows of the table of addresses; and how many functions of equations have theirs there, of which
 #: the last may be missing (see `machine.addresses`).
 SLOW, FAST = 0, 1
-FUNCTIONS = 5
+FUNCTIONS = 4
 
 #: Columns of the table of watches.
 WATCHED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
