@@ -60,7 +60,7 @@ ENOUGH = {
             "cycle, slowness law: recurrence",
         ],
         "integrator": ["DOP853", "RK45", "DOP853 + Radau"],
-        "requested_digits": [4, 6, 8, 9],
+        "requested_digits": [4, 6, 9],
         "repeats": 1,
     },
     "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},

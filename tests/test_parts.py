@@ -72,7 +72,7 @@ def test_everything_follows_from_a_law(law, effects):
         values["critical_stiffness"], rel=1e-6
     )
     stiffer = scene.with_(load_velocity_ratio=None, stiffness_ratio=1.1)
-    assert CriticalStep()(stiffer, Accuracy(1e-5)).status is Status.OK
+    assert CriticalStep()(stiffer, Accuracy(1e-4)).status is Status.OK
 
 
 def test_orbits_of_another_law_need_not_close_at_critical_stiffness():

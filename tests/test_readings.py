@@ -224,7 +224,7 @@ def test_a_step_is_read_off_friction_not_off_the_spring(fields, ratio):
     level = friction(end) + (friction(peak) - friction(end)) / math.e
     left = brentq(lambda t: friction(t) - level, peak, end)
     for engine in ENGINES:
-        found = read(VelocityStep(phases=2), scene, 1e-9, engine=engine)
+        found = read(VelocityStep(phases=2), scene, 1e-8, engine=engine)
         assert found["peak_friction"] == pytest.approx(friction(peak), abs=1e-7)
         assert found["apparent_slip_distance"] == pytest.approx(ratio * (left - peak), rel=2e-4)
 
@@ -234,7 +234,7 @@ def test_healing_is_read_off_friction_not_off_the_spring(fields):
     scene = Scene(law="slip", b_over_a=1.5, hold_time=100.0, **fields)
     friction, highest, _lowest = recorded(scene, 100.0, 20.0)
     for engine in ENGINES:
-        found = read(Healing(phases=2), scene, 1e-9, engine=engine)
+        found = read(Healing(phases=2), scene, 1e-8, engine=engine)
         assert found["healing"] == pytest.approx(friction(highest) - scene.mu_star, abs=1e-7)
         assert found["peak_displacement"] == pytest.approx(highest, rel=1e-3)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 
 from scipy.optimize import brentq
 
@@ -16,8 +17,8 @@ from rsfstudy.slider.scene import Scene
 
 #: Local tolerance of the first root.
 LOOSE = 1e-5
-#: Distance in log size over which the slope of the misfit is taken.
-_NEAR = 3e-3
+#: Least distance in log size over which the slope of the misfit is taken.
+_NEAR = 1e-3
 _MOST_CORRECTIONS = 8
 #: Longest stride, and end, of the search for a sign change in logit(size/largest).
 _LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
@@ -49,6 +50,7 @@ class ShotSteps(Steps):
         which that orbit stops shrinking.
         """
 
+        @cache
         def misfit(log_size: float, tolerance: float = LOOSE) -> float:
             higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
             return math.nan if higher is None else higher
@@ -74,6 +76,7 @@ class ShotSteps(Steps):
         there.
         """
 
+        @cache
         def misfit(log_size: float) -> float:
             scene = self.scene_at(math.exp(log_size))
             state = rate_step_misfit(scene, LOOSE, meter)
@@ -130,14 +133,26 @@ class ShotSteps(Steps):
 
 
 def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, float] | None:
-    """Log size at which a misfit vanishes, and its slope there; None where it has no value on the
-    way.
+    """Log size at which a misfit vanishes, and its slope there, from what is found on the way; None
+    where the misfit has no value there.
     """
+    tried = list[float]()
+
+    def noted(log_size: float) -> float:
+        tried.append(log_size)
+        return misfit(log_size)
+
     try:
-        root = float(brentq(misfit, *bracket, xtol=1e-4))
+        root = float(brentq(noted, *bracket, xtol=1e-4))
     except ValueError:  # of NaN
         return None
-    return root, (misfit(root + _NEAR) - misfit(root - _NEAR)) / (2.0 * _NEAR)
+
+    def distance(log_size: float) -> float:
+        return abs(log_size - root)
+
+    far = (log_size for log_size in tried if distance(log_size) >= _NEAR)
+    other = min(far, key=distance, default=max(bracket, key=distance))
+    return root, (misfit(root) - misfit(other)) / (root - other)
 
 
 def _refined(

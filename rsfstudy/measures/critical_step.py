@@ -124,7 +124,7 @@ class CriticalStep(Measure):
     @property
     def work_by_digits(self) -> Mapping[float, float]:
         """As the study accuracy_cost measured it for a rate step."""
-        return {3.0: 0.59, 5.0: 0.71, 7.0: 1.0, 8.0: 1.15, 9.0: 1.34, 10.0: 1.62}
+        return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Find the boundary, then confirm it with a motion on each side.
