@@ -558,17 +558,3 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     point = system.at(start)
     assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
-
-
-def test_where_normal_stress_all_but_follows_shear_stress_there_is_a_critical_path():
-    """It begins at more friction lost than any motion at another angle loses; motions alone would
-    take ten times the work for a hundred times the error.
-    """
-    scene = Scene(phi=math.degrees(math.atan(0.76)) + 0.01)
-    spring, _psi = touching_point(scene.with_(load_velocity_ratio=1.005))
-    assert spring < -0.9 * scene.mu_star
-    found = CriticalStep()(scene, Accuracy())
-    assert found.status is Status.OK
-    assert found.rhs_evaluations < 60_000
-    above_one = found.values["critical_velocity_ratio"] - 1.0
-    assert found.values["critical_velocity_ratio_error"] < 1e-7 * above_one

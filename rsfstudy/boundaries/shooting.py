@@ -5,7 +5,7 @@ step is found by shooting.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 
 from scipy.optimize import brentq
@@ -49,11 +49,14 @@ class ShotSteps(Steps):
         """Find the step whose limit cycle touches the norm, from one orbit each: the smallest after
         which that orbit stops shrinking.
         """
+        found = dict[float, float]()
 
-        @cache
         def misfit(log_size: float, tolerance: float = LOOSE) -> float:
             higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
-            return math.nan if higher is None else higher
+            if higher is None:
+                return math.nan
+            found[log_size] = higher
+            return higher
 
         stride = math.log(1.5)
         smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
@@ -61,10 +64,10 @@ class ShotSteps(Steps):
         while larger <= math.log(self.largest):
             now = misfit(larger)
             if before < 0.0 <= now:
-                found = _root(misfit, smaller, larger)
-                if found is not None:
+                root = _root(misfit, found, smaller, larger)
+                if root is not None:
                     yield from _refined(
-                        *found,
+                        *root,
                         tolerances,
                         lambda size, tolerance: misfit(math.log(size), tolerance),
                     )
@@ -75,15 +78,19 @@ class ShotSteps(Steps):
         """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
         there.
         """
+        found = dict[float, float]()
 
         @cache
         def misfit(log_size: float) -> float:
             scene = self.scene_at(math.exp(log_size))
             state = rate_step_misfit(scene, LOOSE, meter)
-            return self._verdict(scene, meter) if state is None else state
+            if state is None:
+                return self._verdict(scene, meter)
+            found[log_size] = state
+            return state
 
         bracket = self._bracket(misfit)
-        return None if bracket is None else _root(misfit, *bracket)
+        return None if bracket is None else _root(misfit, found, *bracket)
 
     def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
         """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
@@ -132,27 +139,22 @@ class ShotSteps(Steps):
         return math.nan
 
 
-def _root(misfit: Callable[[float], float], *bracket: float) -> tuple[float, float] | None:
-    """Log size at which a misfit vanishes, and its slope there, from what is found on the way; None
-    where the misfit has no value there.
+def _root(
+    misfit: Callable[[float], float], found: Mapping[float, float], *bracket: float
+) -> tuple[float, float] | None:
+    """Log size at which a misfit vanishes, and its slope there, from the misfits of paths that are
+    found on the way: a mere verdict has no size. None where it has no value on the way.
     """
-    tried = list[float]()
-
-    def noted(log_size: float) -> float:
-        tried.append(log_size)
-        return misfit(log_size)
-
     try:
-        root = float(brentq(noted, *bracket, xtol=1e-4))
+        brentq(misfit, *bracket, xtol=1e-4)
     except ValueError:  # of NaN
         return None
-
-    def distance(log_size: float) -> float:
-        return abs(log_size - root)
-
-    far = (log_size for log_size in tried if distance(log_size) >= _NEAR)
-    other = min(far, key=distance, default=max(bracket, key=distance))
-    return root, (misfit(root) - misfit(other)) / (root - other)
+    root = min(found, key=lambda log_size: abs(found[log_size]), default=math.nan)
+    far = [log_size for log_size in found if abs(log_size - root) >= _NEAR]
+    if not far:
+        return None
+    other = min(far, key=lambda log_size: abs(log_size - root))
+    return root, (found[root] - found[other]) / (root - other)
 
 
 def _refined(

@@ -149,6 +149,21 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
     return None
 
 
+def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
+    """Whether the motion that touches the norm goes beyond it when it comes back, so that others
+    may reach it by their second peak; by laws whose orbits close at critical stiffness none does.
+    """
+    if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
+        return False
+    beyond = rise("log_rate", scene.log_norm_rate + _ABOVE)
+    fallen, watches = False, (beyond, maximum("log_rate"), fall("log_rate", scene.log_load_rate))
+    for event in _path(scene, tolerance, meter, watches, backward=False):
+        if fallen and event.kind in (Kind.RISE, Kind.MAXIMUM):
+            return event.kind is Kind.RISE
+        fallen = fallen or event.kind is Kind.FALL
+    return False
+
+
 def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int) -> float | None:
     """Displacement step of this sign, in D_c, that puts the slider on the critical path.
 

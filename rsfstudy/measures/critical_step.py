@@ -10,32 +10,25 @@ see `swing`. Either way the answer counts only once a motion on each side of it 
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from scipy.optimize import toms748
 
+from rsfstudy.boundaries.by_path import Boundary, from_touching_cycle, from_touching_path
 from rsfstudy.boundaries.displacement_steps import DisplacementSteps
 from rsfstudy.boundaries.normal_stress_steps import NormalStressSteps
 from rsfstudy.boundaries.rate_steps import RateSteps
 from rsfstudy.boundaries.sought import Steps
-from rsfstudy.boundaries.swing import (
-    Swing,
-    neutral,
-    orbits_may_close,
-    ratio_after,
-    stability_margin,
-    swing,
-)
+from rsfstudy.boundaries.swing import Swing, neutral, orbits_may_close, ratio_after, swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
-from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy, error_between
-from rsfstudy.motion.regimes import error_of_slow_manifold, mass_acts
-from rsfstudy.motion.stepping import TIGHTEST, Halt, Meter
+from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.regimes import mass_acts
+from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -49,12 +42,6 @@ DIRECTIONS = ("up", "down")
 #: Accuracy of a boundary that is a limit cycle, whatever is asked for.
 _CAREFUL = 1e-8
 
-#: Part of the accuracy asked for to which the errors of two paths may agree by chance.
-_BY_CHANCE = 0.004
-
-#: Most local tolerances by which a path is followed.
-_MOST_PATHS = 5
-
 #: Widest bracket, over the size, that confirms a boundary.
 _WIDEST = 0.02
 
@@ -63,18 +50,6 @@ _AT_ONCE = 0.1
 
 #: A slip rate norm at which mass hardly acts.
 _LIGHT_NORM = 1e-3
-
-
-@dataclass(frozen=True)
-class Boundary:
-    """A boundary in step size with its numerical error, both before verification; found by motions,
-    or as a limit cycle.
-    """
-
-    size: float
-    relative_error: float
-    by_motions: bool = False
-    of_cycle: bool = False
 
 
 @dataclass(frozen=True)
@@ -156,7 +131,7 @@ class CriticalStep(Measure):
         if not mass_acts(scene, accuracy):
             # a cycle attracts no path, and takes more care
             careful = replace(accuracy, rtol=min(accuracy.rtol, _CAREFUL))
-            for find, asked in ((_from_touching_path, accuracy), (_from_touching_cycle, careful)):
+            for find, asked in ((from_touching_path, accuracy), (from_touching_cycle, careful)):
                 boundary = find(steps, asked, meter)
                 if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
                     outcome = self._verified(steps, boundary, asked, meter)
@@ -175,20 +150,25 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Confirm a boundary by a motion on each side, as close to it as the motions can tell.
 
-        Where motions found the boundary in the first place, the width they confirm is its error.
+        The width they confirm is the error of a boundary that motions found in the first place, and
+        of one that they do not confirm at once. A path is then none: where orbits grow that have
+        not reached the norm yet, a smaller step is critical.
         """
-        width = boundary.relative_error if boundary.by_motions else 3.0 * boundary.relative_error
-        width = max(width, accuracy.rtol)
+        first = boundary.relative_error if boundary.by_motions else 3.0 * boundary.relative_error
+        first = width = max(first, accuracy.rtol)
         while width < _WIDEST:
             inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
             below, above = (_swung(steps, size, accuracy, meter) for size in (inner, outer))
             if below and above and above.reached and not below.reached:
-                relative = width if boundary.by_motions else boundary.relative_error
+                at_once = width == first and not boundary.by_motions
+                relative = boundary.relative_error if at_once else width
                 error = steps.error(boundary.size, relative)
                 values = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
                 return Outcome(Status.OK, values)
+            if not (boundary.by_motions or boundary.of_cycle):
+                break
             if boundary.of_cycle and below and below.reached and below.excess > _AT_ONCE:
                 break
             width *= 10.0
@@ -311,61 +291,6 @@ def _swung(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> Swing
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
         return None
-
-
-def _from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
-    """Boundary from the critical path, unless smaller steps may be unstable; None where there is no
-    such path.
-    """
-    boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
-    if boundary is None or not steps.smaller_ones_decay(boundary.size):
-        return None
-    return boundary
-
-
-def _from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
-    """Boundary where the motion ends in a limit cycle that touches the norm: where larger steps
-    make steady sliding less stable, and the largest unstable.
-    """
-    small, large = (
-        stability_margin(steps.scene_at(size)) for size in (steps.smallest, steps.largest)
-    )
-    if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
-        return None
-    boundary = _boundary(steps, steps.sizes_of_cycle, accuracy, meter)
-    # a cycle attracts little: the two errors may have much in common
-    error = 5.0 * boundary.relative_error if boundary else math.nan
-    return boundary and replace(boundary, relative_error=error, of_cycle=True)
-
-
-def _boundary(
-    steps: Steps,
-    sizes_by: Callable[[Iterable[float], Meter], Iterator[float]],
-    accuracy: Accuracy,
-    meter: Meter,
-) -> Boundary | None:
-    """A boundary with the error that a second, smaller tolerance tells, and a third where that is
-    more than asked for: a path takes so few steps that one whose error is taken for too small
-    decides. None where there is none within the steps of the search.
-    """
-    boundary = None
-    of_path = error_of_slow_manifold(steps.scene) if steps.scene.has_mass else 0.0
-    for size, refined in itertools.pairwise(sizes_by(_tolerances(accuracy), meter)):
-        if not steps.smallest <= size <= steps.largest:
-            break
-        error = error_between(size, refined, _BY_CHANCE * accuracy.rtol) / size
-        boundary = Boundary(size, error + of_path)
-        if error <= steps.allowed(size, accuracy.rtol):
-            break
-    return boundary
-
-
-def _tolerances(accuracy: Accuracy) -> Iterator[float]:
-    """Local tolerances of paths, one a tenth of the other."""
-    for _ in range(_MOST_PATHS):
-        if accuracy.solver > TIGHTEST:
-            yield accuracy.solver
-        accuracy = accuracy.refined()
 
 
 def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
