@@ -222,7 +222,7 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     """What is shot for, and what a survey by motions alone closes in on."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
-    for shot in ("_from_touching_path", "_from_touching_cycle"):
+    for shot in ("from_touching_path", "from_touching_cycle"):
         monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
     forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
     assert abs(value - forward) <= error + its_error
