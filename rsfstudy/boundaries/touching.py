@@ -159,7 +159,8 @@ def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
     fallen, watches = False, (beyond, maximum("log_rate"), fall("log_rate", scene.log_load_rate))
     for event in _path(scene, tolerance, meter, watches, backward=False):
         if fallen and event.kind in (Kind.RISE, Kind.MAXIMUM):
-            return event.kind is Kind.RISE
+            # a step may pass the norm and come back
+            return event.kind is Kind.RISE or event.point.log_rate > scene.log_norm_rate
         fallen = fallen or event.kind is Kind.FALL
     return False
 
