@@ -160,7 +160,7 @@ def test_a_trigger_without_a_number_is_left_out_and_told():
     assert soft.status is Status.OK
     assert "load_velocity_ratio: steady sliding at V_* is unstable" in soft.message
     assert math.isnan(soft.values["direct_ratio"])
-    heavy = {"inertia": True, "instability_norm": 1.0, "law": "slowness"}
+    heavy = {"inertia": True, "instability_norm": 2.0, "law": "slowness"}
     far = Triggers()(Scene(**heavy, alpha=0.56, phi=50.0, stiffness_ratio=1.3), Accuracy(1e-3))
     assert far.status is Status.NORM_UNREACHABLE
     constant = Triggers()(Scene(normal_stress="constant"), Accuracy())

@@ -43,7 +43,7 @@ class NormalStressSteps(ShotSteps):
         scene.with_(normal_stress_step=sign * SMALLEST_STEP)
         super().__init__(scene, sign)
         # what such a step does to ln V is larger by mu_*/a
-        self.smallest = SMALLEST_STEP * min(1.0, scene.a / scene.mu_star)
+        self.smallest = min(SMALLEST_STEP * min(1.0, scene.a / scene.mu_star), 0.1 * self.largest)
 
     def scene_at(self, size: float) -> Scene:
         return self.scene.with_(normal_stress_step=self.value(size))
@@ -112,7 +112,7 @@ class NormalStressSteps(ShotSteps):
 
         if excess(0.0) >= 0.0:
             return 0.0
-        largest = _LARGEST_CHANGE
+        largest = self._limit()
         if excess(largest) > 0.0:
             self.jumps_to_norm = True
             largest = float(brentq(excess, 0.0, largest, xtol=1e-15, rtol=1e-14))
@@ -123,6 +123,15 @@ class NormalStressSteps(ShotSteps):
             middle = 0.5 * (smaller + largest)
             smaller, largest = (middle, largest) if self._may_slide(middle) else (smaller, middle)
         return smaller
+
+    def _limit(self) -> float:
+        """A fall leaves sigma_3 positive where normal stress follows shear stress: beyond, friction
+        falls faster with slip than stress does, however slow that is.
+        """
+        follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
+        if self.sign > 0 or not follows:
+            return _LARGEST_CHANGE
+        return min(_LARGEST_CHANGE, (1.0 - 1e-6) * -math.log(self.scene.mu_star * follows))
 
     def _may_slide(self, size: float) -> bool:
         """Whether sliding can be steady after a step, or needs not because the load point rests."""

@@ -17,8 +17,9 @@ from rsfstudy.slider.scene import Scene
 
 #: Local tolerance of the first root.
 LOOSE = 1e-5
-#: Least distance in log size over which the slope of the misfit is taken.
-_NEAR = 1e-3
+#: Distances in log size over which the slope of the misfit is taken; what corrects a loose root by
+#: more leads nowhere.
+_NEAR, _FAR = 1e-3, 0.05
 _MOST_CORRECTIONS = 8
 #: Longest stride, and end, of the search for a sign change in logit(size/largest).
 _LONGEST_STRIDE, _HIGHEST = 0.7, 4.0
@@ -149,12 +150,18 @@ def _root(
         brentq(misfit, *bracket, xtol=1e-4)
     except ValueError:  # of NaN
         return None
-    root = min(found, key=lambda log_size: abs(found[log_size]), default=math.nan)
-    far = [log_size for log_size in found if abs(log_size - root) >= _NEAR]
-    if not far:
+    if not found:
         return None
-    other = min(far, key=lambda log_size: abs(log_size - root))
-    return root, (found[root] - found[other]) / (root - other)
+    root = min(found, key=lambda log_size: abs(found[log_size]))
+
+    def others() -> list[float]:
+        return [log_size for log_size in found if _NEAR <= abs(log_size - root) <= _FAR]
+
+    for beside in (root + 2.0 * _NEAR, root - 2.0 * _NEAR):
+        if not others():
+            misfit(beside)
+    other = min(others(), key=lambda log_size: abs(log_size - root), default=None)
+    return None if other is None else (root, (found[root] - found[other]) / (root - other))
 
 
 def _refined(
@@ -179,6 +186,8 @@ def _refined(
                 slope = (value - before[1]) / (log_size - before[0])
             before = log_size, value
             log_size -= value / slope
+            if abs(value) > _FAR * abs(slope):
+                return
             if min(abs(value), abs(value / slope)) < 30.0 * tolerance:
                 break
         else:
