@@ -52,6 +52,7 @@ class ShotSteps(Steps):
         """
         found = dict[float, float]()
 
+        @cache
         def misfit(log_size: float, tolerance: float = LOOSE) -> float:
             higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
             if higher is None:
