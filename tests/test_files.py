@@ -17,6 +17,7 @@ from running import FAULTY, SMALL, call, run
 import rsfstudy
 from rsfstudy import Scene, plots
 from rsfstudy.compute.plan import cell_key
+from rsfstudy.compute.provenance import git_state
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents, restore, store
@@ -305,16 +306,34 @@ def test_a_file_says_what_decided_its_numbers(small):
         assert about[name]
 
 
-def test_git_tells_the_commit_and_whether_it_was_clean():
-    said = json.loads(run().attrs["provenance"])["git"]
-    root = Path(rsfstudy.__file__).parent.parent
+def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
+    """What runs and tests leave in a checkout changes no number; the package and studies do."""
 
     def git(*words):
-        return subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True,
-                              check=True).stdout.strip()  # fmt: skip
+        who = "-c", "user.name=x", "-c", "user.email=x"
+        command = ["git", "-C", str(tmp_path), *who, *words]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
-    state = "with uncommitted changes" if git("status", "--porcelain") else "clean"
-    assert said == f"{git('rev-parse', 'HEAD')} {state}"
+    assert git_state(tmp_path) == "none"
+    git("init", "-q")
+    for place in ("rsfstudy", "studies", "outputs"):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "file.py").write_text("x = 1\n")
+    git("add", ".")
+    git("commit", "-q", "-m", "x")
+    commit = git("rev-parse", "HEAD")
+    (tmp_path / "outputs" / "file.py").write_text("x = 2\n")
+    assert git_state(tmp_path) == f"{commit} clean"
+    assert git_state(tmp_path / "rsfstudy") == "none"
+    for place in ("rsfstudy", "studies"):
+        (tmp_path / place / "file.py").write_text("x = 2\n")
+        assert git_state(tmp_path) == f"{commit} with uncommitted changes"
+        git("checkout", "-q", place)
+
+
+def test_a_file_says_from_which_checkout_it_comes():
+    said = json.loads(run().attrs["provenance"])["git"]
+    assert said == git_state(Path(rsfstudy.__file__).parent.parent)
 
 
 # ---- from the file alone ------------------------------------------------------------------------

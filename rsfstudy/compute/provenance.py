@@ -84,7 +84,7 @@ def provenance(study: Study, command: str) -> dict[str, Any]:
             **{name: _version(name) for name in _DEPENDENCIES},
         },
         "fingerprint": fingerprint(study),
-        "git": _git(),
+        "git": git_state(_PACKAGE.parent),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",
         "byte_order": sys.byteorder,
@@ -101,14 +101,14 @@ def _version(name: str) -> str:
         return "unknown"
 
 
-def _git() -> str:
-    """Commit of the checkout the package runs from, and whether it was clean; "none" for an
-    installed wheel.
+def git_state(root: Path) -> str:
+    """Commit of a checkout of this project, and whether what decides numbers was clean; "none"
+    where its root is none, as for an installed wheel.
     """
 
     def ask(*words: str) -> str:
         return subprocess.run(
-            ["git", "-C", str(_PACKAGE), *words],
+            ["git", "-C", str(root), *words],
             capture_output=True,
             text=True,
             check=True,
@@ -116,7 +116,7 @@ def _git() -> str:
         ).stdout.strip()
 
     try:
-        if Path(ask("rev-parse", "--show-toplevel")) != _PACKAGE.parent:
+        if Path(ask("rev-parse", "--show-toplevel")) != root.resolve():
             return "none"
         # what runs leave in the checkout changes nothing
         changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
