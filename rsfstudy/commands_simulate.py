@@ -10,6 +10,7 @@ import xarray as xr
 from rsfstudy import assignments, terminal, terminal_numbers
 from rsfstudy.console import console
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.files import store
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.protocol_file import read_protocol
 from rsfstudy.slider.scene import Scene
@@ -36,6 +37,7 @@ def simulate(
     """Follow one motion, draw it and write it."""
     if output.suffix not in (".png", ".pdf", ".svg"):
         raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
+    _check_replaceable(output.with_suffix(".nc"))
     laboratory = _laboratory(rig)
     scene = _scene(_fields(settings), protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
@@ -43,6 +45,20 @@ def simulate(
     _write(motion, laboratory, output, _ABSCISSAE[against] if against else None)
     status = Status[motion.attrs["status"].upper()]
     return terminal.OK if status.is_answer else terminal.FAILED
+
+
+def _check_replaceable(data: Path) -> None:
+    """What is there may be an earlier motion, and nothing else."""
+    if not data.exists():
+        return
+    try:
+        with xr.open_dataset(data, engine="netcdf4") as there:
+            if "scene" in there.attrs and "time" in there.dims:
+                return
+    except (OSError, RuntimeError, ValueError):
+        pass  # whatever it is, it is no motion
+    remedy = "Choose another --output, or move it away first."
+    raise InvalidValue("--output", str(data), "is there already, and no motion", remedy=remedy)
 
 
 def _laboratory(rig: dict[str, str | None]) -> Laboratory | None:
@@ -79,7 +95,7 @@ def _write(
     motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str | None
 ) -> None:
     """The picture, and the data beside it."""
-    from rsfstudy.plots import styled
+    from rsfstudy.plots import rendered, styled, write_image
     from rsfstudy.plots._motion import picture
 
     data = output.with_suffix(".nc")
@@ -88,10 +104,10 @@ def _write(
         console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
         return
     try:
-        output.parent.mkdir(parents=True, exist_ok=True)
+        store.write(laboratory.in_units(motion) if laboratory else motion, data)
         with styled():
-            picture(motion, laboratory, against=against).savefig(output)
-        (laboratory.in_units(motion) if laboratory else motion).to_netcdf(data)
+            drawn = picture(motion, laboratory, against=against)
+            write_image(rendered(drawn, output.suffix[1:]), output)
     except OSError as error:
         raise DataError(f"{output}: cannot be written ({error})") from error
     terminal_numbers.record(laboratory.in_units(motion, **_UNITS) if laboratory else motion)

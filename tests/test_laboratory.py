@@ -364,6 +364,26 @@ def test_the_command_simulates_a_rig(tmp_path):
         assert float(written.time[-1]) == pytest.approx(1130.0)
 
 
+def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
+    stable = "--set", "load_velocity_ratio=2", "--set", "stiffness_ratio=2"
+    words = ["simulate", *stable, "--rtol", "1e-4", "--duration"]
+    data, image = tmp_path / "motion.nc", tmp_path / "motion.png"
+    assert call(*words, "5", "--output", image).returncode == 0
+    with xr.open_dataset(data) as seen:
+        assert call(*words, "9", "--output", image).returncode == 0
+        assert float(seen.time[-1]) == pytest.approx(5.0)  # whoever reads the old one goes on
+    with xr.open_dataset(data) as seen:
+        assert float(seen.time[-1]) == pytest.approx(9.0)
+    assert sorted(tmp_path.iterdir()) == [data, image]
+    run(output=tmp_path / "study")
+    for other in (b"a plain text", (tmp_path / "study" / "small.nc").read_bytes()):
+        data.write_bytes(other)
+        ran = call(*words, "5", "--output", image)
+        assert ran.returncode == 2
+        assert "is there already, and no motion" in " ".join(ran.stderr.split())
+        assert data.read_bytes() == other
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

@@ -209,24 +209,36 @@ def save(
     OSError
         Where it cannot be written.
     """
-    image, form = io.BytesIO(), path.suffix[1:].lower()
+    form = path.suffix[1:].lower()
     if form not in FIGURES:
         raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURES)
     try:
         drawn = figure(dataset, own, variable=variable, style=style)
         drawn.set_layout_engine(None)  # everything has its place
         with styled(style):
-            drawn.savefig(image, format=form, metadata=_DATES.get(form))
+            image = rendered(drawn, form)
     except RsfStudyError:
         raise
     except Exception as error:
         rule = f"does not fit these results ({type(error).__name__}: {error})"
         raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES) from error
+    write_image(image, path)
+
+
+def rendered(drawn: Figure, form: str) -> bytes:
+    """A figure as PNG, PDF or SVG."""
+    image = io.BytesIO()
+    drawn.savefig(image, format=form, metadata=_DATES.get(form))
+    return image.getvalue()
+
+
+def write_image(image: bytes, path: Path) -> None:
+    """Write an image, so that the old file stays, or the whole new one."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
     try:
         beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
-        beside.write_bytes(image.getvalue())
+        beside.write_bytes(image)
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
