@@ -96,7 +96,7 @@ class ShotSteps(Steps):
 
     def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
         """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
-        guess.
+        guess: where its sign tells which way, that way first.
 
         A misfit of NaN (no critical path) has no sign. The search runs in logit(size/largest),
         which resolves both ends of the range.
@@ -109,26 +109,31 @@ class ShotSteps(Steps):
             share = min(max(size, self.smallest) / self.largest, 0.5)
             return math.log(share / (1.0 - share))
 
-        lowest, highest = position(self.smallest), _HIGHEST
-        left = right = position(self._guess())
-        at_left = at_right = misfit(log_size(left))
-        stride, missing = 0.2, 0
-        while (left > lowest or right < highest) and missing < _GIVE_UP:
-            if right < highest:
-                further = min(right + stride, highest)
-                value = misfit(log_size(further))
-                if at_right * value <= 0.0:
-                    return log_size(right), log_size(further)
-                right, at_right = further, value
-            if left > lowest:
-                further = max(left - stride, lowest)
-                value = misfit(log_size(further))
-                if at_left * value <= 0.0:
-                    return log_size(further), log_size(left)
-                left, at_left = further, value
-            missing = missing + 1 if math.isnan(at_left) and math.isnan(at_right) else 0
-            stride = min(1.5 * stride, _LONGEST_STRIDE)
-        return None
+        lowest, guess = position(self.smallest), position(self._guess())
+
+        def outwards(*ways: int) -> tuple[float, float] | None:
+            ends = dict.fromkeys(ways, (guess, misfit(log_size(guess))))
+            last = {1: _HIGHEST, -1: lowest}
+            stride, missing = 0.2, 0
+            while missing < _GIVE_UP and any(ends[way][0] != last[way] for way in ways):
+                for way, (at, value) in ends.items():
+                    further = min(max(at + way * stride, lowest), _HIGHEST)
+                    beyond = misfit(log_size(further))
+                    if further != at and value * beyond <= 0.0:
+                        return log_size(min(at, further)), log_size(max(at, further))
+                    ends[way] = further, beyond
+                missing = missing + 1 if all(math.isnan(x) for _at, x in ends.values()) else 0
+                stride = min(1.5 * stride, _LONGEST_STRIDE)
+            return None
+
+        way = self._way(misfit(log_size(guess)))
+        return outwards(way) or outwards(-way) if way else outwards(1, -1)
+
+    def _way(self, misfit: float) -> int:
+        """Whether a misfit tells that the critical size is larger (1) or smaller (-1); 0 where it
+        does not.
+        """
+        return 0
 
     def _guess(self) -> float:
         """A size to search from."""
