@@ -34,6 +34,7 @@ class NormalStressSteps(ShotSteps):
     """
 
     quantity = "critical_normal_stress_step"
+    triggers = -1
     beside = ("slip_rate_after_step",)
 
     def __init__(self, scene: Scene, sign: int) -> None:
@@ -88,7 +89,7 @@ class NormalStressSteps(ShotSteps):
 
     def _verdict(self, scene: Scene, meter: Meter) -> float:
         """Far from the boundary a fall still has a verdict, unless its motion cannot go on."""
-        if self.sign > 0:
+        if self.sign != self.triggers:
             return math.nan
         try:
             return -1.0 if swing(scene, Accuracy(LOOSE), meter).reached else 1.0

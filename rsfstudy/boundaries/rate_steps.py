@@ -21,6 +21,7 @@ class RateSteps(ShotSteps):
     """Steps of load point velocity; the size is |ln(V_0/V_*)|."""
 
     quantity = "critical_velocity_ratio"
+    triggers = 1
 
     def scene_at(self, size: float) -> Scene:
         return self.scene.with_(load_velocity_ratio=self.value(size))
@@ -36,13 +37,9 @@ class RateSteps(ShotSteps):
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _LEAST_WEAKENING)
         return math.log1p(math.exp(self.scene.stiffness_ratio - 1.0) / weakening)
 
-    def _way(self, misfit: float) -> int:
-        """Upward steps that are too small have a positive one."""
-        return 0 if self.sign < 0 or math.isnan(misfit) else int(math.copysign(1.0, misfit))
-
     def _verdict(self, scene: Scene, meter: Meter) -> float:
         """Far from the boundary an upward step still has a verdict."""
-        if self.sign < 0:
+        if self.sign != self.triggers:
             return math.nan
         return -1.0 if swing(scene, Accuracy(LOOSE), meter).reached else 1.0
 

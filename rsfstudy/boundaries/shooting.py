@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
+from typing import ClassVar
 
 from scipy.optimize import brentq
 
@@ -30,7 +31,14 @@ _GIVE_UP = 3
 class ShotSteps(Steps):
     """Steps after which the critical path is another for each size, so that the right one is shot
     for: those that change what friction balances, or what moves the spring.
+
+    Attributes
+    ----------
+    triggers : int
+        Sign of the steps whose misfit is positive where they are too small to trigger.
     """
+
+    triggers: ClassVar[int]
 
     def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Shoot: find the step whose critical path comes from the state before it.
@@ -133,7 +141,9 @@ class ShotSteps(Steps):
         """Whether a misfit tells that the critical size is larger (1) or smaller (-1); 0 where it
         does not.
         """
-        return 0
+        if self.sign != self.triggers or math.isnan(misfit):
+            return 0
+        return int(math.copysign(1.0, misfit))
 
     def _guess(self) -> float:
         """A size to search from."""
