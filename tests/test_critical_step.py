@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.boundaries import swing
+from rsfstudy.boundaries.rate_steps import RateSteps
 from rsfstudy.boundaries.touching import touching_point
 from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import critical_step
@@ -558,3 +559,23 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     point = system.at(start)
     assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
+
+
+@pytest.mark.parametrize("factor", [0.4, 3.0])
+@pytest.mark.parametrize("told", [1, -1])
+def test_the_search_begins_on_the_side_that_the_first_path_tells(factor, told):
+    """And goes on to the other where that was none."""
+    steps, asked = RateSteps(Scene(normal_stress="constant"), 1), list[float]()
+    guess = math.log(steps._guess())
+    root = guess + math.log(factor)
+
+    def misfit(log_size):
+        asked.append(log_size)
+        return told * (root - log_size)
+
+    smaller, larger = steps._bracket(misfit)
+    assert smaller < root < larger
+    first = next(log_size for log_size in asked if abs(log_size - guess) > 1e-9)
+    assert (first > guess) is ((factor > 1.0) is (told > 0))
+    if told > 0:
+        assert all((log_size - guess) * (root - guess) > -1e-9 for log_size in asked)
