@@ -6,6 +6,7 @@ import functools
 import gc
 import math
 import os
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -23,6 +24,9 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
+# a hundred processes that tests start would compile the package to bytecode, a second each
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 #: Modules that take longest, which begin first: none of them is left for one process alone at the

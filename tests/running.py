@@ -105,7 +105,6 @@ LEFT_TO_COMPILED = (
     "dilatant_cycles",
     "dilatant_steps",
     "displacement_boundary",
-    "laws_cycles",
     "normal_stress_steps",
     "rate_step_lattice",
     "resonance",

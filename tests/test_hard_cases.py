@@ -23,6 +23,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.status import Status
 
@@ -74,7 +75,8 @@ def test_two_hundred_cycles_do_not_drift():
         normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
     )
     intervals = []
-    for cycle in cycles(scene, Accuracy(1e-5, budget=10**7), Meter(10**7), None):
+    accuracy = Accuracy(1e-5, budget=10**7, engine=COMPILED)
+    for cycle in cycles(scene, accuracy, Meter(10**7, engine=COMPILED), None):
         intervals.append(cycle.interval)
         if len(intervals) == 203:
             break

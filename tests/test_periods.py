@@ -12,7 +12,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import Approach, LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
@@ -31,8 +31,14 @@ def slow(ratio: float, **fields) -> Scene:
     return Scene(**{**SLOW, "stiffness_ratio": ratio, **fields})
 
 
+def quick(rtol: float) -> Accuracy:
+    """By the engine that is quick: of hundreds of events, few things depend on who follows them."""
+    return Accuracy(rtol, 2_000_000, engine=COMPILED)
+
+
 def came_to(scene: Scene, events: int = 64):
-    return course(scene, Accuracy(1e-7), Meter(2_000_000), events)
+    accuracy = quick(1e-7)
+    return course(scene, accuracy, Meter(accuracy.budget, engine=accuracy.engine), events)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -57,7 +63,7 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
         scene = slow(1.0 - off, displacement_step=0.02 + 14.0 * math.sqrt(off))
         fastest = growth_rates(scene, 0.0)[0]
         expected = math.exp(-2.0 * fastest.real * 2.0 * math.pi / abs(fastest.imag))
-        found = Bifurcation(transient=60, events=4)(scene, Accuracy(1e-8)).values
+        found = Bifurcation(transient=60, events=4)(scene, quick(1e-8)).values
         assert 1.0 - found["floquet_multiplier"] == pytest.approx(1.0 - expected, rel=40.0 * off)
 
 
@@ -73,7 +79,9 @@ def test_departures_of_a_motion_shrink_as_the_multipliers_say():
 
 
 def followed(scene: Scene, count: int) -> list[Cycle]:
-    return course(scene, Accuracy(1e-9), Meter(2_000_000), count, to_its_end=True).seen
+    accuracy = quick(1e-9)
+    meter = Meter(accuracy.budget, engine=accuracy.engine)
+    return course(scene, accuracy, meter, count, to_its_end=True).seen
 
 
 @pytest.mark.parametrize(
@@ -82,7 +90,7 @@ def followed(scene: Scene, count: int) -> list[Cycle]:
 def test_periods(ratio, period):
     """And what comes after a period is what was there before, to the accuracy."""
     scene = slow(ratio)
-    found = LimitCycle(phases=50)(scene, Accuracy(1e-7, 1_000_000))
+    found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
     orbit = came_to(scene).orbit.from_largest
@@ -121,7 +129,7 @@ def test_multipliers_of_a_period_are_those_of_all_its_events():
 
 def test_tight_and_loose_agree_within_their_errors():
     for ratio in (0.9, 0.86):
-        one, tight = (LimitCycle(phases=2)(slow(ratio), Accuracy(r)).values for r in (1e-5, 1e-9))
+        one, tight = (LimitCycle(phases=2)(slow(ratio), quick(r)).values for r in (1e-5, 1e-9))
         for name in (n for n in one if f"{n}_error" in one):
             allowed = one[f"{name}_error"] + tight[f"{name}_error"]
             assert abs(one[name] - tight[name]) <= allowed, name
@@ -130,7 +138,7 @@ def test_tight_and_loose_agree_within_their_errors():
 
 def test_a_multiplier_passes_minus_one_where_the_period_doubles():
     before, after = (
-        Bifurcation(transient=64, events=16)(slow(ratio), Accuracy(1e-7)).values
+        Bifurcation(transient=64, events=16)(slow(ratio), quick(1e-7)).values
         for ratio in (0.8664, 0.8661)
     )
     assert (before["period_events"], after["period_events"]) == (1.0, 2.0)

@@ -223,10 +223,9 @@ def test_a_step_is_read_off_friction_not_off_the_spring(fields, ratio):
     peak, end = (highest if ratio > 1.0 else lowest), 20.0 / ratio
     level = friction(end) + (friction(peak) - friction(end)) / math.e
     left = brentq(lambda t: friction(t) - level, peak, end)
-    for engine in ENGINES:
-        found = read(VelocityStep(phases=2), scene, 1e-8, engine=engine)
-        assert found["peak_friction"] == pytest.approx(friction(peak), abs=1e-7)
-        assert found["apparent_slip_distance"] == pytest.approx(ratio * (left - peak), rel=2e-4)
+    found = read(VelocityStep(phases=2), scene, 1e-8, engine=COMPILED)
+    assert found["peak_friction"] == pytest.approx(friction(peak), abs=1e-7)
+    assert found["apparent_slip_distance"] == pytest.approx(ratio * (left - peak), rel=2e-4)
 
 
 @pytest.mark.parametrize("fields", APART)
