@@ -133,6 +133,8 @@ class Scene(Following):
 
     _slider: Part
     _layout: Layout
+    #: What scenes share that differ in the spring and the loading alone.
+    _known_of_friction: dict[str, float]
 
     def __init__(self, *nameless: Never, **given: Any) -> None:
         if nameless:
@@ -157,6 +159,7 @@ class Scene(Following):
         """Take the fields from the parts, and let the parts say whether they go together."""
         slider, *parts = made
         self.__dict__.update(layout.elsewhere, _layout=layout, _slider=slider)
+        self.__dict__["_known_of_friction"] = {}
         self.__dict__["parts"] = Parts(*parts)  # type: ignore[arg-type]
         for part in (slider, *parts):
             self.__dict__.update(part.__dict__)
@@ -202,8 +205,13 @@ class Scene(Following):
         """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
         (see `stability.critical_stiffness`).
         """
-        before = self._with_parts(self.parts._replace(loading=Step())) if self._is_changed else self
-        return stability.critical_stiffness(before, 0.0, quasi_static=True)
+        known = self._known_of_friction
+        if "critical_stiffness" not in known:
+            unloaded = self.parts._replace(loading=Step())
+            before = self._with_parts(unloaded) if self._is_changed else self
+            found = stability.critical_stiffness(before, 0.0, quasi_static=True)
+            known["critical_stiffness"] = found
+        return known["critical_stiffness"]
 
     @property
     def _is_changed(self) -> bool:
@@ -258,8 +266,9 @@ class Scene(Following):
             normal_stress_step=segment.normal_stress,
         )
         scene = self._with_parts(self.parts._replace(loading=step))
-        kept = _UNLOADED[:1] if self.parts.loading.unknowns else _UNLOADED
-        scene.__dict__.update({name: getattr(self, name) for name in kept})
+        scene.__dict__["_known_of_friction"] = self._known_of_friction
+        if not self.parts.loading.unknowns:
+            scene.__dict__["functions"] = self.functions
         return scene
 
     def _with_parts(self, parts: Parts) -> Scene:
@@ -308,12 +317,13 @@ class Scene(Following):
         """
         kept, copiers = self._copying(tuple(names))
         parts = self._slider, *self.parts
-        if all(place == len(parts) - 1 for place, _copy, _own in copiers):
-            inherited = {name: self.__dict__[name] for name in _UNLOADED if name in self.__dict__}
-            kept = kept | inherited
+        others = {name for name in names if self._layout.places[name] != len(parts) - 1}
+        if not others and "functions" in self.__dict__:
+            kept = {**kept, "functions": self.functions}
+        known = self._known_of_friction if others <= {*SPRING} else None
         for row in rows:
             scene, made = Scene.__new__(Scene), list(parts)
-            scene.__dict__.update(kept)
+            scene.__dict__.update(kept, _known_of_friction={} if known is None else known)
             for place, copy, own in copiers:
                 made[place] = copy({name: row[i] for name, i in own})
                 scene.__dict__.update(made[place].__dict__)
@@ -360,11 +370,6 @@ class Scene(Following):
     def own_parts(self) -> tuple[type[Part], ...]:
         """Those of its parts that are the user's own."""
         return tuple(self._layout.own.values())
-
-
-#: What follows from a scene whatever loads it, once it has been asked for; the functions, of all
-#: loadings that have no unknowns, or the same.
-_UNLOADED = ("critical_stiffness", "functions")
 
 
 def check_scene(value: object) -> None:
