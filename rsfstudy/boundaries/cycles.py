@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import pairwise
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
 LN10 = math.log(10.0)
+_LOG_RATE, _SPRING = attrgetter("log_rate"), attrgetter("spring")
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
 #: it.
@@ -181,12 +183,11 @@ class _Watch:
 
     def _complete(self, begin: Point, end: Event) -> Cycle:
         points = [event.point for event in self._seen]
-        fastest = max(points, key=lambda point: point.log_rate)
-        rested = min(points, key=lambda point: point.log_rate)
+        fastest, rested = max(points, key=_LOG_RATE), min(points, key=_LOG_RATE)
         return Cycle(
             interval=end.time - self._begun,
             highest=end.point.spring,
-            lowest=min(point.spring for point in points),
+            lowest=min(map(_SPRING, points)),
             at_peak=fastest.spring,
             sliding=fastest.coefficient,
             slowest=rested.log_rate,

@@ -282,6 +282,7 @@ class Approach:
     def __init__(self, scene: Scene, accuracy: Accuracy, after: Approach | None = None) -> None:
         self._scene, self._accuracy = scene, accuracy
         self.seen: list[Cycle] = []
+        self._numbers: list[np.ndarray] = []
         self.events: int = after.events if after else 0
         self.work = 0
         self._start = after.fixed_point() if after else None
@@ -310,6 +311,7 @@ class Approach:
                 self.work, spent = meter.spent - spent, meter.spent
                 self.events += 1
                 self.seen.append(cycle)
+                self._numbers.append(cycle.numbers())
                 self._learn()
                 if self._repeats():
                     return True
@@ -348,21 +350,21 @@ class Approach:
         if abs(apart) > (1000.0 if self._known else 1.0) * noise:
             self._known = True
             self._return = (now.end.spring - before.end.spring) / apart
-            self._slopes = (now.numbers() - before.numbers()) / apart
+            self._slopes = (self._numbers[-1] - self._numbers[-2]) / apart
 
     def _repeats(self) -> bool:
         """Whether the next cycles would all be the same: as the derivatives say, or because the
         last two are.
         """
         cycle = self.seen[-1]
-        allowed = 0.3 * self._accuracy.rtol * np.abs(cycle.numbers())
+        allowed = 0.3 * self._accuracy.rtol * np.abs(self._numbers[-1])
         if self._known and self._return < _DIVERGES:
             to_come = np.abs(self._slopes * self._ahead(cycle))
             if (to_come <= allowed).all():
                 return True
         if len(self.seen) < 2 or self.seen[-2].end != cycle.begin:
             return False
-        change = np.abs(cycle.numbers() - self.seen[-2].numbers())
+        change = np.abs(self._numbers[-1] - self._numbers[-2])
         left = min(max(self._return, 0.0), _DIVERGES)
         return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
 

@@ -83,7 +83,7 @@ def follow(
         end = min(origin.time + duration, until)
         lasts = end - origin.time if clock else math.inf
         segment = compiled_engine().segment if meter.engine == COMPILED else _segment
-        for event in segment(
+        for last in segment(
             acting,
             accuracy,
             meter,
@@ -94,12 +94,14 @@ def follow(
             clock=clock,
             recording=recording,
         ):
-            happened = [event] if before is None else _begun(event, before, acting, asked)
-            for event in happened:
-                last = event
-                if event.kind is not Kind.END:
+            if before is not None and last.kind is Kind.START:
+                for event in _begun(last, before, acting, asked):
                     yield event
-                if event.watch is not None and event.watch.ends:
+                    if event.watch is not None and event.watch.ends:
+                        return
+            elif last.kind is not Kind.END:
+                yield last
+                if last.watch is not None and last.watch.ends:
                     return
         if last.kind is Kind.END:
             # it was located to the spacing of numbers around the clock
@@ -114,9 +116,7 @@ def follow(
 
 
 def _begun(event: Event, before: Moment, acting: Scene, watches: Sequence[Watch]) -> list[Event]:
-    """An event of a later segment; its first brings those that happened where it began."""
-    if event.kind is not Kind.START:
-        return [event]
+    """That a later segment has begun, and what happened where it did."""
     after = Moment(event.point, acting.numbers)
     return [event._replace(kind=Kind.SEGMENT)] + [
         # slip from the first point: the spring may have jumped with the load point
