@@ -146,3 +146,27 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
     assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
     assert not {"alpha", "phi", "functions", "combination", "_layout", "__init__"} & set(offered)
     assert {"alpha", "phi"} <= set(dir(Scene()))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"stiffness_ratio": 0.5},
+        {"load_velocity_ratio": 3.0},
+        {"displacement_step": 1.0},
+        {"a": 0.012},
+        {"b_over_a": 3.0},
+        {"mu_star": 0.7},
+        {"phi": 70.0},
+        {"alpha": 0.3},
+        {"stiffness_ratio": 0.5, "b_over_a": 3.0},
+    ],
+    ids=str,
+)
+def test_copies_share_a_critical_stiffness_only_where_friction_is_the_same(changes):
+    scene = Scene(normal_stress="variable", stiffness_ratio=0.8)
+    assert scene.critical_stiffness > 0.0
+    (copy,) = scene.varied(tuple(changes), [tuple(changes.values())])
+    anew = Scene(**{"normal_stress": "variable", "stiffness_ratio": 0.8, **changes})
+    assert copy.critical_stiffness == anew.critical_stiffness
+    assert copy.stiffness == anew.stiffness
