@@ -36,9 +36,8 @@ def quick(rtol: float) -> Accuracy:
     return Accuracy(rtol, 2_000_000, engine=COMPILED)
 
 
-def came_to(scene: Scene, events: int = 64):
-    accuracy = quick(1e-7)
-    return course(scene, accuracy, Meter(accuracy.budget, engine=accuracy.engine), events)
+def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
+    return course(scene, quick(rtol), Meter(2_000_000, engine=COMPILED), events, **how)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -79,9 +78,7 @@ def test_departures_of_a_motion_shrink_as_the_multipliers_say():
 
 
 def followed(scene: Scene, count: int) -> list[Cycle]:
-    accuracy = quick(1e-9)
-    meter = Meter(accuracy.budget, engine=accuracy.engine)
-    return course(scene, accuracy, meter, count, to_its_end=True).seen
+    return came_to(scene, count, 1e-9, to_its_end=True).seen
 
 
 @pytest.mark.parametrize(
