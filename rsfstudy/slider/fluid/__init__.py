@@ -24,6 +24,8 @@ class Fluid(Part):
     - ``seeped(log_rate, p)``: what they are in steady sliding, where P is 0.
     """
 
+    conclusions = ("highest_pressure",)
+    equations = frozenset({"seepage", "numbers"})
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
     seepage: ClassVar[Function | None] = None
     seeped: ClassVar[Function | None] = None
