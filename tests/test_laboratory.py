@@ -1,5 +1,6 @@
 """The units of a rig: every conversion by its dimension, and what is no quantity."""
 
+import json
 import math
 import re
 import sys
@@ -8,7 +9,7 @@ import numpy as np
 import pint
 import pytest
 import xarray as xr
-from running import call, run
+from running import call, called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
@@ -28,6 +29,7 @@ RIG = Laboratory(
     reference_velocity="1 um/s",
     stiffness="0.05 MPa/um",
 )
+THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
 LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
 
 
@@ -158,7 +160,13 @@ def test_mass_and_radiation():
         mass="2e4 kg/m^2",
     )
     period = 2.0 * math.pi * math.sqrt(2e4 / 5e10)
-    assert heavy.scene(inertia=True).period == pytest.approx(period)
+    assert heavy.scene().inertia
+    assert heavy.scene().period == pytest.approx(period)
+    still = heavy.scene(inertia=False)
+    assert (still.inertia, still.period) == (False, heavy.scene().period)
+    timed = Laboratory(**THREE, period="10 ms")
+    assert (timed.scene().inertia, timed.scene().period) == (True, pytest.approx(0.01))
+    assert not Laboratory(**THREE).scene().inertia
     radiating = Laboratory(
         normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V,
         shear_modulus="30 GPa", density="2700 kg/m^3",
@@ -166,9 +174,6 @@ def test_mass_and_radiation():
     # G/(2 c_s), c_s = sqrt(G/rho)
     impedance = 30e9 / (2.0 * math.sqrt(30e9 / 2700.0))
     assert radiating.scene().radiation_damping == pytest.approx(impedance * V / SIGMA, rel=1e-12)
-
-
-THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
 
 
 @pytest.mark.parametrize(
@@ -362,6 +367,27 @@ def test_the_command_simulates_a_rig(tmp_path):
     with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
         assert written.load_point_displacement.attrs["units"] == "m"
         assert float(written.time[-1]) == pytest.approx(1130.0)
+
+
+@pytest.mark.parametrize(
+    ("stated", "fields"),
+    [
+        (["--period", "10 ms"], {"inertia": True, "period": 0.01}),
+        (["--period", "10 ms", "--set", "inertia=false"], {"inertia": False, "period": 0.01}),
+        (["--mass", "2e4 kg/m^2", "--stiffness", "50 GPa/m"], {"inertia": True}),
+        (["--shear-modulus", "30 GPa", "--density", "2700 kg/m^3"], {"radiation_damping": 9e-7}),
+    ],
+)
+def test_what_options_of_a_rig_state_acts(stated, fields, tmp_path):
+    words = ["simulate", *stated, "--output", tmp_path / "motion.png", "--duration", "1 s"]
+    words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um"]
+    words += ["--reference-velocity", "1 um/s", "--rtol", "1e-3", "--set", "load_velocity_ratio=2"]
+    code, said = called([str(word) for word in words])
+    assert code == 0, said
+    with xr.open_dataset(tmp_path / "motion.nc") as written:
+        told = json.loads(written.attrs["scene"])
+    # sqrt(G rho)/2 = 4.5 MPa s/m, and V_*/sigma_* = 2e-13 m/s/Pa
+    assert {name: told[name] for name in fields} == pytest.approx(fields, rel=1e-12)
 
 
 def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
