@@ -5,6 +5,7 @@ import re
 import sys
 from unittest import mock
 
+import numpy as np
 import pint
 import pytest
 from hypothesis import HealthCheck, example, given, settings
@@ -16,6 +17,67 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import _KNOWN, factor, in_si
 
 RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "value"),
+    [
+        ("5 MPa", "Pa", 5e6),
+        ("0.3GPa", "Pa", 3e8),
+        ("12 bar", "Pa", 1.2e6),
+        ("10 um", "m", 1e-5),
+        ("10 \u00b5m", "m", 1e-5),
+        ("1e-3 um/s", "m/s", 1e-9),
+        ("1 um s-1", "m/s", 1e-6),
+        ("35 mm/year", "m/s", 35e-3 / (365.25 * 86400.0)),
+        ("0.05 MPa/um", "Pa/m", 5e10),
+        ("2 min", "s", 120.0),
+        ("0.1 1/s", "1/s", 0.1),
+        ("2e3 kg/m^2", "kg/m^2", 2e3),
+        ("2700 kg*m**-3", "kg/m^3", 2700.0),
+        ("3", "1", 3.0),
+        (7.5, "Pa", 7.5),
+        (np.float64(2.0), "m", 2.0),
+    ],
+)
+def test_usual_units(text, units, value):
+    assert in_si("x", text, units) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "units", "complaint"),
+    [
+        ("5 MPa", "m", "x = '5 MPa': has units of another kind than m. Give it in m"),
+        ("5", "Pa", "has units of another kind than Pa"),
+        ("MPa", "Pa", "x = 'MPa': is no quantity. Write a number and its units"),
+        ("nan MPa", "Pa", "must be finite"),
+        (math.inf, "Pa", "must be finite"),
+        (True, "Pa", "True: is no quantity"),
+        (None, "Pa", "None: is no quantity"),
+    ],
+)
+def test_what_is_no_quantity(value, units, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        in_si("x", value, units)
+
+
+def test_other_units_need_pint(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pint", None)
+    with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
+        in_si("normal_stress", "725 psi", "Pa")
+
+
+def test_quantities_of_pint():
+    registry = pint.get_application_registry()
+    assert in_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
+    assert in_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
+    assert in_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
+    with pytest.raises(InvalidValue, match="another kind than m"):
+        in_si("x", registry.Quantity(3.0, "MPa"), "m")
+    with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
+        in_si("x", "3 bananas", "m")
+
+
 #: Units of stress, of those known here and of those that pint knows.
 STRESSES = ("Pa", "kPa", "MPa", "bar", "kg/m/s^2", "kg*m**-1*s-2", "MPa m/mm", "MPa s / s")
 OF_PINT = ("psi", "inH2O", "N/m^2", "percent MPa", "mPa", "psi um/um")

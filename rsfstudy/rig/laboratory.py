@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.scales import Scale, scaled, scales
+from rsfstudy.rig.scales import Scale, rate_of, scaled, scales
 from rsfstudy.rig.units import factor, in_si
 from rsfstudy.slider.fields import QUANTITIES
 from rsfstudy.slider.loading import Segment
@@ -113,7 +113,7 @@ class Laboratory:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
         ``sigma_*/D_c`` is asked for.
         """
-        return in_si(name, value, _UNITS[scale]) / self.scales[scale].factor
+        return float(in_si(name, value, _UNITS[scale]) / self.scales[scale].factor)
 
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
@@ -151,10 +151,11 @@ class Laboratory:
         Raises
         ------
         InvalidValue
-            For units of another kind.
+            For units of another kind, and results at another reference rate than that of the rig.
         DataError
             For a dataset that is in other units already, or not of rsfstudy.
         """
+        rate_of(dataset, self.reference_velocity / self.slip_distance)
         units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
         size = {name: factor("units", *pair) for name, pair in units.items()}
         size["V_*"] = size["D_c"] / size["D_c/V_*"]
