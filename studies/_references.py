@@ -57,7 +57,7 @@ HARD_CYCLES = {
 }
 
 #: Variable normal stress, mass, any parameters (see `hard_cases`): (recurrence interval, relative
-#: uncertainty). What the switch costs falls with the square of its norm there; two norms are extrapolated.
+#: uncertainty). What the switch costs falls with the square of its norm there, which is removed.
 DOWN_TO_137 = (0.79876073128172, 3e-12)
 DOWN_TO_1745 = (49.2071554225251, 3e-11)
 

@@ -16,11 +16,10 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.readings import (
     friction_at,
-    friction_of,
     load_point_of,
     watched,
 )
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.recording import READ, Recording, along_path
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Segment
@@ -135,14 +134,14 @@ class Healing(Reading):
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         """The record itself, from the beginning of the hold on."""
-        path = along_path(record.rows, self.phases)
-        rows = np.column_stack([path[name] for name in OBSERVED])
+        path = along_path(record.rows, self.phases, READ)
+        rows = np.column_stack([path[name] for name in READ])
         moved = load_point_of(scene, rows)
         return {
             "time": path["time"] - record.begin.time,
             "load_point_displacement": moved - moved[0],
             "slip": path["slip"] - path["slip"][0],
-            "friction_coefficient": friction_of(rows),
+            "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],
         }
 

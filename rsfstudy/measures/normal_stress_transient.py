@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.readings import friction_of
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
@@ -219,8 +219,7 @@ class NormalStressTransient(Reading):
         """
         rows, friction = record.rows, friction_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record
-        path = along_path(rows, self.phases)
-        path_rows = np.column_stack([path[name] for name in OBSERVED])
+        path = along_path(rows, self.phases, READ)
         return {
             "direct_change": _direct(scene, record),
             "settled": float(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from))),
@@ -228,7 +227,7 @@ class NormalStressTransient(Reading):
             "time": path["time"],
             "load_point_displacement": path["time"],
             "slip": path["slip"],
-            "friction_coefficient": friction_of(path_rows),
+            "friction_coefficient": path["friction_coefficient"],
             "normal_stress_ratio": path["normal_stress_ratio"],
             "log10_slip_rate": path["log10_slip_rate"],
         }

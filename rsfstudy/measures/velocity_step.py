@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
 from rsfstudy.motion.readings import friction_at, friction_of, watched
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
@@ -241,14 +241,13 @@ class VelocityStep(Reading):
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.end
         direct = friction_at(scene, turned.point) - friction[0]
-        path = along_path(rows, self.phases)
-        path_rows = np.column_stack([path[name] for name in OBSERVED])
+        path = along_path(rows, self.phases, READ)
         return {
             "settled": float(np.ptp(last) < _STAYS * abs(direct)),
             "closed_form_departure": _departure(scene, step, record),
             "load_point_displacement": step.after * (path["time"] - record.begin.time),
             "slip": path["slip"] - rows[0, OBSERVED.index("slip")],
-            "friction_coefficient": friction_of(path_rows),
+            "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],
         }
 
