@@ -161,10 +161,12 @@ def call(*words) -> SimpleNamespace:
     return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=said.getvalue())
 
 
-#: Ctrl-C ends it even where the tests run in the background, where shells have it ignored.
+#: Signals end it even where the tests run in the background, or without a terminal, where shells
+#: have them ignored.
 _COMMAND = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from rsfstudy.cli import main
 main()
 """
