@@ -17,7 +17,14 @@ import click
 from rsfstudy import cli_simulate, options
 from rsfstudy.declare import catalogue
 from rsfstudy.defaults import FORMATS
-from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError, Signalled, brief
+from rsfstudy.errors import (
+    Incomplete,
+    Interrupted,
+    InvalidValue,
+    RsfStudyError,
+    Signalled,
+    brief,
+)
 
 OK, FAILED, WRONG_USAGE = 0, 1, 2
 #: Signals that end a command as Ctrl-C does.
@@ -53,6 +60,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
+    warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _warn(message)
     try:
         with _signals_raise():

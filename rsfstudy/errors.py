@@ -97,7 +97,13 @@ class Signalled(KeyboardInterrupt):
 
 
 class NoAnswer(UserWarning):
-    """What was asked of one scene has no number for an answer, or nothing happens in it."""
+    """What was asked of one scene has no number for an answer, nothing happens in it, or what
+    happens is no physics.
+    """
+
+
+class Incomplete(UserWarning):
+    """A motion that ended early, or cells of a run that failed."""
 
 
 def brief(text: object, most: int = _MOST_CHARACTERS) -> str:

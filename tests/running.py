@@ -26,7 +26,7 @@ import rsfstudy
 # what prints takes its width from the environment when it is loaded: not from that of a test
 from rsfstudy import Axis, Scene, Study, cli, commands  # noqa: F401
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError
+from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.engines import COMPILED
 
@@ -48,6 +48,12 @@ HANGS = 1200.0
 def run(study=SMALL, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def run_with_failures(*words, **options) -> xr.Dataset:
+    """The same, where cells are to fail, which is told."""
+    with pytest.warns(Incomplete, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"):
+        return run(*words, **options)
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that

@@ -22,6 +22,7 @@ from running import (
     command,
     ended,
     run,
+    run_with_failures,
     same_numbers,
     until,
     until_kept,
@@ -404,7 +405,8 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
 def test_failures_are_tried_again(tmp_path, monkeypatch):
     """A cell that failed has no answer: the next run computes it, and only it."""
     failing = declared("raises", at=(2.5,))
-    assert run(failing, output=tmp_path).status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
+    status = run_with_failures(failing, output=tmp_path).status
+    assert status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
     assert cells_in(tmp_path / "faulty.cells.sqlite") == 4
     asked = []
     original = cells.computed
@@ -414,7 +416,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
         return original(task, cell, **options)
 
     monkeypatch.setattr(cells, "computed", counted)
-    run(failing, output=tmp_path)
+    run_with_failures(failing, output=tmp_path)
     assert asked == [2.5]
 
 
@@ -423,7 +425,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
 
 def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again(tmp_path):
     few = {"b_over_a": [2.0], "output": tmp_path}
-    spent = run(SMALL, budget=300, **few)
+    spent = run_with_failures(SMALL, budget=300, **few)
     assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
     assert "--budget 1200 (budget=) allows more" in spent.message.values.flat[0]
     answered = run(SMALL, budget=100_000, **few)
