@@ -20,7 +20,7 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
 from rsfstudy.files.side_by_side import Comparison, side_by_side
@@ -105,6 +105,11 @@ def run(
         For a wrong declaration or override, before anything is computed.
     DataError, RunError
         If results cannot be kept, or the run cannot start or finish.
+
+    Warns
+    -----
+    Incomplete
+        Where cells failed: how many, and with which status.
     """
     declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = Keeping(
@@ -116,7 +121,13 @@ def run(
         command=command,
     )
     where = Workers(workers, client, time_limit)
-    return prepared(declared, keeping, where, progress)()
+    results = prepared(declared, keeping, where, progress)()
+    if failed := runner.failures(results):
+        each = ", ".join(f"{label} {number}" for label, number in failed.items())
+        text = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        text += "; dataset.rsf.failures() lists them"
+        warnings.warn(text, Incomplete, stacklevel=2)
+    return results
 
 
 def declaration(

@@ -4,8 +4,11 @@ loaded when it is called, so that help and the list of studies answer at once.
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +17,18 @@ import click
 from rsfstudy import cli_simulate, options
 from rsfstudy.declare import catalogue
 from rsfstudy.defaults import FORMATS
-from rsfstudy.errors import InvalidValue, RsfStudyError, brief
+from rsfstudy.errors import (
+    Incomplete,
+    Interrupted,
+    InvalidValue,
+    RsfStudyError,
+    Signalled,
+    brief,
+)
 
 OK, FAILED, WRONG_USAGE = 0, 1, 2
+#: Signals that end a command as Ctrl-C does.
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
 
 
 class InOrder(click.Group):
@@ -25,6 +37,13 @@ class InOrder(click.Group):
     def list_commands(self, _context: click.Context) -> list[str]:
         """Names of the commands."""
         return list(self.commands)
+
+    def invoke(self, context: click.Context) -> Any:
+        """Call a command; Ctrl-C and signals end it with one line, without a blank one before."""
+        try:
+            return super().invoke(context)
+        except KeyboardInterrupt as error:
+            raise Interrupted(str(error) or "interrupted") from error
 
 
 @click.group(
@@ -41,9 +60,11 @@ def cli() -> None:
 def main() -> None:
     """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
+    warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _warn(message)
     try:
-        sys.exit(cli(standalone_mode=False) or OK)
+        with _signals_raise():
+            sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
         error.message = brief(error.message)  # type: ignore[misc]
         error.show()
@@ -54,9 +75,35 @@ def main() -> None:
     except InvalidValue as error:
         _say(f"error: {error}")
         sys.exit(WRONG_USAGE)
+    except Interrupted as error:
+        _say(f"error: {error}")
+        sys.exit(error.exit_status)
     except RsfStudyError as error:
         _say(f"error: {error}")
         sys.exit(FAILED)
+
+
+@contextlib.contextmanager
+def _signals_raise() -> Iterator[None]:
+    """Have `Signalled` raised by the first signal that would end the process, which then ends in
+    its own time whatever follows: `timeout` sends two. A signal that is ignored, as by nohup, stays
+    so.
+    """
+    ending = [number for number in _ENDING if signal.getsignal(number) is signal.SIG_DFL]
+    arrived: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        arrived.append(number)
+        if len(arrived) == 1:
+            raise Signalled(number)
+
+    for number in ending:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in () if arrived else ending:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def _warn(message: Warning | str) -> None:

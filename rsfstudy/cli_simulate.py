@@ -74,6 +74,10 @@ def simulate(**given: Any) -> int:
     """Follow one motion of one slider, draw it and write it.
 
     The picture shows friction and slip rate along it, and its path on the phase plane.
+
+    Exit status 1 where the motion ends early, whatever the reason; 2 for wrong usage; 3 where it
+    passes the instability norm with neither mass nor radiation damping, beyond which it is no
+    physics; else 0.
     """
     from rsfstudy import commands_simulate
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+import signal
 from collections.abc import Iterable
 
 #: Most characters of a text, and most choices, that a message has room for.
@@ -79,11 +80,30 @@ class RunError(RsfStudyError):
 
 
 class Interrupted(RunError):
-    """A run that the user ended."""
+    """A run that the user ended, or a signal."""
+
+    @property
+    def exit_status(self) -> int:
+        """What the process ends with: 128 and the number of the signal, but 1 after Ctrl-C."""
+        return self.__cause__.exit_status if isinstance(self.__cause__, Signalled) else 1
+
+
+class Signalled(KeyboardInterrupt):
+    """A signal that ends the process in order, as Ctrl-C does."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"ended by {signal.Signals(number).name}")
+        self.exit_status = 128 + number
 
 
 class NoAnswer(UserWarning):
-    """What was asked of one scene has no number for an answer, or nothing happens in it."""
+    """What was asked of one scene has no number for an answer, nothing happens in it, or what
+    happens is no physics.
+    """
+
+
+class Incomplete(UserWarning):
+    """A motion that ended early, or cells of a run that failed."""
 
 
 def brief(text: object, most: int = _MOST_CHARACTERS) -> str:

@@ -169,5 +169,8 @@ def record(motion: xr.Dataset) -> None:
         peak = int(np.argmax(values.values))
         at = f"after {float(time[peak]):.6g} {unit}"
         table.add_row(name, f"{float(values[peak]):.6g} {of}", at)
+    if "instability_time" in motion:
+        since = f"after {float(motion['instability_time']):.6g} {unit}"
+        table.add_row("beyond the instability norm", "no physics", since)
     table.add_row("friction at the end", f"{float(friction[-1]):.6g}", "")
     console.print(table)

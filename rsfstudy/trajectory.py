@@ -13,10 +13,11 @@ import numpy as np
 import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
-from rsfstudy.errors import InvalidValue, NoAnswer, brief
+from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
+from rsfstudy.motion.events import rise
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.motion.stepping import Halt, Meter, more_work
@@ -33,6 +34,18 @@ _UNSTEPPED = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
+_INSTABILITY_TIME = Quantity(
+    "instability_time",
+    "$t V_*/D_c$",
+    "1",
+    "time at which slip rate first passed the instability norm",
+    "D_c/V_*",
+)
+#: Attribute that says from when on a motion is no physics.
+BEYOND = "beyond_instability_norm"
+#: Slip rate over that of the load point that counts as instability where the load point alone
+#: reaches the norm, as it may where the period is not that of the slider.
+_OVER_LOADING = 1e6
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
@@ -71,7 +84,10 @@ def simulate(
         Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
         time and what it then is a few floating-point numbers later, as are the points of a rupture
         too short for its times to differ. A motion that cannot go on ends early, with its
-        ``status`` and ``message`` in the attributes.
+        ``status`` and ``message`` in the attributes. Beyond the instability norm a motion with
+        neither mass nor radiation damping is no physics: from when on, say ``instability_time`` and
+        the attribute ``beyond_instability_norm``. (Where the load point itself is beyond the norm:
+        from a million times its velocity.)
 
     Raises
     ------
@@ -80,8 +96,11 @@ def simulate(
 
     Warns
     -----
+    Incomplete
+        Where the motion ends early, with the status and the reason.
     NoAnswer
-        Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*.
+        Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*. And
+        where it passes the instability norm with neither mass nor radiation damping.
     """
     if nameless:
         remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
@@ -96,9 +115,11 @@ def simulate(
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
     recording = Recording(list(_REGIMES))
-    status, message = Status.OK, ""
-    moving = follow(scene, accuracy, meter, recording=recording, until=duration)
+    status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
+    watches = [rise("log_rate", limit)] if limit < math.inf else []
+    moving = follow(scene, accuracy, meter, watches, recording=recording, until=duration)
     try:
+        passed = next((e.time for e in moving if e.watch or e.point.log_rate >= limit), math.nan)
         collections.deque(moving, maxlen=0)
     except Halt as halt:
         status, message = halt.status, str(halt)
@@ -112,7 +133,7 @@ def simulate(
     dataset = _dataset(columns, seen[:, REGIME], recording.regimes)
     dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
     dataset = dataset.set_coords(["slip", "reference_rate"])
-    return dataset.assign_attrs(
+    dataset = dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
             "Conventions": "CF-1.11",
@@ -126,6 +147,25 @@ def simulate(
             "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
         }
     )
+    if passed >= 0.0:
+        text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
+        dataset[_INSTABILITY_TIME.name] = ((), passed, _about(_INSTABILITY_TIME))
+        dataset = dataset.assign_attrs({BEYOND: text})
+        warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=2)
+    if status is not Status.OK:
+        text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
+        warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=2)
+    return dataset
+
+
+def _limit(scene: Scene) -> float:
+    """ln(V/V_*) beyond which a motion is no physics."""
+    if scene.has_mass or scene.dynamics.damping(0.0):
+        return math.inf
+    loads = [segment.load_velocity for segment in scene.parts.loading.segments]
+    fastest = math.log(max(1.0, *loads))
+    norm = scene.log_norm_rate
+    return norm if norm > fastest else fastest + math.log(_OVER_LOADING)
 
 
 def _dataset(

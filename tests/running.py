@@ -25,7 +25,7 @@ import rsfstudy
 # what prints takes its width from the environment when it is loaded: not from that of a test
 from rsfstudy import Axis, Scene, Study, cli, commands  # noqa: F401
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError
+from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.engines import COMPILED
 
@@ -47,6 +47,12 @@ HANGS = 1200.0
 def run(study=SMALL, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def run_with_failures(*words, **options) -> xr.Dataset:
+    """The same, where cells are to fail, which is told."""
+    with pytest.warns(Incomplete, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"):
+        return run(*words, **options)
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
@@ -163,10 +169,12 @@ def call(*words) -> SimpleNamespace:
     return SimpleNamespace(returncode=ended.value.code, stdout=texts[0], stderr=texts[1])
 
 
-#: Ctrl-C ends it even where the tests run in the background, where shells have it ignored.
+#: Signals end it even where the tests run in the background, or without a terminal, where shells
+#: have them ignored.
 _COMMAND = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from rsfstudy.cli import main
 main()
 """

@@ -340,10 +340,33 @@ def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_pa
     assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.parametrize(
+    ("duration", "budget", "status", "said"),
+    [
+        ("100", 5000, 0, ""),
+        ("116", 5000, 3, "warning: beyond the instability norm from 114.5"),
+        ("100", 200, 1, ""),
+    ],
+)
+def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
+    """To the end of a hold, beyond the pulse that follows, and where the budget ends it; what is
+    said stands on one stream.
+    """
+    words = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100}
+    settings = [word for name, value in words.items() for word in ("--set", f"{name}={value}")]
+    least = ("--duration", duration, "--budget", budget, "--engine", "compiled")
+    ran = call("simulate", *settings, *least, "--output", tmp_path / "motion.png")
+    assert ran.returncode == status
+    assert said in ran.stderr
+    assert ("budget" in ran.stdout) is (status == 1)
+    assert len(ran.stderr.splitlines()) == (status == 3)
+    assert ("no physics after 114.5" in " ".join(ran.stdout.split())) is (status == 3)
+
+
 def test_a_motion_that_cannot_begin_is_told(tmp_path):
     output = tmp_path / "motion.png"
     ended = call("simulate", "--set", "displacement_step=-200", "--output", output)
-    assert ended.returncode == 0  # an answer
+    assert (ended.returncode, ended.stderr) == (1, "")
     assert "normal_stress_lost" in ended.stdout
     assert "nothing moved" in ended.stdout
     assert not output.exists()

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, HANGS, call, run
+from running import FAULTY, HANGS, call, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, assignments, terminal
 from rsfstudy.compute import clusters, runner, worker_log, workers
 from rsfstudy.compute.plan import Batches
-from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.errors import Incomplete, InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import LinearFit, reduced
 from rsfstudy.status import Status
@@ -74,7 +74,7 @@ def gone_wrong(tmp_path_factory, cluster):
     found = []
     for where in ({"workers": 0}, {"client": cluster}):
         output = tmp_path_factory.mktemp("wrong")
-        found += [run(study, **where, output=output), rsfstudy.open("faulty", output)]
+        found += [run_with_failures(study, **where, output=output), rsfstudy.open("faulty", output)]
     return found
 
 
@@ -104,7 +104,7 @@ def lost(*words, **options):
         pytest.warns(UserWarning, match="a worker ended: the cells it held"),
         pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run goes on"),
     ):
-        return run(*words, **options)
+        return run_with_failures(*words, **options)
 
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
@@ -117,7 +117,7 @@ def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
 
 def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):
     """Nobody pressed Ctrl-C there."""
-    dataset = run(declared("interrupts", at=(2.5,)), client=cluster)
+    dataset = run_with_failures(declared("interrupts", at=(2.5,)), client=cluster)
     only_one_failed(dataset, "cell_raised")
     assert "KeyboardInterrupt" in dataset.message.values[1]
 
@@ -219,13 +219,29 @@ def test_also_where_every_cell_kills_its_worker(sturdy, tmp_path, monkeypatch):
 def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
     """The first cells are a sample of all, wherever they stand on their axis."""
     corner = tuple(2.0 + 0.5 * i for i in range(100))
-    status = run(declared("raises", at=corner, cells=400)).status.values
+    study = declared("raises", at=corner, cells=400)
+    status = run_with_failures(study).status.values
     assert (status[:100] == Status.CELL_RAISED).all()
     assert (status[100:] == Status.OK).all()
 
 
+def test_a_run_says_which_cells_failed(tmp_path, capsys):
+    """In Python by a warning, with their statuses; the command prints a table, and no more."""
+    study = declared("nan", at=(2.5, 3.0))
+    with pytest.warns(Incomplete, match=r"^2 of 4 cells failed: not_finite 2; dataset\.rsf\."):
+        dataset = run(study)
+    assert len(dataset.rsf.failures()) == 2
+    assert "failed" not in "".join(capsys.readouterr())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FAULT", "nan")
+        patch.setenv("FAULT_AT", "2.5 3.0")
+        told = call("run", FAULTY, "--serial", "--quiet", "--output", tmp_path)
+    assert "2 cells failed" in told.stdout
+    assert told.stderr == ""
+
+
 def test_it_goes_on_when_told_to():
-    dataset = run(declared("raises", cells=100), keep_going=True)
+    dataset = run_with_failures(declared("raises", cells=100), keep_going=True)
     assert (dataset.status == int(Status.CELL_RAISED)).all()
 
 
@@ -234,9 +250,10 @@ def test_a_few_failures_or_a_small_lattice_do_not_stop_it(tmp_path):
     failing = tuple(2.0 + 0.5 * i for i in range(40))
     half = declared("raises", at=failing, cells=80)
     for _ in range(2):
-        dataset = run(half, output=tmp_path)
+        dataset = run_with_failures(half, output=tmp_path)
         assert int((dataset.status == int(Status.CELL_RAISED)).sum()) == 40
-    assert (run(declared("raises", cells=9)).status == int(Status.CELL_RAISED)).all()
+    nine = run_with_failures(declared("raises", cells=9))
+    assert (nine.status == int(Status.CELL_RAISED)).all()
 
 
 def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monkeypatch):
@@ -312,7 +329,8 @@ def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
 
 
 def lattice(failing=(3.0,)) -> xr.Dataset:
-    return run(declared("raises", at=failing, cells=6))
+    study = declared("raises", at=failing, cells=6)
+    return (run_with_failures if failing == (3.0,) else run)(study)
 
 
 FIT = (LinearFit(name="slope", of="total", on="b_over_a"),)
@@ -362,8 +380,8 @@ def test_the_run_passes_it_on(tmp_path):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(CriticalStep, "find", find)
-        assert np.isnan(run(study, output=tmp_path).slope)
-        told = run(study, output=tmp_path, despite_failures=True)
+        assert np.isnan(run_with_failures(study, output=tmp_path).slope)
+        told = run_with_failures(study, output=tmp_path, despite_failures=True)
     assert np.isfinite(told.slope)
     assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, SMALL, call, run
+from running import FAULTY, SMALL, call, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Scene, plots
@@ -426,7 +426,7 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
 def test_a_measure_of_ones_own_is_not_taken_for_one_of_ours(tmp_path):
     """Not even where it bears the name of one."""
     (tmp_path / "mine.py").write_text(OWN_CRITICAL_STEP)
-    rsfstudy.run(tmp_path / "mine.py", workers=0, output=tmp_path, progress=False)
+    run_with_failures(tmp_path / "mine.py", output=tmp_path)
     for again in (rsfstudy.rerun, lambda file: rsfstudy.cell(file, {"b_over_a": 2.0})):
         with pytest.raises(InvalidValue, match="'critical_step': is a user's own.*--study"):
             again(tmp_path / "mine.nc")

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
@@ -163,7 +163,8 @@ def test_a_step_that_takes_all_stress_is_refused_wherever_it_stands():
     with pytest.raises(Halt) as halt:
         told(of, until=5.0)
     assert halt.value.status is Status.SHEAR_STRESS_REVERSED
-    motion = simulate(of, duration=5.0)
+    with pytest.warns(Incomplete, match="after 1 of 5 .*shear_stress_reversed"):
+        motion = simulate(of, duration=5.0)
     assert motion.attrs["status"] == "shear_stress_reversed"
     assert float(motion.time[-1]) == pytest.approx(1.0)
 

@@ -22,6 +22,7 @@ from running import (
     command,
     ended,
     run,
+    run_with_failures,
     same_numbers,
     until,
     until_kept,
@@ -143,14 +144,26 @@ def test_the_resource_tracker_is_killed(held):
     assert (code, said) == (0, "")
 
 
-@pytest.mark.parametrize("options", [["--serial"], ["--workers", "1"]], ids=["serial", "worker"])
-def test_ctrl_c(options, held):
-    """A real SIGINT to the command and, as a terminal sends it, to its workers."""
+@pytest.mark.parametrize(
+    ("options", "number", "status", "why"),
+    [
+        (["--serial"], signal.SIGINT, 1, "interrupted"),
+        (["--workers", "1"], signal.SIGINT, 1, "interrupted"),
+        (["--serial"], signal.SIGTERM, 128 + 15, "ended by SIGTERM"),
+        (["--workers", "1"], signal.SIGTERM, 128 + 15, "ended by SIGTERM"),
+        (["--workers", "1"], signal.SIGHUP, 128 + 1, "ended by SIGHUP"),
+    ],
+)
+def test_a_signal_ends_a_run_in_order(options, number, status, why, held):
+    """A real one to the command and, as a terminal or a batch system sends it, to its workers."""
     run = held(*options)
-    os.killpg(run.process.pid, signal.SIGINT)
+    left = list(children(run.process).values())
+    os.killpg(run.process.pid, number)
     run.let_through()
     code, _out, said = ended(run.process)
-    assert code == 1
+    assert code == status
+    assert f"error: faulty: {why}. " in said
+    assert not psutil.wait_procs(left, timeout=HANGS)[1]
     assert f"of {CELLS} cells are finished and kept in" in said
     assert len(said.splitlines()) == 1, said
     partial = rsfstudy.open(run.output / "faulty.partial.nc")
@@ -159,6 +172,22 @@ def test_ctrl_c(options, held):
     assert (partial.status == int(Status.PENDING)).sum() == CELLS - done
     assert 0 < done < CELLS
     goes_on(run.output, done)
+
+
+def test_a_signal_ends_a_motion_with_one_line(tmp_path):
+    """Sent once the command has said that the rig is unusual, and is at work; twice, as `timeout`
+    does.
+    """
+    rig = ("--normal-stress", "1 Pa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
+    cycles = ("--set", "stiffness_ratio=0.8", "--set", "inertia=true", "--set", "hold_time=1 s")
+    for_ever = ("--duration", "1e15 s", "--budget", str(10**15))
+    process = command("simulate", *rig, *cycles, *for_ever, "--output", tmp_path / "motion.png")
+    assert "unusual for a rig" in process.stderr.readline()
+    process.terminate()
+    process.terminate()
+    code, _out, said = ended(process)
+    assert (code, said) == (128 + signal.SIGTERM, "error: ended by SIGTERM\n")
+    assert not list(tmp_path.iterdir())
 
 
 def test_ctrl_c_while_the_workers_start(tmp_path):
@@ -376,7 +405,8 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
 def test_failures_are_tried_again(tmp_path, monkeypatch):
     """A cell that failed has no answer: the next run computes it, and only it."""
     failing = declared("raises", at=(2.5,))
-    assert run(failing, output=tmp_path).status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
+    status = run_with_failures(failing, output=tmp_path).status
+    assert status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
     assert cells_in(tmp_path / "faulty.cells.sqlite") == 4
     asked = []
     original = cells.computed
@@ -386,7 +416,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
         return original(task, cell, **options)
 
     monkeypatch.setattr(cells, "computed", counted)
-    run(failing, output=tmp_path)
+    run_with_failures(failing, output=tmp_path)
     assert asked == [2.5]
 
 
@@ -395,7 +425,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch):
 
 def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again(tmp_path):
     few = {"b_over_a": [2.0], "output": tmp_path}
-    spent = run(SMALL, budget=300, **few)
+    spent = run_with_failures(SMALL, budget=300, **few)
     assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
     assert "--budget 1200 (budget=) allows more" in spent.message.values.flat[0]
     answered = run(SMALL, budget=100_000, **few)

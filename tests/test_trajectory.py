@@ -9,7 +9,8 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer
+from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.recording import REGIME, STATES, strictly_later
 
 
@@ -104,13 +105,68 @@ def test_rows_of_one_time_are_told_apart_and_those_that_say_nothing_left_out():
 
 
 def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
-    cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
+    with pytest.warns(Incomplete, match=r"after .* of 1000 D_c/V_\*: work_budget_spent \("):
+        cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
     assert cut.sizes["time"] > 10
     assert cut.attrs["message"].endswith("--budget 2000 (budget=) allows more")
-    opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
+    with pytest.warns(Incomplete, match="after 0 of 50 .*: normal_stress_lost .*takes normal"):
+        opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
     assert opened.attrs["status"] == "normal_stress_lost"
     assert opened.sizes["time"] == 0
+
+
+#: A pulse of 10^40 V_* after a hold; it comes to rest, and nothing ends it.
+PULSE = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100.0}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_beyond_the_norm_without_mass_or_damping_it_is_no_physics(engine):
+    """From where slip rate passes 5e-4 over T V_*/(2 pi D_c) on; in all units."""
+    with pytest.warns(NoAnswer, match="beyond the instability norm from .*neither mass nor"):
+        motion = rsfstudy.simulate(Scene(**PULSE), duration=150.0, engine=engine)
+    assert motion.attrs["status"] == "ok"
+    since = float(motion.instability_time)
+    norm = math.log10(5e-4 / (5.0 * 1.17e-8 / (2.0 * math.pi)))
+    # slip rate grows by a power of ten within some 1e-6 D_c/V_* there, and is recorded more often
+    assert since == pytest.approx(114.540722, abs=1e-4)
+    rate = motion.log10_slip_rate
+    assert float(rate.where(motion.time < since).max()) < norm
+    assert float(rate.where(motion.time >= since).dropna("time")[0]) >= norm - 1e-9
+    assert f"from {since:.9g} D_c/V_* on" in motion.attrs["beyond_instability_norm"]
+    in_si = motion.rsf.to_si(normal_stress=1e6, slip_distance=1e-5)
+    assert in_si.instability_time.attrs["units"] == "s"
+    assert float(in_si.instability_time) == pytest.approx(since / 1.17e-8, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"inertia": True},
+        {"radiation_damping": 1e-5},
+        # with this period the load point itself is beyond the norm, and the pulse is one of 40 V_0
+        {"reference_rate": 0.1, "stiffness_ratio": 1.4},
+    ],
+)
+def test_there_is_physics_beyond_the_norm_with_mass_or_damping(fields):
+    """And it says nothing of itself where the load point alone passes it."""
+    motion = rsfstudy.simulate(Scene(**PULSE, **fields), duration=150.0, engine=COMPILED)
+    assert float(motion.log10_slip_rate.max()) > 0.5
+    assert "instability_time" not in motion
+    assert "beyond_instability_norm" not in motion.attrs
+
+
+def test_a_motion_that_begins_beyond_the_norm_says_so():
+    """And where the load point alone passes it, what is a million times faster is beyond it."""
+    # ln V jumps by K d/a = 15, and K > b takes it down again
+    jump = Scene(**PULSE | {"hold_time": 0.0}, displacement_step=3.0, stiffness_ratio=10.0)
+    with pytest.warns(NoAnswer, match="from 0 D_c"):
+        rsfstudy.simulate(jump, duration=1.0, rtol=1e-3)
+    with pytest.warns(NoAnswer, match="from 114"):
+        motion = rsfstudy.simulate(Scene(**PULSE, reference_rate=0.1), duration=150.0)
+    at = motion.sel(time=float(motion.instability_time), method="nearest")
+    # samples are a few tenths of a power of ten apart
+    assert float(at.log10_slip_rate) == pytest.approx(6.0, abs=0.5)
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf])

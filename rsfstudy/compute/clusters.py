@@ -10,12 +10,15 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from rsfstudy.errors import RunError, brief
 
 #: Time in s to wait for a process of this machine that does not answer.
 _HANGS = 600
+#: What ends a run in order, where it is handled.
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextlib.contextmanager
@@ -38,29 +41,35 @@ def _script_not_imported() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Delay Ctrl-C until the end of this block, and keep it from processes that are started in it:
-    on Ctrl-C the driver ends the run, and then its workers. A second Ctrl-C is not delayed.
+    """Delay Ctrl-C, and signals that end the run as it does, until the end of this block. Ctrl-C
+    and the end of a terminal are kept from processes that are started in it: the driver ends the
+    run, and then its workers. A second Ctrl-C is not delayed.
     """
     held: list[int] = []
+    found = {int(number): signal.getsignal(number) for number in _ENDING}
+    handlers = {number: handler for number, handler in found.items() if callable(handler)}
 
-    def hold(number: int, _frame: object) -> None:
-        if held:
-            raise KeyboardInterrupt
+    def hold(number: int, frame: FrameType | None) -> None:
+        if held and number == signal.SIGINT:
+            handlers[number](number, frame)
         held.append(number)
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    handler = signal.signal(signal.SIGINT, hold)
-    # threads and processes inherit the signals that are blocked when they are started
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    for number in handlers:
+        signal.signal(number, hold)
+    # threads and processes inherit the signals that are blocked when they are started; SIGTERM is
+    # what ends those that do not answer
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        signal.signal(signal.SIGINT, handler)
-    if held:
-        raise KeyboardInterrupt
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if held:  # also where a process that had the signal too could not be started
+            handlers[held[0]](held[0], None)
 
 
 @contextlib.contextmanager

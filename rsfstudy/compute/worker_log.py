@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import sys
 import tempfile
 import warnings
@@ -73,12 +74,15 @@ def _logged(log: Path) -> Iterator[None]:
 def start_tracker(log: Path) -> None:
     """Start multiprocessing's resource tracker if it does not run; its errors go to `log`."""
     terminal = os.dup(_ERRORS) if _has_errors() else None
+    # by itself it ignores the other signals that end the run, and not the end of a terminal
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
         _redirect(log)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an earlier one may have been killed
             resource_tracker.ensure_running()
     finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         if terminal is not None:
             os.dup2(terminal, _ERRORS)
             os.close(terminal)
