@@ -30,7 +30,7 @@ _LAST, _STAYS = 0.1, 0.01
 #: Part of ln r within which slip is steady before the step.
 _STEADY = 1e-3
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
+_BY_CHANCE = 0.1
 
 _READ = (
     Quantity("apparent_a", "$a$", "1", "direct effect parameter as read off"),
