@@ -14,11 +14,7 @@ from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
-from rsfstudy.motion.readings import (
-    friction_at,
-    load_point_of,
-    watched,
-)
+from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
 from rsfstudy.motion.recording import READ, Recording, along_path
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
@@ -28,6 +24,8 @@ from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.01
+#: Distance from steady sliding within which a hold begins in it, in ln V or in the state over b.
+_STEADY = 1e-3
 #: Part of the largest distance from steady sliding at which there is no more peak to come.
 _SETTLED = 1e-6
 
@@ -69,6 +67,8 @@ class Healing(Reading):
 
     With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
     mu_h - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
+    Where a hold does not begin in steady sliding the message says so. A peak that stands above the
+    end of the record by no more than its own error is none.
 
     Parameters
     ----------
@@ -104,33 +104,36 @@ class Healing(Reading):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and once more with smaller tolerances for the errors."""
-        history = scene.parts.loading.segments
-        holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
-        if not holds:
-            return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
-        if history[holds[0] + 1].load_velocity == 0.0:
-            return Outcome(Status.NOT_APPLICABLE, message="the hold is followed by another")
-        before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
-        stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
-        if hold.displacement or reload.displacement or len(stresses) > 1:
-            why = "the load point is displaced, or normal stress stepped, at an end of the hold"
-            return Outcome(Status.NOT_APPLICABLE, message=why)
-        first = _follow(scene, holds[0], accuracy, meter)
+        hold = _hold(scene)
+        if isinstance(hold, Outcome):
+            return hold
+        first = _follow(scene, hold, accuracy, meter)
+        said = _beginning(scene, hold, first.begin, max(_STEADY, accuracy.rtol))
+        peakless = Outcome(
+            Status.NOT_APPLICABLE,
+            {"relaxation": _relaxation(scene, first)},
+            "; ".join(filter(None, ("no peak of friction on reloading", said))),
+        )
         if first.peak is None:
-            values = {"relaxation": _relaxation(scene, first)}
-            return Outcome(Status.NOT_APPLICABLE, values, "no peak of friction on reloading")
-        goes_on = self.record / history[holds[0] + 1].load_velocity
-        ends = math.fsum(segment.duration for segment in history[: holds[0] + 2])
-        until = min(first.peak.time + goes_on, ends)
-        again = _follow(scene, holds[0], accuracy.refined(), meter, until)
+            return peakless
+        again = _follow(scene, hold, accuracy.refined(), meter, self._end(scene, hold, first.peak))
         if again.peak is None:
-            return Outcome(Status.UNVERIFIED, message="smaller tolerances find no peak")
+            return peakless
         values, finer = _read(scene, first, first.peak), _read(scene, again, again.peak)
         errors = {
             f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
             for name, value in values.items()
         }
-        return Outcome(Status.OK, {**values, **errors, **self._shown(scene, again)})
+        above = again.peak.point.reading - float(friction_of(again.rows)[-1])
+        if above <= errors["healing_error"]:
+            return peakless
+        return Outcome(Status.OK, {**values, **errors, **self._shown(scene, again)}, said)
+
+    def _end(self, scene: Scene, hold: int, peak: Event) -> float:
+        """Time at which the record ends."""
+        history = scene.parts.loading.segments
+        goes_on = self.record / history[hold + 1].load_velocity
+        return min(peak.time + goes_on, math.fsum(s.duration for s in history[: hold + 2]))
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         """The record itself, from the beginning of the hold on."""
@@ -144,6 +147,31 @@ class Healing(Reading):
             "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],
         }
+
+
+def _hold(scene: Scene) -> int | Outcome:
+    """The number of the segment in which the load point is held first; or why it is no hold."""
+    history = scene.parts.loading.segments
+    holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
+    if not holds:
+        return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
+    before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
+    if reload.load_velocity == 0.0:
+        return Outcome(Status.NOT_APPLICABLE, message="the hold is followed by another")
+    stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
+    if hold.displacement or reload.displacement or len(stresses) > 1:
+        why = "the load point is displaced, or normal stress stepped, at an end of the hold"
+        return Outcome(Status.NOT_APPLICABLE, message=why)
+    return holds[0]
+
+
+def _beginning(scene: Scene, hold: int, begin: Event, near: float) -> str:
+    """How far from steady sliding a hold begins, if it does."""
+    before = (Segment(1.0), *scene.parts.loading.segments)[hold]
+    away = unsteady(scene, begin.point, before.load_velocity)
+    if away <= near:
+        return ""
+    return f"the hold does not begin in steady sliding, but {away:.2g} from it in ln V or state/b"
 
 
 def _follow(
@@ -173,14 +201,14 @@ def _follow(
 
 
 def _relaxation(scene: Scene, record: _Record) -> float:
-    return friction_at(scene, record.reload.point) - friction_at(scene, record.begin.point)
+    return record.reload.point.reading - record.begin.point.reading
 
 
 def _read(scene: Scene, record: _Record, peak: Event) -> dict[str, float]:
-    before = friction_at(scene, record.begin.point)
+    before = record.begin.point.reading
     longer = (peak.point.spring - record.reload.point.spring) / scene.stiffness
     return {
-        "healing": friction_at(scene, peak.point) - before,
+        "healing": peak.point.reading - before,
         "relaxation": _relaxation(scene, record),
         "peak_displacement": peak.slip - record.reload.slip + longer,
     }

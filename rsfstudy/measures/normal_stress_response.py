@@ -16,7 +16,6 @@ from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
-from rsfstudy.motion.readings import friction_at
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
@@ -279,7 +278,7 @@ def _shown(scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         "time": time,
         "load_point_displacement": scene.load_velocity * time,
         "slip": np.array([event.slip for event in events]),
-        "friction_coefficient": np.array([friction_at(scene, e.point) for e in events]),
+        "friction_coefficient": np.array([e.point.reading for e in events]),
         "normal_stress_ratio": np.array([event.point.normal_stress for event in events]),
         "log10_slip_rate": np.array([e.point.log_rate for e in events]) / math.log(10.0),
     }

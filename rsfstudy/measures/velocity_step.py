@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -16,7 +15,7 @@ from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
-from rsfstudy.motion.readings import friction_at, friction_of, watched
+from rsfstudy.motion.readings import friction_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -103,6 +102,8 @@ class VelocityStep(Reading):
     recorded, and of slip, which is that less the shortening of the spring. Nothing is corrected for
     the stiffness of the rig: what a soft spring does to the numbers is what is measured. Friction
     has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record.
+    Where there is no extremum, or no more evolution than its own error, the measure is
+    `not_applicable`, with the numbers that there are.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ class VelocityStep(Reading):
         return 8_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion twice, the second time told where 1/e is left; and both once more with
+        """Follow the motion, and from its peak on to where 1/e is left; and both once more with
         smaller tolerances for the errors.
         """
         check_leaves_alone(scene)
@@ -159,8 +160,11 @@ class VelocityStep(Reading):
             f"{name}_error": error_between(value, again[name], _BY_CHANCE * accuracy.rtol)
             for name, value in values.items()
         }
-        shown = self._shown(scene, step, record)
-        return Outcome(Status.OK, {**values, **errors, **shown})
+        found = {**values, **errors, **self._shown(scene, step, record)}
+        if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
+            text = "friction has no extremum after the step, or does not evolve from there"
+            return Outcome(Status.NOT_APPLICABLE, found, text)
+        return Outcome(Status.OK, found)
 
     def _step(self, scene: Scene) -> _Step | Outcome:
         """The step to read; or why there is none."""
@@ -185,7 +189,10 @@ class VelocityStep(Reading):
         turn, recording = _turn(scene, step), Recording()
         begun: list[Event] = []
         peak = None
-        for event in _events(scene, step, accuracy, meter, turn, recording):
+        moving = follow(
+            scene, accuracy, meter, [turn], recording=recording, until=step.begins + step.lasts
+        )
+        for event in moving:
             if event.kind in (Kind.START, Kind.SEGMENT):
                 begun.append(event)
             elif event.watch == turn and len(begun) == self.step_number and peak is None:
@@ -198,38 +205,38 @@ class VelocityStep(Reading):
         self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
     ) -> dict[str, float]:
         """What is read off; of the peak nothing, where there is none."""
-        before, after = (friction_at(scene, e.point) for e in (record.begin, record.end))
-        top = friction_at(scene, record.peak.point) if record.peak else math.nan
-        left = self._left(scene, step, record, accuracy, meter)
-        moved, slipped = math.nan, math.nan
-        if left is not None and record.peak is not None:
-            moved = step.after * (left.time - record.peak.time)
-            slipped = left.slip - record.peak.slip
+        before, after = (e.point.reading for e in (record.begin, record.end))
+        top = record.peak.point.reading if record.peak else math.nan
+        left = self._left(scene, record, accuracy, meter)
         return {
             "apparent_a": (top - before) / step.ratio,
             "apparent_b": (top - after) / step.ratio,
             "apparent_a_minus_b": (after - before) / step.ratio,
-            "apparent_slip_distance": moved,
-            "corrected_slip_distance": slipped,
+            "apparent_slip_distance": step.after * left.time if left else math.nan,
+            "corrected_slip_distance": left.slip if left else math.nan,
             "peak_friction": top,
             "friction_before": before,
             "friction_after": after,
         }
 
     def _left(
-        self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
+        self, scene: Scene, record: _Record, accuracy: Accuracy, meter: Meter
     ) -> Event | None:
-        """Where 1/e of the evolution is left, after the peak."""
-        if record.peak is None:
+        """Where 1/e of the evolution is left, with time and slip since the peak: followed from
+        there, because the step that holds the peak may hold a crossing of the level on either side.
+        """
+        peak = record.peak
+        if peak is None or not peak.time < record.end.time:
             return None
-        after, top = (friction_at(scene, e.point) for e in (record.end, record.peak))
+        after, top = (e.point.reading for e in (record.end, peak))
         of, above = watched(scene)
         level = after + (top - after) / math.e - above
-        watch = fall(of, level) if step.ratio > 0.0 else rise(of, level)
-        for event in _events(scene, step, accuracy, meter, watch):
-            if event.watch == watch and event.time > record.peak.time:
-                return event
-        return None
+        # with a state that strengthens, evolution may go the way of the direct effect
+        watch = fall(of, level, ends=True) if top > after else rise(of, level, ends=True)
+        stepped, _lasts = scene.segments[self.step_number - 1]
+        rest = record.end.time - peak.time
+        events = follow(stepped, accuracy, meter, [watch], start=peak.point, until=rest)
+        return next((event for event in events if event.watch == watch), None)
 
     def _shown(self, scene: Scene, step: _Step, record: _Record) -> dict[str, float | np.ndarray]:
         """Whether friction has settled, how far it departs from that of a stiff slider, and the
@@ -240,7 +247,7 @@ class VelocityStep(Reading):
         # there may be few samples, in long steps
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.end
-        direct = friction_at(scene, turned.point) - friction[0]
+        direct = turned.point.reading - friction[0]
         path = along_path(rows, self.phases, READ)
         return {
             "settled": float(np.ptp(last) < _STAYS * abs(direct)),
@@ -255,19 +262,6 @@ class VelocityStep(Reading):
 def _turn(scene: Scene, step: _Step) -> Watch:
     of, _above = watched(scene)
     return maximum(of) if step.ratio > 0.0 else minimum(of)
-
-
-def _events(
-    scene: Scene,
-    step: _Step,
-    accuracy: Accuracy,
-    meter: Meter,
-    watch: Watch,
-    recording: Recording | None = None,
-) -> Sequence[Event]:
-    """What happens up to the end of the record."""
-    end = step.begins + step.lasts
-    return list(follow(scene, accuracy, meter, [watch], clock=True, recording=recording, until=end))
 
 
 def _departure(scene: Scene, step: _Step, record: _Record) -> float:
@@ -285,7 +279,7 @@ def _departure(scene: Scene, step: _Step, record: _Record) -> float:
     later = record.rows[:, 0] >= record.peak.time
     left = np.array([stress_left(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
     expected = steady + scene.b * left
-    seen = (friction_of(record.rows) - friction_at(scene, record.begin.point))[later]
+    seen = (friction_of(record.rows) - record.begin.point.reading)[later]
     return float(np.abs(seen - expected).max())
 
 
@@ -299,7 +293,4 @@ def _has_closed_form(scene: Scene, step: _Step, record: _Record) -> bool:
         return False
     if not law.scale_free and step.before != 1.0:
         return False
-    begin = record.begin.point
-    size = scene.a * law.size_over_a
-    away = max(abs(begin.log_rate - math.log(step.before)), begin.unrest / size)
-    return away < _STEADY * abs(step.ratio)
+    return unsteady(scene, record.begin.point, step.before) < _STEADY * abs(step.ratio)

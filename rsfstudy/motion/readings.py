@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rsfstudy.motion.recording import OBSERVED, READ
@@ -21,9 +23,12 @@ LOAD_POINT = Quantity(
 )
 
 
-def friction_at(scene: Scene, point: Point) -> float:
-    """The friction coefficient that is read at a point of a motion."""
-    return point.reading
+def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
+    """How far a point is from steady sliding at a load point velocity, in ln V or in the state over
+    b.
+    """
+    size = scene.a * scene.parts.law.size_over_a
+    return max(abs(point.log_rate - math.log(load_velocity)), point.unrest / size)
 
 
 def watched(scene: Scene) -> tuple[str, float]:

@@ -1,0 +1,121 @@
+"""Where there is nothing to read off a velocity step or a hold, and where it is hard to see."""
+
+import math
+
+import numpy as np
+import pytest
+from test_readings import PLAIN, read, recorded
+
+from rsfstudy import Scene, protocol, simulate
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.status import Status
+
+
+@pytest.mark.parametrize("digits", range(2, 8))
+def test_a_peak_stands_above_what_follows_by_more_than_its_error(digits):
+    """Friction comes from below to steady sliding, and rounds a corner of the size of the tolerance
+    there, at most.
+    """
+    scene = Scene(
+        law="cut_off", cutoff_velocity_ratio=17122.0, normal_stress="constant", a=0.0048,
+        b_over_a=3.56674, mu_star=0.71079, stiffness_ratio=4.72567, hold_time=1.87307,
+        load_velocity_ratio=0.12839,
+    )  # fmt: skip
+    outcome = Healing(phases=2)(scene, Accuracy(10.0**-digits, engine=COMPILED))
+    assert (outcome.status, outcome.message[:7]) == (Status.NOT_APPLICABLE, "no peak")
+    assert outcome.values["relaxation"] == pytest.approx(-0.00919624, rel=10.0**-digits)
+
+
+@pytest.mark.parametrize(("distance", "is_steady"), [(1.0, False), (30.0, True)])
+def test_a_hold_that_does_not_begin_in_steady_sliding_says_so(distance, is_steady):
+    """After a step to 2 V_*, from which friction has evolved over 1 D_c, or 30."""
+    rows = [
+        {"velocity": 2.0, "distance": distance},
+        {"velocity": 0.0, "duration": 50.0},
+        {"velocity": 2.0},
+    ]
+    scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
+    outcome = Healing(phases=2)(scene, Accuracy(1e-5, engine=COMPILED))
+    motion = simulate(scene, duration=distance / 2.0, rtol=1e-8)
+    theta = float(motion.state_variable[-1])
+    rate = float(motion.log10_slip_rate[-1]) * math.log(10.0)
+    assert outcome.status is Status.OK
+    assert (outcome.message == "") is is_steady
+    if not is_steady:
+        # ln V from that of the load point, or the state from -b ln V, over b
+        expected = max(abs(rate - math.log(2.0)), abs(theta / scene.b + rate))
+        told = float(outcome.message.split("but ")[1].split()[0])
+        assert told == pytest.approx(expected, rel=0.05)  # it is told with two digits
+
+
+def drawn(number: int) -> Scene:
+    """A scene with a step of velocity, from wide ranges; of some, states strengthen."""
+    draw = np.random.default_rng([4, number])
+    several = {
+        "law": "two_slowness_states",
+        "b1_over_a": 1.0 + draw.uniform(0.1, 1.0),
+        "b2_over_a": draw.uniform(-1.0, 0.0),
+        "length_ratio": 10.0 ** draw.uniform(-1.0, 1.0),
+    }
+    b_over_a = 1.0 + 10.0 ** draw.uniform(-1.0, 0.5)
+    cut_off = {"law": "cut_off", "cutoff_velocity_ratio": 10.0 ** draw.uniform(0.0, 2.0)}
+    return Scene(
+        normal_stress="constant",
+        a=0.01,
+        stiffness=10.0 ** draw.uniform(-2.0, -0.5),
+        load_velocity_ratio=10.0 ** draw.uniform(-1.5, 1.5),
+        **([several, {"law": "slip", "b_over_a": b_over_a}, {**cut_off, "b_over_a": b_over_a}])[
+            number % 3
+        ],
+    )
+
+
+def test_no_number_of_a_step_that_is_ok_is_missing():
+    """Whether friction has no extremum (above the cut-off), evolves the way of the direct effect (a
+    state that strengthens), or crosses the level twice in the integration step of its peak (at
+    loose tolerances): of each kind there are some.
+    """
+    ended = []
+    for number in range(180):
+        for rtol in (1e-2, 1e-4):
+            scene = drawn(number)
+            outcome = VelocityStep(phases=2)(scene, Accuracy(rtol, engine=COMPILED))
+            ended.append(outcome.status)
+            found = {n: v for n, v in outcome.values.items() if n != "closed_form_departure"}
+            if outcome.status is Status.OK:
+                assert np.isfinite(np.concatenate([np.ravel(v) for v in found.values()])).all()
+    assert set(ended) >= {Status.OK, Status.NOT_APPLICABLE}
+
+
+def test_evolution_in_the_direction_of_the_direct_effect_has_its_slip_distance():
+    """With a second state that strengthens, over a larger distance."""
+    scene = Scene(
+        law="two_slowness_states", normal_stress="constant", a=0.003, b1_over_a=1.275,
+        b2_over_a=-0.79, length_ratio=8.0, stiffness_ratio=5.0, load_velocity_ratio=0.5,
+    )  # fmt: skip
+    found = read(VelocityStep(phases=2), scene, 1e-8, engine=COMPILED)
+    friction, _highest, _lowest = recorded(scene, 0.0, 40.0)
+    trough = min(t for t in friction.derivative().roots(extrapolate=False) if t > 0.0)
+    assert found["apparent_b"] < 0.0
+    assert found["peak_friction"] == pytest.approx(float(friction(trough)), abs=1e-9)
+    level = friction(40.0) + (friction(trough) - friction(40.0)) / math.e
+    left = min(t for t in friction.solve(level, extrapolate=False) if t > trough)
+    assert found["apparent_slip_distance"] == pytest.approx(0.5 * (left - trough), rel=2e-4)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_one_step_of_the_integrator_may_hold_a_peak_and_what_is_on_either_side(engine):
+    """Friction is below the level before this step and after it."""
+    scene = Scene(
+        law="cut_off", cutoff_velocity_ratio=37636.873010838295, normal_stress="constant",
+        a=0.015843391107432936, b_over_a=1.2851363057799494, mu_star=0.7632291812253668,
+        stiffness_ratio=1.0718746434241289, load_velocity_ratio=7.966252844601684,
+    )  # fmt: skip
+    rough, exact = (
+        read(VelocityStep(phases=2), scene, rtol, engine=engine) for rtol in (1e-2, 1e-7)
+    )
+    for name in ("apparent_slip_distance", "corrected_slip_distance"):
+        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"] + exact[f"{name}_error"]
