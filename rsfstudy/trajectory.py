@@ -79,8 +79,9 @@ def simulate(
     xarray.Dataset
         ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring), ``frictional_stress``,
         ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``, and what a rig reads,
-        ``load_point_displacement`` and ``friction_coefficient`` (spring stress over effective
-        normal stress), along ``time``; and ``porosity`` and ``pore_pressure`` of a dilatant fault.
+        ``load_point_displacement`` and ``friction_coefficient`` (spring stress over normal stress
+        less pore pressure outside the fault), along ``time``; and ``porosity`` and
+        ``pore_pressure`` of a dilatant fault.
         Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
         time and what it then is a few floating-point numbers later, as are the points of a rupture
         too short for its times to differ. A motion that cannot go on ends early, with its
