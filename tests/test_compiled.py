@@ -21,7 +21,7 @@ from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, Incomplete, InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.coverage import QUESTIONS, random_scene
 from rsfstudy.measures.critical_step import CriticalStep
@@ -370,7 +370,8 @@ class Ending(Law):
 @pytest.mark.parametrize("by", ENGINES)
 def test_a_rate_that_is_no_number_ends_the_motion(by):
     scene = Scene(law=Ending, stiffness_ratio=1.5, load_velocity_ratio=20.0)
-    ended = simulate(scene, duration=10.0, budget=5_000, engine=by)
+    with pytest.warns(Incomplete, match="integration_failed|work_budget_spent"):
+        ended = simulate(scene, duration=10.0, budget=5_000, engine=by)
     assert ended.attrs["status"] in ("integration_failed", "work_budget_spent")
     assert float(ended["log10_slip_rate"].max()) <= 1.0 / math.log(10.0)
 
