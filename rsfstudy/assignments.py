@@ -10,6 +10,7 @@ import numpy as np
 
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.units import number
 
 _SPACED = "must read start:stop:count, two finite numbers and a count"
 _LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
@@ -58,19 +59,18 @@ def _spaced(text: str, parts: list[str]) -> list[float]:
     spacing = parts[3].strip().lower() if len(parts) == 4 else ""
     if len(parts) not in (3, 4) or spacing not in ("", "log"):
         raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC)
-    try:
-        first, last, points = float(parts[0]), float(parts[1]), int(parts[2])
-    except ValueError as error:
-        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC) from error
+    first, last, points = map(number, parts[:3])
+    if first is None or last is None or points is None or not points.is_integer():
+        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC)
     if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
         raise InvalidValue("--set", text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
-    spaced: list[float] = np.linspace(first, last, points).tolist()
+    spaced: list[float] = np.linspace(first, last, int(points)).tolist()
     if not spacing:
         return spaced
     if first <= 0.0 or last <= 0.0:
         remedy = "Leave :log out, or start above 0."
         raise InvalidValue("--set", text, "has no logarithm of 0 or less", remedy=remedy)
-    geometric: list[float] = np.geomspace(first, last, points).tolist()
+    geometric: list[float] = np.geomspace(first, last, int(points)).tolist()
     return geometric
 
 
@@ -79,7 +79,10 @@ def value(text: str) -> Any:
     flags = {"true": True, "false": False}
     if text.lower() in flags:
         return flags[text.lower()]
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return number_or_text(text)
+
+
+def number_or_text(text: str) -> float | str:
+    """The number that a text is, or else the text."""
+    read = number(text)
+    return text if read is None else read

@@ -18,6 +18,8 @@ _RIG = {
     "stiffness": "0.1 MPa/um",
     "period": "10 ms",
     "mass": "1e4 kg/m^2",
+    "shear_modulus": "30 GPa",
+    "density": "2700 kg/m^3",
 }
 
 

@@ -67,7 +67,8 @@ def _check_replaceable(data: Path) -> None:
 
 def _laboratory(rig: dict[str, str | None]) -> Laboratory | None:
     """The rig that the options state, if they state one."""
-    stated = {name: _number(text) for name, text in rig.items() if text is not None}
+    texts = {name: text for name, text in rig.items() if text is not None}
+    stated = {name: assignments.number_or_text(text) for name, text in texts.items()}
     for name in _AT_LEAST if stated else ():
         if name not in stated:
             remedy = "A rig is stated by these three at least."
@@ -86,7 +87,7 @@ def _scene(
 
 def _duration(text: str, laboratory: Laboratory | None) -> float:
     """In D_c/V_*."""
-    stated = _number(text)
+    stated = assignments.number_or_text(text)
     if laboratory is not None:
         return laboratory.dimensionless(stated, name="--duration")
     if isinstance(stated, str):
@@ -128,10 +129,3 @@ def _fields(settings: tuple[str, ...]) -> dict[str, Any]:
             raise InvalidValue("--set", text, f"sets {name} twice")
         fields[name] = assignments.value(value)
     return fields
-
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -13,13 +13,13 @@ import numpy as np
 import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import Measure, Value
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
-from rsfstudy.rig.scales import scaled, scales
+from rsfstudy.rig.scales import rate_of, scaled, scales
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
@@ -130,28 +130,26 @@ def to_si(
     slip_distance : quantity
         D_c, in m ("10 um").
     reference_rate : quantity, optional
-        V_*/D_c, in 1/s; by default that of the dataset, where it holds one.
+        V_*/D_c, in 1/s, of a dataset that does not hold it. One that holds it is converted by its
+        own, cell by cell.
 
     Raises
     ------
     InvalidValue
-        For scales that are no quantities or not positive, or a dataset that does not say its
-        `reference_rate`.
+        For scales that are no quantities or not positive; for a dataset that does not say its
+        `reference_rate`, or says another.
     DataError
-        For a dataset that is in other units already, or not of rsfstudy.
+        For a dataset that is in other units already, or not of rsfstudy; or where the scale of an
+        axis varies along another.
     """
-    if reference_rate is None:
-        if "reference_rate" not in dataset or dataset["reference_rate"].ndim:
-            raise InvalidValue(
-                "reference_rate", None, "is not one number in the dataset", remedy="State it."
-            )
-        reference_rate = float(dataset["reference_rate"])
+    if reference_rate is not None:
+        reference_rate = in_si("reference_rate", reference_rate, "1/s")
     return scaled(
         dataset,
         scales(
             in_si("normal_stress", normal_stress, "Pa"),
             in_si("slip_distance", slip_distance, "m"),
-            in_si("reference_rate", reference_rate, "1/s"),
+            rate_of(dataset, reference_rate),
         ),
     )
 

@@ -56,5 +56,10 @@ HARD_CYCLES = {
     "T = 1e4 s": 17.26640860590658854,
 }
 
+#: Variable normal stress, mass, any parameters (see `hard_cases`): (recurrence interval, relative
+#: uncertainty). What the switch costs falls with the square of its norm there, which is removed.
+DOWN_TO_137 = (0.79876073128172, 3e-12)
+DOWN_TO_1745 = (49.2071554225251, 3e-11)
+
 #: Slowness law, constant normal stress, k = k_cr, b/a = 2: log10 of the peak after a step to 200.
 PEAK_AFTER_200 = 87.02666189007507609300213265385

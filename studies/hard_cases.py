@@ -26,7 +26,6 @@ CONSTANT: Fields = {"normal_stress": "constant"}
 SLOWNESS: Fields = {"law": "slowness", "normal_stress": "constant"}
 CYCLE: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 EXACT = "closed form"
-ANOTHER_CODE = "a code of its own, with time as the clock, to the digits it gives"
 
 step, triggered = CriticalStep(), Triggered()
 cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
@@ -259,8 +258,8 @@ number(
     "slip law, down to 10^-137 V_*",
     cycle,
     "recurrence_interval",
-    0.798761,
-    ANOTHER_CODE,
+    known.DOWN_TO_137[0],
+    known.EXTENDED,
     {
         "law": "slip",
         "a": 0.008794017206350683,
@@ -274,14 +273,14 @@ number(
         "load_velocity_ratio": 86.431987832162,
         "inertia": True,
     },
-    uncertainty=1e-6,
+    uncertainty=known.DOWN_TO_137[1],
 )
 number(
     "slowness law, down to 10^-1745 V_*",
     cycle,
     "recurrence_interval",
-    49.20716,
-    ANOTHER_CODE,
+    known.DOWN_TO_1745[0],
+    known.EXTENDED,
     {
         "law": "slowness",
         "a": 0.004822260947305701,
@@ -295,7 +294,7 @@ number(
         "load_velocity_ratio": 1.2036896528515733,
         "inertia": True,
     },
-    uncertainty=2e-7,
+    uncertainty=known.DOWN_TO_1745[1],
 )
 ends(
     "mass against every stiffness",

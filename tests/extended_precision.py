@@ -11,10 +11,12 @@ remove (Richardson).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from rsfstudy.named_studies.hard_cases import CASES
 
 L = np.longdouble
 State = np.ndarray
@@ -317,6 +319,29 @@ HARD_CYCLES = {
     "T = 1e-6 s": {"ratio": "0.8", "period": "1e-6"},
     "T = 1e4 s": {"ratio": "0.8", "period": "1e4"},
 }
+#: Limit cycles of `hard_cases` at any parameters: what `stated` makes a slider of, the cycle, and
+#: two norms at which to switch. With normal stress that varies their error goes with the square.
+DEEP_CYCLES = {
+    "slip law, down to 10^-137 V_*": (4, ("2.5e-4", "1.25e-4")),
+    "slowness law, down to 10^-1745 V_*": (9, ("1e-3", "5e-4")),
+}
+
+
+def stated(fields: Mapping[str, Any]) -> Slider:
+    """The slider that a scene with an angle states."""
+    a, mu, alpha = (L(fields[name]) for name in ("a", "mu_star", "alpha"))
+    cot_phi = 1 / np.tan(L(fields["phi"]) * np.arccos(L(-1)) / 180)
+    b = a * L(fields["b_over_a"])
+    stiffness = L(fields["stiffness_ratio"]) * (b - a) / (1 - cot_phi * (mu - alpha))
+    inertial_time = L(fields["period"]) * L(fields["reference_rate"]) / (2 * np.arccos(L(-1)))
+    load = L(fields["load_velocity_ratio"])
+    return Slider(fields["law"], cot_phi, alpha, stiffness, load, b, a, mu, inertial_time)
+
+
+def deep_cycle(fields: Mapping[str, Any], count: int, norms: tuple[str, str]) -> np.longdouble:
+    """Recurrence interval, the error of the switch removed."""
+    coarse, fine = (Motion(stated(fields), float(w), 1e-16).numbers(count)[0] for w in norms)
+    return fine + (fine - coarse) / 3
 
 
 if __name__ == "__main__":
@@ -331,3 +356,5 @@ if __name__ == "__main__":
         print(label, "critical velocity", critical_velocity(slider(**fields), 5e-4), flush=True)
     for label, fields in HARD_CYCLES.items():
         print(label, cycle(slider(**fields), 0.02, 8), flush=True)
+    for label, (count, norms) in DEEP_CYCLES.items():
+        print(label, deep_cycle(CASES[label][0], count, norms), flush=True)

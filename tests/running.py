@@ -19,7 +19,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
 import rsfstudy
 
@@ -155,16 +154,19 @@ def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
 
 
 def call(*words) -> SimpleNamespace:
-    """The command, in this process."""
-    out, said = io.StringIO(), io.StringIO()
+    """The command in this process, from its real entry point; what would be a traceback is raised,
+    and so is what cannot be encoded.
+    """
+    out = io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True)
+    said = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
         patch.setattr(sys, "argv", ["rsfstudy", *map(str, words)])
         patch.setattr(sys, "stdout", out)
         patch.setattr(sys, "stderr", said)
         with pytest.raises(SystemExit) as ended:
             cli.main()
-    code = ended.value.code
-    return SimpleNamespace(returncode=code, stdout=out.getvalue(), stderr=said.getvalue())
+    texts = [stream.buffer.getvalue().decode() for stream in (out, said)]
+    return SimpleNamespace(returncode=ended.value.code, stdout=texts[0], stderr=texts[1])
 
 
 #: Signals end it even where the tests run in the background, or without a terminal, where shells
@@ -202,18 +204,9 @@ def ended(process: subprocess.Popen) -> tuple[int, str, str]:
 
 
 def called(words: Sequence[str]) -> tuple[int, str]:
-    """Exit status and what is said by the command in this process, from its real entry point; what
-    would be a traceback is raised.
-    """
-    with pytest.MonkeyPatch.context() as patch, CliRunner().isolation() as (out, err, _both):
-        patch.setattr(sys, "argv", ["rsfstudy", *words])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as ended_with:
-            code = int(ended_with.code or 0)
-        said = out.getvalue().decode(errors="replace") + err.getvalue().decode(errors="replace")
-    return code, " ".join(said.split())
+    """Exit status and what is said by the command in this process, on one line."""
+    done = call(*words)
+    return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
 
 
 def cells_in(journal: Path) -> int:

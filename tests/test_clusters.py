@@ -3,6 +3,7 @@ faults of the cluster told for what they are.
 """
 
 import contextlib
+import ipaddress
 import json
 import os
 import re
@@ -13,6 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import dask
+import psutil
 import pytest
 import yaml
 from faulty import declared
@@ -157,6 +160,44 @@ def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
         run(client=cluster)
 
 
+def test_nothing_listens_beyond_this_machine(cluster):
+    """Neither the scheduler and what watches over workers, in this process, nor the workers."""
+    processes = {os.getpid(), *cluster.run(os.getpid).values()}
+    assert len(processes) == 3
+    for process in processes:
+        sockets = psutil.Process(process).net_connections("inet")
+        listening = [found.laddr for found in sockets if found.status == psutil.CONN_LISTEN]
+        assert listening
+        assert [a for a in listening if not ipaddress.ip_address(a.ip).is_loopback] == []
+
+
+@pytest.fixture
+def encrypted():
+    """A scheduler and a worker that talk to the holders of a certificate only."""
+    from distributed import LocalCluster, Security
+
+    pytest.importorskip("cryptography")
+    security = Security.temporary()
+    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+    with LocalCluster(1, protocol="tls", security=security, **quiet) as encrypted:
+        yield encrypted
+
+
+def test_a_scheduler_by_tls(encrypted):
+    """With the certificates of Dask's configuration, as of its other clients."""
+    pem = encrypted.security.get_tls_config_for_role("client")
+    names = {f"distributed.comm.tls.{name}": pem[key] for name, key in (
+        ("ca-file", "ca_file"), ("client.cert", "cert"), ("client.key", "key"))}  # fmt: skip
+    address = encrypted.scheduler_address
+    with dask.config.set(names), clusters.existing_cluster(address, timeout=HANGS) as client:
+        same_numbers(run(client=client), run())
+    with (
+        pytest.raises(RunError, match=r"ssl_context.*certificates for tls://"),
+        clusters.existing_cluster(address, timeout=HANGS),
+    ):
+        pass
+
+
 @pytest.mark.parametrize(
     "address", ["tcp://127.0.0.1:1", "nonsense", "tcp://", "http://127.0.0.1:1", "tcp://[", "", " "]
 )
@@ -181,7 +222,7 @@ def test_a_port_that_listens_and_says_nothing(tmp_path):
 def test_a_client_that_is_closed(tmp_path):
     from distributed import Client
 
-    quiet = {"dashboard_address": ":0", "scheduler_kwargs": {"dashboard": False}}
+    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
     with Client(n_workers=1, processes=False, **quiet) as client:
         pass
     with pytest.raises(RunError, match="client is closed"):
@@ -195,7 +236,7 @@ def test_the_slurm_job_is_what_it_says():
     from dask_jobqueue import SLURMCluster
 
     job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
-    with SLURMCluster(**job, scheduler_options={"dashboard_address": ":0"}) as cluster:
+    with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
         script = cluster.job_script()
     assert "#SBATCH -p normal" in script
     assert "#SBATCH --cpus-per-task=16" in script
@@ -212,7 +253,8 @@ def cluster(walltime, queue, **words):
 
 runpy.run_path(sys.argv[1])["main"](
     "rigid_response", cluster, jobs=1, cores=1, processes=1, memory="2GB",
-    python=sys.executable, death_timeout=1200, scheduler_options={"dashboard_address": ":0"},
+    python=sys.executable, death_timeout=1200,
+    scheduler_options={"dashboard_address": "127.0.0.1:0"},
 )
 """
 
@@ -236,11 +278,18 @@ def test_the_kubernetes_file_starts_a_cluster(tmp_path):
         return template["metadata"]["labels"], template["spec"]["containers"][0]
 
     labels, scheduler = container("rsfstudy-scheduler")
-    _labels, worker = container("rsfstudy-workers")
+    workers, worker = container("rsfstudy-workers")
     assert service["spec"]["selector"] == labels
     port = service["spec"]["ports"][0]["targetPort"]
     assert {"containerPort": port} in scheduler["ports"]
     assert f"tcp://rsfstudy-scheduler:{service['spec']['ports'][0]['port']}" in worker["args"]
+
+    policy = named["NetworkPolicy", "rsfstudy"]["spec"]
+    (allowed,) = policy["podSelector"]["matchExpressions"]
+    assert allowed == {
+        "key": "app", "operator": "In", "values": [labels["app"], workers["app"]]
+    }  # fmt: skip
+    assert policy["ingress"] == [{"from": [{"podSelector": policy["podSelector"]}]}]
 
     with socket.create_server(("127.0.0.1", 0)) as server:
         free = str(server.getsockname()[1])

@@ -5,6 +5,7 @@ import importlib
 import importlib.util
 import itertools
 import math
+import os
 import sys
 import types
 from dataclasses import dataclass, replace
@@ -370,7 +371,7 @@ class Ending(Law):
 @pytest.mark.parametrize("by", ENGINES)
 def test_a_rate_that_is_no_number_ends_the_motion(by):
     scene = Scene(law=Ending, stiffness_ratio=1.5, load_velocity_ratio=20.0)
-    with pytest.warns(Incomplete, match="integration_failed|work_budget_spent"):
+    with pytest.warns(Incomplete, match="the motion ends after"):
         ended = simulate(scene, duration=10.0, budget=5_000, engine=by)
     assert ended.attrs["status"] in ("integration_failed", "work_budget_spent")
     assert float(ended["log10_slip_rate"].max()) <= 1.0 / math.log(10.0)
@@ -493,6 +494,64 @@ def test_a_damaged_cache_costs_time_only(place, empty_cache):
 
 def test_a_cache_that_cannot_be_written_costs_time_only(empty_cache):
     empty_cache.parent.write_text("no folder")
+    assert [compiled_programs() for _ in range(2)] == [1, 1]
+
+
+@pytest.mark.parametrize("listed", ["{}", "[]", "null"])
+def test_files_that_are_not_listed_are_not_run(listed, empty_cache):
+    compiled_programs()
+    (digests,) = empty_cache.rglob("digests.json")
+    digests.write_text(listed)
+    assert [compiled_programs() for _ in range(2)] == [1, 0]
+
+
+def test_a_file_beside_those_listed_costs_time_only(empty_cache):
+    compiled_programs()
+    (machine_code,) = empty_cache.rglob("*.nbc")
+    (machine_code.parent / "planted.nbc").write_text("")
+    assert [compiled_programs() for _ in range(2)] == [1, 0]
+
+
+def files_in(folder: Path) -> list[tuple[str, bytes]]:
+    return sorted((str(f), f.read_bytes()) for f in folder.rglob("*") if f.is_file())
+
+
+@pytest.mark.parametrize("mode", [0o770, 0o707])
+@pytest.mark.parametrize("place", [".", "compiled", "compiled/*"])
+def test_folders_that_others_may_write_to_are_left_alone(place, mode, empty_cache, caplog):
+    compiled_programs()
+    (folder,) = [empty_cache.parent] if place == "." else empty_cache.parent.glob(place)
+    folder.chmod(mode)
+    before = files_in(empty_cache)
+    assert [compiled_programs() for _ in range(2)] == [1, 1]
+    assert files_in(empty_cache) == before
+    (said,) = caplog.messages
+    assert f"{folder}: others own it or may write to it" in said
+
+
+def test_folders_of_others_are_left_alone(empty_cache, monkeypatch):
+    compiled_programs()
+    before = files_in(empty_cache)
+    me = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: me + 1)
+    assert [compiled_programs(f) for f in (doubled, tripled)] == [1, 1]
+    assert files_in(empty_cache) == before
+
+
+def test_what_users_of_a_group_share_is_kept_all_the_same(empty_cache):
+    """Folders are made for the user alone, whatever the umask lets others do."""
+    before = os.umask(0o002)
+    try:
+        assert [compiled_programs() for _ in range(2)] == [1, 0]
+    finally:
+        os.umask(before)
+
+
+def test_a_user_without_a_home_is_served(monkeypatch):
+    """As in a container whose user is not in passwd."""
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
     assert [compiled_programs() for _ in range(2)] == [1, 1]
 
 

@@ -127,7 +127,7 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     from distributed import Client
 
     monkeypatch.setenv("FAULT_TAKES", "0.3")
-    quiet = {"dashboard_address": ":0", "scheduler_kwargs": {"dashboard": False}}
+    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
     with Client(processes=False, n_workers=1, **quiet) as client:
         dataset = run(declared(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
@@ -185,7 +185,7 @@ def test_a_cell_that_exhausts_memory(monkeypatch):
             n_workers=1,
             threads_per_worker=1,
             memory_limit="600MiB",
-            dashboard_address=":0",
+            dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
             silence_logs=50,
         ) as cluster,
@@ -409,7 +409,7 @@ def test_workers_that_never_come(monkeypatch):
         monkeypatch.setattr(workers, name, seconds)
     with (
         LocalCluster(
-            n_workers=0, dashboard_address=":0", scheduler_kwargs={"dashboard": False}
+            n_workers=0, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}
         ) as cluster,
         Client(cluster) as client,
         pytest.warns(UserWarning, match=r"has no worker: waiting 0\.4 s for one"),

@@ -29,7 +29,7 @@ from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.regimes import check_start
 from rsfstudy.motion.stepping import Halt, Meter
@@ -551,3 +551,17 @@ def test_a_study_of_fluids_is_restored():
     assert again.describe() == study.describe()
     values = dataset.critical_stiffness
     assert float(values[0, 0]) == float(values[0, 1]) > float(values[1, 0]) > float(values[1, 1])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("stress", [{"normal_stress": "constant"}, {"alpha": 0.2}])
+def test_a_rig_knows_nothing_of_the_pressure_inside_the_fault(stress, engine):
+    """It divides by normal stress less the pressure outside, and so reads dilatant hardening."""
+    scene = Scene(law="slowness", **stress, fluid="dilatant", dilatancy=0.01, drainage=0.1,
+                  stiffness_ratio=5.0, load_velocity_ratio=10.0)  # fmt: skip
+    motion = simulate(scene, duration=5.0, engine=engine)
+    outside = motion.normal_stress_ratio + motion.pore_pressure
+    expected = motion.shear_stress / outside
+    assert np.allclose(motion.friction_coefficient, expected, rtol=1e-12, atol=0.0)
+    # suction of two parts in a hundred, of mu_* = 0.76
+    assert float((motion.shear_stress / motion.normal_stress_ratio - expected).min()) < -0.01

@@ -1,23 +1,22 @@
 """The units of a rig: every conversion by its dimension, and what is no quantity."""
 
+import json
 import math
 import re
-import sys
 
 import numpy as np
-import pint
 import pytest
 import xarray as xr
-from running import call, run
+from running import call, called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots._motion import picture
-from rsfstudy.rig.units import in_si
 from rsfstudy.slider.fields import QUANTITIES
 from rsfstudy.slider.loading import Segment
 
@@ -28,66 +27,8 @@ RIG = Laboratory(
     reference_velocity="1 um/s",
     stiffness="0.05 MPa/um",
 )
+THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
 LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
-
-
-@pytest.mark.parametrize(
-    ("text", "units", "value"),
-    [
-        ("5 MPa", "Pa", 5e6),
-        ("0.3GPa", "Pa", 3e8),
-        ("12 bar", "Pa", 1.2e6),
-        ("10 um", "m", 1e-5),
-        ("10 \u00b5m", "m", 1e-5),
-        ("1e-3 um/s", "m/s", 1e-9),
-        ("1 um s-1", "m/s", 1e-6),
-        ("35 mm/year", "m/s", 35e-3 / (365.25 * 86400.0)),
-        ("0.05 MPa/um", "Pa/m", 5e10),
-        ("2 min", "s", 120.0),
-        ("0.1 1/s", "1/s", 0.1),
-        ("2e3 kg/m^2", "kg/m^2", 2e3),
-        ("2700 kg*m**-3", "kg/m^3", 2700.0),
-        ("3", "1", 3.0),
-        (7.5, "Pa", 7.5),
-        (np.float64(2.0), "m", 2.0),
-    ],
-)
-def test_usual_units(text, units, value):
-    assert in_si("x", text, units) == pytest.approx(value, rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("value", "units", "complaint"),
-    [
-        ("5 MPa", "m", "x = '5 MPa': has units of another kind than m. Give it in m"),
-        ("5", "Pa", "has units of another kind than Pa"),
-        ("MPa", "Pa", "x = 'MPa': is no quantity. Write a number and its units"),
-        ("nan MPa", "Pa", "must be finite"),
-        (math.inf, "Pa", "must be finite"),
-        (True, "Pa", "True: is no quantity"),
-        (None, "Pa", "None: is no quantity"),
-    ],
-)
-def test_what_is_no_quantity(value, units, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        in_si("x", value, units)
-
-
-def test_other_units_need_pint(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pint", None)
-    with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
-        in_si("normal_stress", "725 psi", "Pa")
-
-
-def test_quantities_of_pint():
-    registry = pint.get_application_registry()
-    assert in_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
-    assert in_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
-    assert in_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
-    with pytest.raises(InvalidValue, match="another kind than m"):
-        in_si("x", registry.Quantity(3.0, "MPa"), "m")
-    with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
-        in_si("x", "3 bananas", "m")
 
 
 #: What 1 of each scale is, in SI units.
@@ -158,7 +99,13 @@ def test_mass_and_radiation():
         mass="2e4 kg/m^2",
     )
     period = 2.0 * math.pi * math.sqrt(2e4 / 5e10)
-    assert heavy.scene(inertia=True).period == pytest.approx(period)
+    assert heavy.scene().inertia
+    assert heavy.scene().period == pytest.approx(period)
+    still = heavy.scene(inertia=False)
+    assert (still.inertia, still.period) == (False, heavy.scene().period)
+    timed = Laboratory(**THREE, period="10 ms")
+    assert (timed.scene().inertia, timed.scene().period) == (True, pytest.approx(0.01))
+    assert not Laboratory(**THREE).scene().inertia
     radiating = Laboratory(
         normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V,
         shear_modulus="30 GPa", density="2700 kg/m^3",
@@ -166,9 +113,6 @@ def test_mass_and_radiation():
     # G/(2 c_s), c_s = sqrt(G/rho)
     impedance = 30e9 / (2.0 * math.sqrt(30e9 / 2700.0))
     assert radiating.scene().radiation_damping == pytest.approx(impedance * V / SIGMA, rel=1e-12)
-
-
-THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
 
 
 @pytest.mark.parametrize(
@@ -232,6 +176,67 @@ def test_axes_of_results_are_in_units_of_the_rig_too():
     assert shown.peak_displacement_error.attrs["units"] == "um"
     assert float(shown.stiffness) == pytest.approx(5e10 * 1e-6)
     assert shown.healing.attrs["units"] == "1"
+
+
+def heavy_cycles(axis):
+    """Limit cycles of which each has a reference rate of its own."""
+    study = Study(
+        name="rates", title="Cycles at two rates", measure=LimitCycle(phases=2),
+        base=Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True),
+        axes=[Axis("reference_rate", [1e-2, 8e-3]), axis],
+    )  # fmt: skip
+    return run(study, rtol=1e-4)
+
+
+def test_each_cell_is_converted_by_its_own_reference_rate():
+    """As it would be if it were the only one, and with the names and units of that."""
+    results = heavy_cycles(Axis("b_over_a", [1.5, 2.0]))
+    found = rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C)
+    rates = np.array([[1e-2], [8e-3]])
+    interval = results.recurrence_interval.values
+    assert np.isfinite(interval).all()
+    # products of the same numbers: roundings alone
+    np.testing.assert_allclose(found.recurrence_interval, interval / rates, rtol=1e-14)
+    fastest = 10.0**results.max_log10_slip_rate.values * D_C * rates
+    np.testing.assert_allclose(found.max_slip_rate, fastest, rtol=1e-13)
+    assert found.recurrence_interval.dims == results.recurrence_interval.dims
+    for place in range(2):
+        one = rsfstudy.to_si(
+            results.isel(reference_rate=place), normal_stress=SIGMA, slip_distance=D_C
+        )
+        cell = found.isel(reference_rate=place)
+        assert set(cell.variables) == set(one.variables)
+        for name, variable in one.variables.items():
+            assert cell[name].attrs == variable.attrs, name
+            if variable.dtype.kind == "f":
+                np.testing.assert_allclose(cell[name].values, variable.values, rtol=1e-13)
+    assert "D_c/V_* = 100 to 125 s" in found.attrs["scales"]
+    for scalar in (1e-2, "0.008 1/s"):
+        with pytest.raises(InvalidValue, match="contradicts that of the dataset, 0.008 to 0.01 1"):
+            rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C, reference_rate=scalar)
+    with pytest.raises(InvalidValue, match=r"reference_rate = 0\.1: contradicts"):
+        RIG.in_units(results)
+    cell = results.isel(reference_rate=1)
+    stated = rsfstudy.to_si(
+        cell, normal_stress=SIGMA, slip_distance=D_C, reference_rate="0.008 1/s"
+    )
+    np.testing.assert_allclose(stated.recurrence_interval, interval[1] / 8e-3, rtol=1e-14)
+
+
+def test_an_axis_whose_scale_varies_along_another_is_refused():
+    results = heavy_cycles(Axis("load_velocity_ratio", [1.5, 2.0]))
+    with pytest.raises(DataError, match=r"load_velocity_ratio varies .*isel\(reference_rate=0\)"):
+        rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C)
+    one = results.isel(reference_rate=0).rsf.to_si(normal_stress=SIGMA, slip_distance=D_C)
+    np.testing.assert_allclose(one.load_velocity, np.array([1.5, 2.0]) * 1e-2 * D_C, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["normal_stress", "slip_distance"])
+def test_no_scale_is_zero(name):
+    motion = simulate(Scene(hold_time=1.0), duration=0.1, rtol=1e-2)
+    stated = {"normal_stress": SIGMA, "slip_distance": D_C} | {name: 0.0}
+    with pytest.raises(InvalidValue, match="must be positive and finite"):
+        rsfstudy.to_si(motion, **stated)
 
 
 def test_one_test_in_two_units_is_one_test():
@@ -362,6 +367,27 @@ def test_the_command_simulates_a_rig(tmp_path):
     with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
         assert written.load_point_displacement.attrs["units"] == "m"
         assert float(written.time[-1]) == pytest.approx(1130.0)
+
+
+@pytest.mark.parametrize(
+    ("stated", "fields"),
+    [
+        (["--period", "10 ms"], {"inertia": True, "period": 0.01}),
+        (["--period", "10 ms", "--set", "inertia=false"], {"inertia": False, "period": 0.01}),
+        (["--mass", "2e4 kg/m^2", "--stiffness", "50 GPa/m"], {"inertia": True}),
+        (["--shear-modulus", "30 GPa", "--density", "2700 kg/m^3"], {"radiation_damping": 9e-7}),
+    ],
+)
+def test_what_options_of_a_rig_state_acts(stated, fields, tmp_path):
+    words = ["simulate", *stated, "--output", tmp_path / "motion.png", "--duration", "1 s"]
+    words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um"]
+    words += ["--reference-velocity", "1 um/s", "--rtol", "1e-3", "--set", "load_velocity_ratio=2"]
+    code, said = called([str(word) for word in words])
+    assert code == 0, said
+    with xr.open_dataset(tmp_path / "motion.nc") as written:
+        told = json.loads(written.attrs["scene"])
+    # sqrt(G rho)/2 = 4.5 MPa s/m, and V_*/sigma_* = 2e-13 m/s/Pa
+    assert {name: told[name] for name in fields} == pytest.approx(fields, rel=1e-12)
 
 
 def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):

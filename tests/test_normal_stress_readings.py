@@ -245,3 +245,41 @@ def test_a_transient_is_not_asked_of_an_oscillation():
 def test_measures_that_read_nothing(wrong, message):
     with pytest.raises(InvalidValue, match=message):
         wrong()
+
+
+def test_where_slip_does_not_come_as_far_nothing_is_read():
+    """A rise of normal stress stops a weak machine."""
+    stopped = {"law": "slip", **IMPOSED, "a": 0.004, "stiffness": 0.004, "normal_stress_step": 0.9,
+               "load_velocity_ratio": 1.0}  # fmt: skip
+    outcome = NormalStressTransient()(Scene(**stopped), Accuracy(1e-5, engine=COMPILED))
+    assert (outcome.status, outcome.values) == (Status.NOT_APPLICABLE, {})
+    assert "slip does not come to 1.5 D_c" in outcome.message
+    # slip rates from 10^-500 V_* on: friction changes there without slip
+    still = {**stopped, "a": 0.0005, "stiffness": 0.1}
+    scene = Scene(**still, b_over_a=1.2)
+    outcome = NormalStressTransient()(scene, Accuracy(1e-5, engine=COMPILED))
+    assert "friction does not decay" in outcome.message
+    assert outcome.values["closed_form_departure"] < 1.0
+
+
+@pytest.mark.parametrize("step", [0.1, -0.1])
+def test_of_no_effect_on_the_state_no_part_is_left(step):
+    """What is left after D_c is over the direct change of the state, and that is rounding."""
+    scene = Scene(law="slip", **IMPOSED, stiffness_ratio=50.0, normal_stress_step=step,
+                  load_velocity_ratio=1.0)  # fmt: skip
+    found = read(NormalStressTransient(), scene)
+    assert math.isfinite(found["evolution_left_error"])
+    without = NormalStressTransient()(scene.with_(alpha=0.0), Accuracy(engine=COMPILED))
+    assert math.isnan(without.values.get("evolution_left", math.nan))
+
+
+@pytest.mark.parametrize("samples", [32, 64, 128])
+def test_overtones_beyond_the_samples_are_part_of_the_error(samples):
+    """Held to eight times as many; the estimate stays within thirty times the error."""
+    scene = Scene(law="slowness", normal_stress="imposed", alpha=0.55, a=0.00285, b_over_a=2.93,
+                  mu_star=0.5525, stiffness_ratio=1.1, oscillation_amplitude=0.0077,
+                  oscillation_period=56.0, load_velocity_ratio=0.107)  # fmt: skip
+    found = read(NormalStressResponse(samples=samples), scene)
+    exact = 0.568893387573  # at 512 samples and 1e-9; 256 and 512 agree to ten digits
+    away = abs(found["distortion"] - exact)
+    assert away <= found["distortion_error"] <= 30.0 * away

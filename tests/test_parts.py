@@ -11,14 +11,17 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fields, laws, stability, steady
 from rsfstudy.slider.equations import evolution_of, relation_of
+from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.laws.slowness import SlownessLaw
+from rsfstudy.slider.normal_stress.variable import Variable
 from rsfstudy.slider.slots import FIRST_OWN
 from rsfstudy.status import Status
 
-C = 0.5
+OWN, C = 0, 0.5
 
 
 def weakened(friction, ratio, change, p):
@@ -142,3 +145,36 @@ def test_a_part_owns_its_fields():
         Scene(inertia=True, radiation_damping=0.1)
     assert Scene(inertia=True, radiation_damping=0.0).inertia is True
     assert Scene(normal_stress="constant", alpha=None).alpha is None
+
+
+def half_as_strong(friction, ratio, change, p):
+    return 0.5 * p[OWN] * math.log(ratio), 0.5 * p[OWN] * change / ratio
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfEffect(Variable):
+    name = "half_effect"
+    state_effect = staticmethod(half_as_strong)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeakyFault(Dilatant):
+    name = "leaky"
+    seepage = staticmethod(Dilatant.seepage)
+
+
+def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
+    """What follows from the equations of another: d sigma/d tau and alpha, by which published
+    formulas and the friction of Coulomb stress go, or a bound of pore pressure.
+    """
+    own, half = Scene(normal_stress=HalfEffect, alpha=0.4), Scene(alpha=0.2)
+    assert own.critical_stiffness == pytest.approx(half.critical_stiffness, rel=1e-12)
+    assert half.parts.normal_stress.coupling[1] == 0.2
+    assert own.parts.normal_stress.coupling is None
+    assert own.parts.normal_stress.weakest(own) == -math.inf
+    told = LinearStability()(own, Accuracy()).values
+    assert told["critical_stiffness"] == pytest.approx(half.critical_stiffness, rel=1e-9)
+    assert math.isnan(told["critical_stiffness_explicit"])
+    assert Triggers()(own, Accuracy()).status is Status.NOT_APPLICABLE
+    assert LeakyFault().highest_pressure(0.0, (0.0, 0.0)) == math.inf
+    assert Dilatant().highest_pressure(0.0, (0.0, 0.0)) < math.inf

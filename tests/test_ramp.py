@@ -14,7 +14,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import Kind, maximum, settling
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.stability import growth_rates
@@ -39,6 +39,29 @@ def test_normal_stress_rises_at_a_steady_rate_and_stays(slider, engine):
     assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-12)
     assert (motion.time == 4.0).any()
     assert float(motion.time[-1]) == pytest.approx(12.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("over", [0.3, 1.0, 1.7])
+def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(over, engine):
+    """A spring sixty times stiffer than critical: what dense output tells within such steps is off
+    by a hundred times the accuracy, and a ramp handed that on to the rest of the motion.
+    """
+    scene = Scene(law="slip", a=0.005, b_over_a=2.4, normal_stress="imposed", alpha=0.2,
+                  load_velocity_ratio=1.1, stiffness=0.36, normal_stress_ramp=0.33,
+                  ramp_duration=30.5)  # fmt: skip
+
+    def at_end(rtol: float, engine: str) -> tuple[float, float]:
+        meter = Meter(200_000, engine=engine)
+        accuracy = Accuracy(rtol, engine=engine)
+        *_, end = follow(scene, accuracy, meter, clock=True, until=over * 30.5)
+        assert end.time == over * 30.5
+        return end.point.log_rate, end.point.spring / scene.a
+
+    exact = at_end(1e-11, COMPILED)
+    # three times the accuracy asked for: local errors add up
+    for rtol in (1e-5, 1e-7, 1e-9):
+        assert at_end(rtol, engine) == pytest.approx(exact, abs=3.0 * rtol)
 
 
 @pytest.mark.parametrize("change", [-0.1, 0.1])

@@ -250,15 +250,19 @@ def test_healing_is_read_off_friction_not_off_the_spring(fields):
     ],
 )
 def test_the_change_of_what_is_read_is_its_derivative(equations):
-    """By a difference of order four along a step."""
+    """By a difference of order four along a step: of spring stress over normal stress less the
+    pressure outside the fault, which is the effective one and the pressure inside.
+    """
     start = [0.01 * (1.0 + n) for n in range(len(equations.unknowns))]
     for number, step in enumerate(steps(equations, start, 1e-10, Meter(10**4))):
         middle, reach = 0.5 * (step.start + step.end), 0.1 * (step.end - step.start)
 
         def reads(clock, step=step):
             point = step.point_at(clock)
-            return (equations.p[2] + point.spring) / point.normal_stress
+            inside = point.psis[-1] if "pore_pressure" in equations.unknowns else 0.0
+            return (equations.p[2] + point.spring) / (point.normal_stress + inside)
 
+        assert step.before.reading == pytest.approx(reads(step.start), rel=1e-13)
         near, far = (reads(middle + n * reach) - reads(middle - n * reach) for n in (1, 2))
         change = (8.0 * near - far) / (12.0 * reach)
         size = abs(reads(step.end) - reads(step.start)) / abs(step.end - step.start)

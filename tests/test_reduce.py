@@ -343,6 +343,51 @@ def test_a_level_of_a_power_law_is_inverted(power, level):
     assert float(found["at_error"]) == pytest.approx(float(found["at"]) * 0.01 / power, rel=0.02)
 
 
+#: Smooth, monotone, and curved in logarithms; with their inverses.
+CURVED = {
+    "expm1": (np.expm1, np.log1p),
+    "sinh": (np.sinh, np.arcsinh),
+    "falling": (lambda x: np.exp(-x), lambda y: -np.log(y)),
+    "saturating": (lambda x: x / (1.0 + x), lambda y: y / (1.0 - y)),
+}
+
+
+def inverted(x, y, level, errors=0.0):
+    found = reduced(
+        xr.Dataset(
+            {
+                "y": ("x", y),
+                "y_error": ("x", np.zeros(len(x)) + errors),
+                "status": ("x", np.zeros(len(x), np.int8)),
+            },
+            coords={"x": x},
+        ),
+        (Inverse(name="at", of="y", on="x", levels=level),),
+    )
+    return float(found["at"]), float(found["at_error"])
+
+
+@settings(max_examples=100)
+@given(
+    st.sampled_from(sorted(CURVED)),
+    st.lists(st.floats(1.3, 2.5), min_size=4, max_size=7),
+    st.floats(0.02, 0.98),
+)
+def test_the_error_of_an_inverse_covers(name, ratios, share):
+    function, inverse = CURVED[name]
+    x = 0.1 * np.cumprod(ratios)
+    truth = x[0] * (x[-1] / x[0]) ** share
+    at, error = inverted(x, function(x), float(function(truth)))
+    # beside that, only rounding
+    assert abs(at - float(inverse(function(truth)))) <= error + 1e-12 * truth
+
+
+def test_an_inverse_whose_bracket_stays_is_not_taken_for_exact():
+    x = np.array([0.1, 0.2, 0.4, 0.8, 1.2, 2.4])
+    at, error = inverted(x, np.expm1(x), 5.0)
+    assert abs(at - np.log(6.0)) <= error < 0.2
+
+
 def test_levels_by_label_and_levels_out_of_reach():
     x = np.geomspace(1.0, 100.0, 9)
     dataset = xr.Dataset(

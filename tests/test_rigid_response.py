@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
@@ -112,3 +113,31 @@ def test_numbers_do_not_depend_on_the_points_that_are_kept():
 @pytest.mark.parametrize("rate", [1e-16, 1e-8, 1e8])
 def test_the_closed_form_keeps_its_digits(rate):
     assert response(rate, law="slowness", **CONSTANT)["closed_form_misfit"] < 1e-8
+
+
+@pytest.mark.parametrize("step", [0.5, -0.4])
+@pytest.mark.parametrize("law", ["two_slip_states", "two_slowness_states"])
+def test_two_states_each_lose_their_share_to_a_step_of_normal_stress(law, step):
+    """Both by their closed forms, from b_i ln V less its share of alpha ln r: to 1/e of the sum."""
+    b, lengths = np.array([0.01, 0.008]), np.array([1.0, 10.0])
+    begins = b * math.log(10.0) - b / b.sum() * 0.5 * math.log1p(step)
+
+    def left(slip: float) -> float:
+        decay = np.exp(-slip / lengths)
+        if law == "two_slip_states":
+            return float((begins * decay).sum())
+        return float((b * np.log1p(np.expm1(begins / b) * decay)).sum())
+
+    exact = brentq(lambda slip: left(slip) - left(0.0) / math.e, 0.0, 30.0, xtol=1e-12)
+    found = response(10.0, law=law, normal_stress="imposed", alpha=0.5, a=0.01, b1_over_a=1.0,
+                     b2_over_a=0.8, length_ratio=10.0, mu_star=0.6, stiffness_ratio=2.0,
+                     normal_stress_step=step)  # fmt: skip
+    assert found["evolution_distance"] == pytest.approx(exact, rel=1e-6)
+    assert abs(found["evolution_distance"] - exact) <= found["evolution_distance_error"]
+
+
+@pytest.mark.parametrize("step", [0.5, -0.3])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_the_closed_form_is_times_the_normal_stress_after_the_step(law, step):
+    found = response(10.0, law=law, normal_stress="imposed", alpha=0.0, normal_stress_step=step)
+    assert found["closed_form_misfit"] < 1e-7

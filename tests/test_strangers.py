@@ -472,6 +472,7 @@ def test_an_output_that_can_be_no_directory(output):
 def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     monkeypatch.setattr("rsfstudy.api.prepared", lambda _s, _k, workers, _p: workers.threads)
+    monkeypatch.setattr("rsfstudy.api.runner.failures", lambda _results: {})
     assert run(workers=most) == most
     for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
         with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):

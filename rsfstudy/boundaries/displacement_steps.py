@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator
 
 from rsfstudy.boundaries.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
@@ -14,6 +15,7 @@ from rsfstudy.slider.scene import Scene
 
 #: Spring stress over sigma_* that no step goes beyond.
 _LARGEST_STRESS = 1e6
+_LARGEST_LOGARITHM = math.log(sys.float_info.max)
 
 
 class DisplacementSteps(Steps):
@@ -51,10 +53,13 @@ class DisplacementSteps(Steps):
         return behind * (moved + missed) > UNSEEN * rtol * size
 
     def values_beside(self, size: float) -> dict[str, float]:
-        """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13)."""
+        """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13), which
+        by a stiff spring is beyond the largest number: infinite.
+        """
 
         def after(step: float) -> float:
-            return math.exp(log_rate_at(self.scene, self.scene.stiffness * step, 0.0))
+            log_rate = log_rate_at(self.scene, self.scene.stiffness * step, 0.0)
+            return math.exp(log_rate) if log_rate < _LARGEST_LOGARITHM else math.inf
 
         weakening = self.scene.parts.law.b_over_a - 1.0
         closed_form = after(self.sign / weakening) if weakening > 0.0 else math.nan

@@ -44,7 +44,7 @@ class NormalStressSteps(ShotSteps):
         scene.with_(normal_stress_step=sign * SMALLEST_STEP)
         super().__init__(scene, sign)
         # what such a step does to ln V is larger by mu_*/a
-        self.smallest = min(SMALLEST_STEP * min(1.0, scene.a / scene.mu_star), 0.1 * self.largest)
+        self.smallest = min(self.smallest, SMALLEST_STEP * scene.a / scene.mu_star)
 
     def scene_at(self, size: float) -> Scene:
         return self.scene.with_(normal_stress_step=self.value(size))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rsfstudy.boundaries.shooting import LOOSE, ShotSteps
 from rsfstudy.boundaries.swing import swing
 from rsfstudy.motion.accuracy import Accuracy
@@ -35,7 +37,7 @@ class RateSteps(ShotSteps):
     def _guess(self) -> float:
         """Of the size of the closed forms for the slip law (Gu et al. 1984)."""
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _LEAST_WEAKENING)
-        return math.log1p(math.exp(self.scene.stiffness_ratio - 1.0) / weakening)
+        return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
     def _verdict(self, scene: Scene, meter: Meter) -> float:
         """Far from the boundary an upward step still has a verdict."""

@@ -13,8 +13,8 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene
 
-#: Smallest step the search tries.
-SMALLEST_STEP = 1e-3
+#: Smallest step the search tries, and the part of the largest that it is at most.
+SMALLEST_STEP, _SMALLEST_PART = 1e-3, 0.1
 #: How much farther in ln V a step may jump where mass delays the rise of slip rate.
 RISE_OF_MASS = 5.0
 #: Part of the accuracy asked for to which what mass delays goes unseen.
@@ -49,8 +49,8 @@ class Steps:
 
     def __init__(self, scene: Scene, sign: int) -> None:
         self.scene, self.sign = scene, sign
-        self.smallest = SMALLEST_STEP
         self.largest = self._largest() * (1.0 - 1e-9)
+        self.smallest = min(SMALLEST_STEP, _SMALLEST_PART * self.largest)
 
     def scene_at(self, size: float) -> Scene:
         """The scene with a step of this size."""

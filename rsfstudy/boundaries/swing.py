@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rsfstudy.boundaries.held import excess_of_peak
 from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
@@ -96,8 +97,8 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
     reach the norm or a limit cycle. To see which without following a thousand swings, the motion
     leaps to a somewhat larger orbit: if that grows too, and so on up to the norm, so does the orbit
     inside it. With mass, which acts during ruptures only, the same rules serve; with several states
-    only the norm, steady sliding itself or a cycle that repeats ends a motion. Once the load point
-    is held, spring stress can only fall, and the first peak is the last.
+    only the norm, steady sliding itself or a cycle that repeats ends a motion. For load points that
+    are held see `held`.
 
     Raises
     ------
@@ -105,7 +106,8 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
         With `no_steady_state` where the load point velocity has none, or as `motion` does.
     """
     if scene.log_load_rate == -math.inf:
-        return _held(scene, accuracy, meter)
+        excess = excess_of_peak(scene, accuracy, meter)
+        return Swing(excess >= 0.0, excess)
     steady = _steady(scene)
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     if orbits_may_close(scene) and abs(steady.margin) < accuracy.rtol:
@@ -166,19 +168,6 @@ def stability_margin(scene: Scene) -> float:
     by how far they are below.
     """
     return math.inf if scene.log_load_rate == -math.inf else _steady(scene).margin
-
-
-def _held(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
-    """With the load point at rest: up to the only peak."""
-    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    watches = (_TOP,) if heavy else (_TOP, rise("log_rate", norm))
-    highest = -math.inf
-    for event in follow(scene, accuracy, meter, watches):
-        highest = norm if event.kind is Kind.RISE else event.point.log_rate
-        slows_from_start = event.kind is Kind.START and event.point.growth <= 0.0
-        if event.watch is not None or slows_from_start or (highest >= norm and not heavy):
-            break
-    return Swing(highest >= norm, highest - norm if heavy else math.copysign(1.0, highest - norm))
 
 
 def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:

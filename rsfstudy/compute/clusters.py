@@ -116,7 +116,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=":0",
+                dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
                 scheduler_kwargs={"dashboard": False},
                 silence_logs=logging.ERROR,
                 plugins=(worker_log.WritesTo(log.resolve()),),
@@ -133,15 +133,17 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
 
 async def _greeting(address: str) -> None:
     """Check that Dask answers; its client would wait for ever if another program listens there."""
+    from distributed import Security
     from distributed.comm.core import connect
 
-    comm = await connect(address)
+    comm = await connect(address, **Security().get_connection_args("client"))
     comm.abort()
 
 
 @contextlib.contextmanager
 def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
-    """A client of a Dask scheduler that is already running.
+    """A client of a Dask scheduler that is already running, with the certificates of Dask's
+    configuration.
 
     Raises
     ------
@@ -161,7 +163,8 @@ def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
             raise RunError(
                 f"no Dask scheduler answers at {brief(address)!r}: "
                 f"{brief(error) or 'it took too long'}. "
-                "Start one with `dask scheduler`, or leave --scheduler out."
+                "Start one with `dask scheduler` (certificates for tls:// are those of Dask's "
+                "configuration), or leave --scheduler out."
             ) from error
         with client:
             yield client

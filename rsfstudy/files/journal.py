@@ -29,8 +29,8 @@ from rsfstudy.status import Status
 #: A finished cell: its key, status, message, right-hand sides, wall time in s, numbers, checksum.
 Finished = tuple[bytes, str, str, int, float, bytes, int]
 
-#: Raised when the tables change, or what a cell is named by.
-_FORMAT = 3
+#: Raised when the tables, the checksum or what a cell is named by change.
+_FORMAT = 4
 _TABLES = """
 CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS cells (
@@ -69,7 +69,7 @@ class Layout:
         """A cell as the journal holds it."""
         numbers, work = self.packed(outcome.values), outcome.rhs_evaluations
         row = (outcome.status.name, outcome.message, work, seconds, numbers)
-        return (key, *row, _checksum(*row))
+        return (key, *row, _checksum(key, *row))
 
 
 @dataclass(frozen=True)
@@ -205,13 +205,13 @@ class Journal:
             If a row is not what was written.
         """
         columns = Columns.pending(len(keys), self._layout.width)
-        what = "status, message, work, seconds, numbers, checksum"
+        what = "key, status, message, work, seconds, numbers, checksum"
         for places, rows in self._rows(keys, what):
             if any(_checksum(*known) != checksum for *known, checksum in rows):
                 raise DataError(
                     f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
                 )
-            status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
+            _keys, status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
             columns.status[places] = [Status[name] for name in status]
             columns.message[places], columns.work[places] = message, work
             columns.seconds[places] = [math.nan if s is None else s for s in seconds]
@@ -310,9 +310,13 @@ def _forget(path: Path) -> None:
         file.unlink(missing_ok=True)
 
 
-def _checksum(status: str, message: str, work: int, seconds: float | None, numbers: bytes) -> int:
+def _checksum(
+    key: bytes, status: str, message: str, work: int, seconds: float | None, numbers: bytes
+) -> int:
     known = math.nan if seconds is None else seconds
-    return zlib.crc32(numbers, zlib.crc32(f"{status}\0{message}\0{work}\0{known!r}\0".encode()))
+    # repr keeps texts apart, whatever they hold
+    text = f"{key!r} {status!r} {message!r} {work} {known!r} "
+    return zlib.crc32(numbers, zlib.crc32(text.encode()))
 
 
 def _allows_more(theirs: str, ours: str) -> bool:

@@ -14,14 +14,8 @@ from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
-from rsfstudy.motion.readings import (
-    friction_at,
-    friction_of,
-    load_point_of,
-    unsteady,
-    watched,
-)
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
+from rsfstudy.motion.recording import READ, Recording, along_path
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Segment
@@ -133,7 +127,7 @@ class Healing(Reading):
             f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
             for name, value in values.items()
         }
-        above = friction_at(scene, again.peak.point) - float(friction_of(again.rows)[-1])
+        above = again.peak.point.reading - float(friction_of(again.rows)[-1])
         # beside steady sliding friction turns within the tolerance, where two runs may agree
         if above <= max(errors["healing_error"], _TURNS * accuracy.refined().solver):
             return peakless
@@ -147,14 +141,14 @@ class Healing(Reading):
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         """The record itself, from the beginning of the hold on."""
-        path = along_path(record.rows, self.phases)
-        rows = np.column_stack([path[name] for name in OBSERVED])
+        path = along_path(record.rows, self.phases, READ)
+        rows = np.column_stack([path[name] for name in READ])
         moved = load_point_of(scene, rows)
         return {
             "time": path["time"] - record.begin.time,
             "load_point_displacement": moved - moved[0],
             "slip": path["slip"] - path["slip"][0],
-            "friction_coefficient": friction_of(rows),
+            "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],
         }
 
@@ -211,14 +205,14 @@ def _follow(
 
 
 def _relaxation(scene: Scene, record: _Record) -> float:
-    return friction_at(scene, record.reload.point) - friction_at(scene, record.begin.point)
+    return record.reload.point.reading - record.begin.point.reading
 
 
 def _read(scene: Scene, record: _Record, peak: Event) -> dict[str, float]:
-    before = friction_at(scene, record.begin.point)
+    before = record.begin.point.reading
     longer = (peak.point.spring - record.reload.point.spring) / scene.stiffness
     return {
-        "healing": friction_at(scene, peak.point) - before,
+        "healing": peak.point.reading - before,
         "relaxation": _relaxation(scene, record),
         "peak_displacement": peak.slip - record.reload.slip + longer,
     }

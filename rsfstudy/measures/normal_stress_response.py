@@ -16,7 +16,6 @@ from rsfstudy.measures._reading import Reading
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
-from rsfstudy.motion.readings import friction_at
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
@@ -101,6 +100,18 @@ class _Record(NamedTuple):
         return np.asarray(harmonics[2:] / harmonics[1])
 
     @property
+    def aliasing(self) -> float:
+        """What overtones that the samples do not resolve may change of all together.
+
+        They are taken to be as strong as the upper quarter of those that are resolved, B. They add
+        up in squares, and are folded back upon that quarter: (B**2 + 2 B B)/(2 D) of a sum D.
+        """
+        overtones = np.abs(self.overtones)
+        resolved = float(np.linalg.norm(overtones))
+        upper = float(np.linalg.norm(overtones[3 * len(overtones) // 4 :]))
+        return 2.0 * upper * upper / resolved if resolved else 0.0
+
+    @property
     def response(self) -> complex:
         """Spring stress over imposed normal stress, at the period."""
         return complex(_harmonics(self.spring)[1] / _harmonics(self.imposed)[1])
@@ -177,7 +188,8 @@ class NormalStressResponse(Reading):
             "phase_lead": math.degrees(unseen),
             # what is left of overtones adds up as noise does, and seldom cancels
             "distortion": 5.0 * float(np.linalg.norm(last.overtones - again.overtones))
-            + last.drift,
+            + last.drift
+            + last.aliasing,
             "departure_from_linear": unseen * abs(last.response / linear),
         }
         errors = {
@@ -266,7 +278,7 @@ def _shown(scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         "time": time,
         "load_point_displacement": scene.load_velocity * time,
         "slip": np.array([event.slip for event in events]),
-        "friction_coefficient": np.array([friction_at(scene, e.point) for e in events]),
+        "friction_coefficient": np.array([e.point.reading for e in events]),
         "normal_stress_ratio": np.array([event.point.normal_stress for event in events]),
         "log10_slip_rate": np.array([e.point.log_rate for e in events]) / math.log(10.0),
     }

@@ -13,11 +13,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._reading import Reading
 from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.readings import friction_of
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.scene import Scene
@@ -29,6 +29,10 @@ _LAST, _STAYS = 0.1, 0.01
 #: ln(V/V_*) within which slip rate must be again where reading begins: the spring has then taken up
 #: what strength changed by.
 _TAKEN_UP = math.log(2.0)
+#: log10(V/V_*) below which the fault is still: friction changes by no slip at all.
+_STILL = -250.0
+#: Direct change over mu_* that is no more than rounding.
+_NONE = 10.0 * ROUNDING
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.01
 #: By how much the errors of two runs, at single instants of a stiff machine, differ by chance.
@@ -153,6 +157,9 @@ class NormalStressTransient(Reading):
             return Outcome(Status.NOT_APPLICABLE, message=why)
         record = self._follow(scene, accuracy, meter)
         again = self._follow(scene, accuracy.refined(), meter)
+        if record is None or again is None:
+            why = f"slip does not come to {max(self.fit_to, 1.0):g} D_c, where friction is read"
+            return Outcome(Status.NOT_APPLICABLE, message=f"{why}, within record = {self.record:g}")
         shown = self._shown(scene, record)
         values, finer = self._read(scene, record), self._read(scene, again)
         if not values or not finer:
@@ -165,6 +172,8 @@ class NormalStressTransient(Reading):
             + _AT_INSTANTS * error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
             for name, value in values.items()
         }
+        rounded = ROUNDING * scene.mu_star / abs(_direct(scene, record) or 1.0)
+        errors["evolution_left_error"] += rounded * abs(values["evolution_left"])
         return Outcome(Status.OK, {**values, **errors, **shown})
 
     def _speaks_against(self, scene: Scene) -> str:
@@ -178,14 +187,18 @@ class NormalStressTransient(Reading):
             return "normal stress does not stay so for all of the record"
         return ""
 
-    def _follow(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> _Record:
+    def _follow(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> _Record | None:
+        """What the motion tells; nothing where slip does not come as far as it is read."""
         recording = Recording()
         begin, *_others = follow(
             scene, accuracy, meter, clock=True, recording=recording, until=self.record
         )
         rows = recording.seen(scene)
         slip = rows[:, OBSERVED.index("slip")]
+        if slip.max() < max(self.fit_to, 1.0):
+            return None
         onward = np.append(True, np.diff(np.maximum.accumulate(slip)) > 0.0)
+        onward &= rows[:, OBSERVED.index("log10_slip_rate")] > _STILL
         kept = rows[onward]
         rate = 10.0 ** kept[:, OBSERVED.index("log10_slip_rate")]
         ratio = kept[:, OBSERVED.index("normal_stress_ratio")]
@@ -207,10 +220,12 @@ class NormalStressTransient(Reading):
         size = first * math.exp(self.fit_from / distance)
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         direct = _direct(scene, record)
+        # of no direct effect on the state no part is left
+        direct = direct if abs(direct) > _NONE * scene.mu_star else math.nan
         return {
             "apparent_alpha": -size / math.log(ratio),
             "apparent_slip_distance": distance,
-            "evolution_left": record.left(1.0) / direct if direct else math.nan,
+            "evolution_left": record.left(1.0) / direct,
         }
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:
@@ -219,8 +234,7 @@ class NormalStressTransient(Reading):
         """
         rows, friction = record.rows, friction_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record
-        path = along_path(rows, self.phases)
-        path_rows = np.column_stack([path[name] for name in OBSERVED])
+        path = along_path(rows, self.phases, READ)
         return {
             "direct_change": _direct(scene, record),
             "settled": float(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from))),
@@ -228,7 +242,7 @@ class NormalStressTransient(Reading):
             "time": path["time"],
             "load_point_displacement": path["time"],
             "slip": path["slip"],
-            "friction_coefficient": friction_of(path_rows),
+            "friction_coefficient": path["friction_coefficient"],
             "normal_stress_ratio": path["normal_stress_ratio"],
             "log10_slip_rate": path["log10_slip_rate"],
         }

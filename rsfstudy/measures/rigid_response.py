@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider.equations import rigid
+from rsfstudy.slider.equations import resting_of, rigid
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_sliding, stress_after_jump
 from rsfstudy.status import Status
@@ -118,12 +118,11 @@ class RigidResponse(Measure):
         at = self.inner_coordinates["slip"]
         rows: list[tuple[float, float, float]] = []
         distance = left = math.nan
-        others = steady_sliding(scene, 0.0)
-        assert others is not None
         equations = rigid(scene, scene.log_load_rate)
         moments = np.union1d(at, [1.0])
         watches = (rise("friction", level), fall("friction", level))
-        state = (start, *others.psis[1:])
+        # states freed of stress are still those of steady sliding at V_* before the step
+        state = (start, *resting_of(scene, 0.0, 0.0)[1:])
         for event in along(equations, state, tolerance, meter, watches, samples=moments.tolist()):
             point = event.point
             if event.watch is not None and math.isnan(distance):
@@ -138,16 +137,16 @@ class RigidResponse(Measure):
 
 
 def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: np.ndarray) -> float:
-    """Largest departure of the stress change from the closed form of the law at constant normal
-    stress (eqs. 17a and 17b of the paper, less mu_* sigma + a sigma ln(V/V_*), which they leave
-    out), over sigma_*; NaN where there is none.
+    """Largest departure of the stress change from the closed form of the law at normal stress that
+    is constant after the step (eqs. 17a and 17b of the paper, less mu_* sigma + a sigma ln(V/V_*),
+    which they leave out), over sigma_*; NaN where there is none.
     """
     law, parts = scene.parts.law, scene.parts
     stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.feels_stress
     if stress_acts or law.stress_left is None:
         return math.nan
     left = np.array([law.stress_left(scene.log_load_rate, at) for at in slip.tolist()])
-    exact = steady + scene.b * left
+    exact = steady + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 
 

@@ -23,7 +23,7 @@ from rsfstudy.motion.events import (
 from rsfstudy.motion.recording import SAMPLES, Recording, row
 from rsfstudy.motion.regimes import jumped, motion, starting
 from rsfstudy.motion.stepping import Meter, Step, steps
-from rsfstudy.motion.timeline import elapsed, moment_in, timed
+from rsfstudy.motion.timeline import elapsed, ended, timed
 from rsfstudy.slider.equations import RIGID, Equations
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
@@ -203,7 +203,7 @@ def _segment(
             yield from told.beginning(step, begin, before, watching)
         over = begin + elapsed(scene, step, step.end) >= lasts
         if over:
-            step = step.until(moment_in(scene, step, lasts - begin))
+            step = ended(scene, step, lasts - begin, accuracy.solver)
         told.record(step, begin, clocks_within(step, SAMPLES))
         for happening in told_of(step, watching):
             yield told.event(step, begin, happening, point_at(step, happening.clock))

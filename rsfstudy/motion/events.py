@@ -29,7 +29,7 @@ import numpy as np
 from rsfstudy.motion.stepping import Step
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import LOG_LOAD_RATE, MU_STAR, SIZE
+from rsfstudy.slider.slots import LOG_LOAD_RATE, SIZE
 
 
 class Kind(StrEnum):
@@ -195,8 +195,6 @@ def watchers(watches: Sequence[Watch]) -> list[Watcher]:
 
 def _above(watch: Watch) -> Quantity:
     level = watch.level
-    if watch.of == "reading":
-        return lambda point, p: (p[MU_STAR] + point.spring) / point.normal_stress - level
     value = attrgetter(watch.of)
     return lambda point, p: value(point) - level
 

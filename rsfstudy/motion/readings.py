@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rsfstudy.motion.recording import OBSERVED
+from rsfstudy.motion.recording import OBSERVED, READ
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
@@ -15,16 +15,12 @@ FRICTION = Quantity(
     "friction_coefficient",
     r"$\mu$",
     "1",
-    "friction coefficient as a load cell reads it: stress of the spring over normal stress",
+    "friction coefficient as a rig reads it: stress of the spring over normal stress less the pore "
+    "pressure outside the fault",
 )
 LOAD_POINT = Quantity(
     "load_point_displacement", r"$\delta_0/D_c$", "1", "load point displacement", "D_c"
 )
-
-
-def friction_at(scene: Scene, point: Point) -> float:
-    """The friction coefficient that is read at a point of a motion."""
-    return (scene.mu_star + point.spring) / point.normal_stress
 
 
 def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
@@ -40,15 +36,14 @@ def watched(scene: Scene) -> tuple[str, float]:
     and what it is above it: spring stress itself where nothing changes normal stress.
     """
     parts = scene.parts
-    if parts.normal_stress.normal_stress is None and not scene.pressing.unknowns:
+    if parts.normal_stress.normal_stress is None and not parts.loading.unknowns:
         return "spring", scene.mu_star
     return "reading", 0.0
 
 
 def friction_of(table: np.ndarray) -> np.ndarray:
     """The friction coefficient along a recorded motion."""
-    stress = table[:, OBSERVED.index("shear_stress")]
-    return np.asarray(stress / table[:, OBSERVED.index("normal_stress_ratio")])
+    return table[:, READ.index("friction_coefficient")]
 
 
 def load_point_of(scene: Scene, table: np.ndarray) -> np.ndarray:

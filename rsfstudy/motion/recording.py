@@ -22,8 +22,10 @@ OBSERVED = (
     "normal_stress_ratio",
     "state_variable",
 )
+#: The same, and what a rig reads.
+READ = (*OBSERVED, "friction_coefficient")
 #: Columns behind those: the regime, and from this one on the states.
-REGIME, STATES = len(OBSERVED), len(OBSERVED) + 1
+REGIME, STATES = len(READ), len(READ) + 1
 #: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
 #: they still differ in other units, where each is rounded anew.
 _APART, _LEAST = 4, 1e-290
@@ -64,7 +66,7 @@ class Recording:
         self._ended = len(self._rows)
 
     def seen(self, scene: Scene, until: Event | None = None) -> np.ndarray:
-        """The quantities of `OBSERVED`, the number of the regime and the states freed of stress, in
+        """The quantities of `READ`, the number of the regime and the states freed of stress, in
         columns; up to an event. Of states, those that there are in every segment of loading.
         """
         rows = self._rows or [np.empty((0, STATES + scene.states))]
@@ -79,11 +81,14 @@ class Recording:
 
 
 def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
-    """What is recorded of a point: the quantities of `OBSERVED`, less scales and offsets, the
+    """What is recorded of a point: the quantities of `READ`, less scales and offsets, the
     regime, and the states.
     """
     stresses = point.spring, point.friction, point.normal_stress
-    return time, slip, point.log_rate, *stresses, point.state, regime, *point.psis
+    return (
+        *(time, slip, point.log_rate, *stresses, point.state, point.reading),
+        *(regime, *point.psis),
+    )
 
 
 def strictly_later(table: np.ndarray) -> np.ndarray:
@@ -103,11 +108,14 @@ def strictly_later(table: np.ndarray) -> np.ndarray:
     return table
 
 
-def along_path(table: np.ndarray, points: int) -> dict[str, np.ndarray]:
-    """What was seen, at points spread evenly along the path, half by its length in time, ln V and
-    stress, half by the steps the integrator took, which are short where the path bends.
+def along_path(
+    table: np.ndarray, points: int, names: Sequence[str] = OBSERVED
+) -> dict[str, np.ndarray]:
+    """What was seen, by the names of the first columns, at points spread evenly along the path,
+    half by its length in time, ln V and stress, half by the steps the integrator took, which are
+    short where the path bends.
     """
-    table = table[:, : len(OBSERVED)]
+    table = table[:, : len(names)]
     table = table[np.append(True, (np.diff(table, axis=0) != 0.0).any(axis=1))]
     seen = table[:, [OBSERVED.index(n) for n in ("time", "log10_slip_rate", "shear_stress")]]
     spread = np.ptp(seen, axis=0)
@@ -115,4 +123,4 @@ def along_path(table: np.ndarray, points: int) -> dict[str, np.ndarray]:
     strides = strides / strides.sum() + 1.0 / len(strides)
     path = np.concatenate([[0.0], np.cumsum(strides)])
     at = np.linspace(0.0, path[-1], points)
-    return {name: np.interp(at, path, table[:, i]) for i, name in enumerate(OBSERVED)}
+    return {name: np.interp(at, path, table[:, i]) for i, name in enumerate(names)}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolver, Radau
+from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolution, OdeSolver, Radau
 from scipy.optimize import brentq
 
 from rsfstudy.motion.engines import SCIPY
@@ -174,47 +174,19 @@ def steps(
         With `work_budget_spent`, or `integration_failed` when SciPy gives up, a step has no length,
         or a number is not finite.
     """
-    regime, rate_of, p = equations.regime, equations.rate, equations.p
-    method = meter.method_of(regime)
-    tolerance = max(tolerance, TIGHTEST)
-
-    def rate(_clock: float, unknowns: Vector) -> Numbers:
-        meter.charge(regime, 1)
-        changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
-        return changes
-
-    # how long a first step may be is asked of a trial step too
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        solver = method(
-            rate,
-            0.0,
-            np.asarray(state, dtype=float),
-            -math.inf if backward else math.inf,
-            rtol=tolerance,
-            atol=tolerance * np.asarray(equations.scales),
-            max_step=LONGEST_STEP,
-        )
+    p, tolerance = equations.p, max(tolerance, TIGHTEST)
+    ends = 0.0, -math.inf if backward else math.inf
+    solver = _solver(equations, state, ends, tolerance, meter)
     # what limits a step must differ between two tolerances whose results are to tell errors
     finer, jacobians = (tolerance / TOLERANCE_OF_STRIDES) ** 0.125, 0
-    before = equations.point(tuple(solver.y.tolist()), _rates(solver, rate), p)
+    before = _point(solver, equations)
     while True:
-        # trial steps may leave the domain, and the solver then rejects them; what it accepts is
-        # checked
         longest = equations.longest(before.log_rate, before.normal_stress, p[LOG_LOAD_RATE])
         solver.max_step = longest * finer
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            failure = solver.step()
-        meter.steps += 1
+        _advance(solver, equations.regime, meter)
         meter.jacobians += solver.njev - jacobians
         jacobians = solver.njev
-        if solver.status == "failed":
-            raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
-        unknowns = tuple(solver.y.tolist())
-        if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
-            raise Halt(
-                Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}"
-            )
-        after = equations.point(unknowns, _rates(solver, rate), p)
+        after = _point(solver, equations)
         yield Step(
             equations,
             float(solver.t_old),
@@ -228,10 +200,80 @@ def steps(
         before = after
 
 
-def _rates(solver: OdeSolver, rate: Callable[[float, Vector], Numbers]) -> Numbers:
-    """Rates of the unknowns where the solver stands; most have just computed them."""
+def retaken(step: Step, clock: float, tolerance: float) -> Step:
+    """The part of a step that ends at `clock`, integrated anew.
+
+    Where stability limits steps, and not accuracy, dense output is far less accurate than their
+    ends.
+    """
+    if clock == step.start:
+        return step.until(clock)
+    equations, meter = step.equations, step.meter
+    state, length = step.state_at(step.start), abs(clock - step.start)
+    ends = step.start, clock
+    solver = _solver(equations, state, ends, max(tolerance, TIGHTEST), meter, first_step=length)
+    clocks, within = [step.start], []
+    while solver.status == "running":
+        _advance(solver, equations.regime, meter)
+        clocks.append(solver.t)
+        within.append(solver.dense_output())
+    after, known = _point(solver, equations), OdeSolution(clocks, within)
+    return Step(equations, step.start, clock, step.before, after, solver.y, lambda: known, meter)
+
+
+def _solver(
+    equations: Equations,
+    state: Sequence[float] | Vector,
+    ends: tuple[float, float],
+    tolerance: float,
+    meter: Meter,
+    **first: float,
+) -> OdeSolver:
+    """SciPy's integrator of some equations from one clock to another, charged to a meter."""
+    regime, rate_of, p = equations.regime, equations.rate, equations.p
+
+    def rate(_clock: float, unknowns: Vector) -> Numbers:
+        meter.charge(regime, 1)
+        changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+        return changes
+
+    # how long a first step may be is asked of a trial step too
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return meter.method_of(regime)(
+            rate,
+            ends[0],
+            np.asarray(state, dtype=float),
+            ends[1],
+            rtol=tolerance,
+            atol=tolerance * np.asarray(equations.scales),
+            max_step=LONGEST_STEP,
+            **first,
+        )
+
+
+def _advance(solver: OdeSolver, regime: str, meter: Meter) -> None:
+    """Take one step.
+
+    Trial steps may leave the domain, and the solver then rejects them; what it accepts is checked.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        failure = solver.step()
+    meter.steps += 1
+    if solver.status == "failed":
+        raise Halt(Status.INTEGRATION_FAILED, f"{regime}: {failure}")
+    unknowns = tuple(solver.y.tolist())
+    if solver.t == solver.t_old or not math.isfinite(math.fsum(unknowns)):
+        raise Halt(Status.INTEGRATION_FAILED, f"{regime}: step without length or state {unknowns}")
+
+
+def _point(solver: OdeSolver, equations: Equations) -> Point:
+    """What the slider does where the solver stands; most have just computed the rates there."""
     known = getattr(solver, "f", None)
-    return rate(solver.t, solver.y) if known is None else tuple(known.tolist())
+    rates = solver.fun(solver.t, solver.y) if known is None else known
+    point: Point = equations.point(
+        tuple(solver.y.tolist()), tuple(np.asarray(rates).tolist()), equations.p
+    )
+    return point
 
 
 def _dense(solver: OdeSolver) -> Callable[[], Callable[[float], Vector]]:

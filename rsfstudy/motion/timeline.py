@@ -7,9 +7,12 @@ from collections.abc import Iterator
 
 from scipy.optimize import brentq
 
-from rsfstudy.motion.stepping import Step
+from rsfstudy.motion.stepping import Step, retaken
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.scene import Scene
+
+#: How often the clock at which a step is to end is looked for.
+CORRECTIONS = 2
 
 
 def timed(scene: Scene, moving: Iterator[Step]) -> Iterator[tuple[Step, float]]:
@@ -27,11 +30,29 @@ def elapsed(scene: Scene, step: Step, clock: float) -> float:
     """Time in D_c/V_* since the regime of a step began; NaN where nothing tells it."""
     if step.equations.unknowns[-1] != "time":
         return math.nan
-    unit = scene.inertial_time if step.equations.regime == IN_RUPTURE else 1.0
-    return float(step.state_at(clock)[-1]) * unit
+    return float(step.state_at(clock)[-1]) * _unit(scene, step)
 
 
-def moment_in(scene: Scene, step: Step, time: float) -> float:
+def _unit(scene: Scene, step: Step) -> float:
+    """What the time that a step carries along is measured in, over D_c/V_*."""
+    return scene.inertial_time if step.equations.regime == IN_RUPTURE else 1.0
+
+
+def ended(scene: Scene, step: Step, time: float, tolerance: float) -> Step:
+    """The part of a step that ends this long after its regime began; all of it at the most.
+
+    Dense output tells the clock at which to end. Where stability limits steps it is far less
+    accurate than their ends: the part is integrated anew, and again with what time it was missing.
+    """
+    clock = _moment_in(scene, step, time)
+    for _ in range(CORRECTIONS):
+        part = retaken(step, clock, tolerance)
+        pace = step.equations.rates(tuple(part.state.tolist()))[-1] * _unit(scene, step)
+        clock -= (elapsed(scene, part, clock) - time) / pace
+    return part
+
+
+def _moment_in(scene: Scene, step: Step, time: float) -> float:
     """Clock at which a step is this long after its regime began; its end at the latest."""
     if elapsed(scene, step, step.end) <= time:
         return step.end

@@ -99,7 +99,7 @@ class Inverse(Reduction):
     ----------
     name : str
         Name of the result; ``<name>_error`` comes with it: what the uncertainty of the level does,
-        and how much the result moves when every other point is left out.
+        and how far interpolants through the neighbours on either side are from the result.
     of : str
         Variable that reaches the level; positive.
     on : str
@@ -168,11 +168,36 @@ def _inverse(
     if np.isnan(level) or level <= 0.0 or x.size < 4:
         return np.nan, np.nan
     fine = _reaches(x, y, np.log(level))
-    sparse = sorted({*range(0, x.size, 2), x.size - 1})
-    coarse = _reaches(x[sparse], y[sparse], np.log(level))
     ends = [_reaches(x, y, np.log(level) + d) for d in (-uncertainty, uncertainty)]
-    error = abs(fine - coarse) + float(np.max(np.abs(fine - np.array(ends))))
+    error = _unseen(x, y, np.log(level), fine) + float(np.max(np.abs(fine - np.array(ends))))
     return float(np.exp(fine)), float(np.exp(fine) * error)
+
+
+def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
+    """How far the place where a smooth variable reaches the level may be from that found.
+
+    Parabolas through the bracket and one neighbour, on its left and on its right, err to opposite
+    sides where the third derivative keeps its sign. Where it does not, or where there is a
+    neighbour on one side only, the chord tells the rest. The bracket bounds all.
+    """
+    if np.isnan(fine):
+        return np.nan
+    first = int(np.clip(np.searchsorted(x, fine) - 1, 0, x.size - 2))
+    ends = x[first : first + 2]
+    starts = [s for s in (first - 1, first) if 0 <= s <= x.size - 3]
+    through = [_parabola(y[s : s + 3], x[s : s + 3], level) for s in starts]
+    through.append(float(np.interp(level, *_ascending(y[first : first + 2], ends))))
+    return float(min(np.sum(np.abs(np.array(through) - fine)), np.max(np.abs(ends - fine))))
+
+
+def _parabola(y: np.ndarray, x: np.ndarray, level: float) -> float:
+    """The parabola x(y) through three points, at a level; infinite where y is not monotone."""
+    slopes = np.diff(y)
+    if not slopes[0] * slopes[1] > 0.0:
+        return np.inf
+    rises = np.diff(x) / slopes
+    bend = (rises[1] - rises[0]) / (y[2] - y[0])
+    return float(x[0] + (level - y[0]) * (rises[0] + bend * (level - y[1])))
 
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.scales import Scale, scaled, scales
+from rsfstudy.rig.scales import Scale, rate_of, scaled, scales
 from rsfstudy.rig.units import factor, in_si
 from rsfstudy.slider.fields import QUANTITIES
 from rsfstudy.slider.loading import Segment
@@ -61,11 +61,13 @@ class Laboratory:
     stiffness : quantity, optional
         Of the machine with its sample, as stress over displacement (Pa/m).
     period : quantity, optional
-        Period of free oscillation T (s), where mass is to act; or
+        Period of free oscillation T (s), where mass acts; or
     mass : quantity, optional
         the mass that moves over the area of the fault (kg/m^2): ``T = 2 pi sqrt(mass/stiffness)``.
+        Scenes of a rig that states either have ``inertia=True``.
     shear_modulus, density : quantity, optional
-        Of the medium (Pa; kg/m^3), where it radiates: damping ``sqrt(G rho)/2``.
+        Of the medium (Pa; kg/m^3), where it radiates: damping ``sqrt(G rho)/2``, which stands in
+        for mass.
 
     Raises
     ------
@@ -111,7 +113,7 @@ class Laboratory:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
         ``sigma_*/D_c`` is asked for.
         """
-        return in_si(name, value, _UNITS[scale]) / self.scales[scale].factor
+        return float(in_si(name, value, _UNITS[scale]) / self.scales[scale].factor)
 
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
@@ -121,7 +123,7 @@ class Laboratory:
         **fields
             Those of `Scene`. One that is measured in a unit of the slider (`hold_time`,
             `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
-            units.
+            units. ``inertia=False`` leaves out the mass that the rig states.
         """
         return Scene(**self._of_rig() | {n: self._field(n, v) for n, v in fields.items()})
 
@@ -149,10 +151,11 @@ class Laboratory:
         Raises
         ------
         InvalidValue
-            For units of another kind.
+            For units of another kind, and results at another reference rate than that of the rig.
         DataError
             For a dataset that is in other units already, or not of rsfstudy.
         """
+        rate_of(dataset, self.reference_velocity / self.slip_distance)
         units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
         size = {name: factor("units", *pair) for name, pair in units.items()}
         size["V_*"] = size["D_c"] / size["D_c/V_*"]
@@ -177,6 +180,8 @@ class Laboratory:
             found["period"] = 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
         if self.period is not None:
             found["period"] = self.period
+        if "period" in found:
+            found["inertia"] = True
         if self.density is not None:
             impedance = 0.5 * math.sqrt(self.shear_modulus * self.density)
             found["radiation_damping"] = impedance * self.reference_velocity / self.normal_stress

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from pathlib import Path
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.units import number
 from rsfstudy.slider.protocol import KEYS, Protocol, protocol
 
 #: Units of the slider, which need no laboratory.
@@ -15,7 +17,7 @@ _OF_SLIDER = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
-_HEADER = re.compile(r"\s*(\w+)\s*[\[(]\s*(.*?)\s*[\])]\s*")
+_HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 _EXAMPLE = "velocity (um/s), distance (um)"
 
 
@@ -53,6 +55,9 @@ def read_protocol(
         remedy = f"Its first line reads, for instance, {_EXAMPLE}."
         raise InvalidValue("protocol", str(path), "has no header", remedy=remedy)
     columns = [_column(text) for text in rows[0][1]]
+    for key, count in Counter(key for key, _units in columns).items():
+        if count > 1:
+            raise InvalidValue("column", key, "stands twice in the header")
     segments = [_segment(row, columns, f"{path}, line {n}") for n, row in rows[1:]]
     of_slider = all(_OF_SLIDER[key] == units for key, units in columns)
     if of_slider:
@@ -70,13 +75,13 @@ def read_protocol(
 
 def _column(text: str) -> tuple[str, str]:
     """What a column holds, and its units."""
-    match = _HEADER.fullmatch(text)
+    match = _HEADER.fullmatch(text.strip())
     if not match:
         remedy = f"Write the header as in {_EXAMPLE}."
         raise InvalidValue("header", text, "names no column with its units", remedy=remedy)
     if match[1] not in KEYS:
         raise InvalidValue("column", match[1], "is unknown", choices=KEYS)
-    return match[1], match[2]
+    return match[1], match[2].strip()
 
 
 def _segment(
@@ -87,13 +92,11 @@ def _segment(
         rule = f"has {len(row)} fields, and the header {len(columns)}"
         raise InvalidValue("line", ",".join(row), rule).at(place)
     segment = {}
-    for number, (text, (key, units)) in enumerate(zip(row, columns, strict=True), start=1):
+    for column, (text, (key, units)) in enumerate(zip(row, columns, strict=True), start=1):
         if not text.strip():
             continue
-        try:
-            float(text)
-        except ValueError as error:
+        if number(text) is None:
             wrong = InvalidValue(key, text, "is no number", remedy="Units stand in the header.")
-            raise wrong.at(f"{place}, column {number}") from error
+            raise wrong.at(f"{place}, column {column}")
         segment[key] = text.strip(), units
     return segment

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
@@ -21,14 +22,41 @@ _WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 SCALES = "scales"
 
 
-class Scale(NamedTuple):
-    """What 1 is in some units."""
+#: Relative difference of two reference rates that are one: of rounding, and of what was printed.
+_ROUNDING = 1e-9
 
-    factor: float
+
+class Scale(NamedTuple):
+    """What 1 is in some units; of each cell, where it varies among them."""
+
+    factor: float | xr.Variable
     units: str
 
 
-def scales(normal_stress: float, slip_distance: float, reference_rate: float) -> dict[str, Scale]:
+def rate_of(dataset: xr.Dataset, stated: float | None) -> float | xr.Variable:
+    """V_*/D_c of each cell in 1/s: that of the dataset, where it holds one.
+
+    Raises
+    ------
+    InvalidValue
+        Where it holds none and none is stated, or another is stated.
+    """
+    if "reference_rate" not in dataset:
+        if stated is None:
+            remedy = "State it."
+            raise InvalidValue("reference_rate", None, "is not in the dataset", remedy=remedy)
+        return stated
+    held = dataset["reference_rate"].variable.to_base_variable()
+    if stated is not None and not np.allclose(held, stated, rtol=_ROUNDING, atol=0.0):
+        rule = f"contradicts that of the dataset, {_range(held)} 1/s"
+        remedy = "Each cell is converted by its own: state another to the scenes."
+        raise InvalidValue("reference_rate", stated, rule, remedy=remedy)
+    return held
+
+
+def scales(
+    normal_stress: float, slip_distance: float, reference_rate: float | xr.Variable
+) -> dict[str, Scale]:
     """The scales of dimensionless quantities in SI units, by the names that attributes have.
 
     Parameters
@@ -37,7 +65,7 @@ def scales(normal_stress: float, slip_distance: float, reference_rate: float) ->
         sigma_* in Pa.
     slip_distance : float
         D_c in m.
-    reference_rate : float
+    reference_rate : float or xarray.Variable
         V_*/D_c in 1/s.
 
     Raises
@@ -45,18 +73,33 @@ def scales(normal_stress: float, slip_distance: float, reference_rate: float) ->
     InvalidValue
         For scales that are not positive and finite.
     """
+    for of, factor in (
+        ("sigma_*", normal_stress), ("D_c", slip_distance), ("V_*/D_c", reference_rate),
+    ):  # fmt: skip
+        _check(of, factor)
     found = {
         "sigma_*": Scale(normal_stress, "Pa"),
         "D_c": Scale(slip_distance, "m"),
         "V_*": Scale(slip_distance * reference_rate, "m s-1"),
-        "D_c/V_*": Scale(1.0 / reference_rate if reference_rate else 0.0, "s"),
+        "D_c/V_*": Scale(1.0 / reference_rate, "s"),
         "V_*/D_c": Scale(reference_rate, "s-1"),
         "sigma_*/D_c": Scale(normal_stress / slip_distance, "Pa m-1"),
     }
     for of, scale in found.items():
-        if not 0.0 < scale.factor < float("inf"):
-            raise InvalidValue(of, scale.factor, "must be positive and finite")
+        _check(of, scale.factor)
     return found
+
+
+def _check(of: str, factor: float | xr.Variable) -> None:
+    values = np.asarray(factor)
+    if not (np.isfinite(values) & (values > 0.0)).all():
+        raise InvalidValue(of, values.tolist(), "must be positive and finite")
+
+
+def _range(factor: float | xr.Variable) -> str:
+    """A number, or the least and the largest where it varies."""
+    ends = np.unique([np.min(factor), np.max(factor)])
+    return " to ".join(f"{end:g}" for end in ends)
 
 
 def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
@@ -70,7 +113,7 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     Raises
     ------
     DataError
-        Where nothing says its scale.
+        Where nothing says its scale, or that of an axis varies along another.
     """
     result = dataset.copy()
     logarithms = [n for n in map(str, dataset.variables) if _LOGARITHM.fullmatch(n)]
@@ -79,10 +122,15 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         text = "nothing in the dataset says its scale: it is in other units already, or not ours"
         raise DataError(text)
     for name in measured:
-        values = dataset[name]
+        values = dataset[name].variable.to_base_variable()
         scale = by[values.attrs["scale"]]
+        converted = values * scale.factor
+        if name in dataset.dims and converted.dims != (name,):
+            other = next(dim for dim in converted.dims if dim != name)
+            text = f"the scale of the axis {name} varies along {other}: select one place on that"
+            raise DataError(f"{text} first, as in dataset.isel({other}=0)")
         kept = {key: value for key, value in values.attrs.items() if key != "scale"}
-        result[name] = (values.dims, values.values * scale.factor, kept | {"units": scale.units})
+        result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
     for name in logarithms:
         result = result.assign(_slip_rate(dataset, name, by["V_*"]))
     new = {str(name): _renamed(str(name)) for name in measured}
@@ -91,7 +139,9 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         beside = str(variable.attrs.get("ancillary_variables", "")).split()
         if beside:
             variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in beside)
-    return result.assign_attrs({SCALES: ", ".join(f"{n} = {s[0]:g} {s[1]}" for n, s in by.items())})
+    return result.assign_attrs(
+        {SCALES: ", ".join(f"{n} = {_range(s.factor)} {s.units}" for n, s in by.items())}
+    )
 
 
 def _renamed(name: str) -> str:
@@ -106,10 +156,11 @@ def _slip_rate(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Var
     log, plain = dataset[name].variable, name.replace("log10_", "")
     words = str(log.attrs.get("long_name", plain))
     about = {"long_name": re.sub(_WORDS, "", words), "units": scale.units}
-    found = {plain: xr.Variable(log.dims, 10.0**log.values * scale.factor, about)}
+    rates = xr.Variable(log.dims, 10.0**log.values) * scale.factor
+    found = {plain: xr.Variable(rates.dims, rates.values, about)}
     if f"{name}_error" in dataset:
         error = dataset[f"{name}_error"].variable
         about = about | {"long_name": f"numerical error estimate of {about['long_name']}"}
-        size = found[plain].values * math.log(10.0) * error.values
-        found[f"{plain}_error"] = xr.Variable(error.dims, size, about)
+        size = rates * (math.log(10.0) * xr.Variable(error.dims, error.values))
+        found[f"{plain}_error"] = xr.Variable(size.dims, size.values, about)
     return found

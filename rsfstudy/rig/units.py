@@ -1,14 +1,19 @@
-"""Numbers with units: the usual ones of a rig are known here, all others to pint."""
+"""Numbers with units: the usual ones of a rig are known here, all others to pint.
+
+A quantity is one number and one unit, in one grammar for both: pint is asked for names of units
+only, since it would take numbers among them for factors.
+"""
 
 from __future__ import annotations
 
 import importlib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from numbers import Real
 from typing import Any
 
+from rsfstudy.declare.axis import plain
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.
@@ -16,7 +21,6 @@ Unit = tuple[float, tuple[int, int, int]]
 
 _STRESS, _LENGTH, _TIME = (1, -1, -2), (0, 1, 0), (0, 0, 1)
 _KNOWN: Mapping[str, Unit] = {
-    "1": (1.0, (0, 0, 0)),
     "kg": (1.0, (1, 0, 0)),
     **{f"{p}Pa": (x, _STRESS) for p, x in (("", 1.0), ("k", 1e3), ("M", 1e6), ("G", 1e9))},
     "bar": (1e5, _STRESS),
@@ -32,9 +36,23 @@ _KNOWN: Mapping[str, Unit] = {
     "day": (86400.0, _TIME),
     "year": (365.25 * 86400.0, _TIME),
 }
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|[-+]?inf)\s*(.*?)\s*")
-_POWER = re.compile(r"(.*?[A-Za-z1\u00b5\u03bc])\s*(?:\^|\*\*)?\s*([-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf")
+#: A name with its power: of one digit, so that no power overflows.
+_POWER = (
+    r"([A-Za-z\u00b5\u03bc](?:[A-Za-z\u00b5\u03bc0-9_]*[A-Za-z\u00b5\u03bc])?)"
+    r"(?:(?:\^|\*\*)?([-+]?[1-9]))?"
+)
+_POWERS = re.compile(rf"(/?)\s*{_POWER}")
+#: A product, over others one by one: what ``Pa/m s`` means is not agreed upon.
+_UNIT = re.compile(
+    rf"(?:1(?=\s*/)|{_POWER}(?:(?:\s*[*.\u00b7]\s*|\s+){_POWER})*)?(?:\s*/\s*{_POWER})*"
+)
 _PINT = "Install pint (pip install 'rsfstudy[units]')"
+
+
+def number(text: str) -> float | None:
+    """The number that a text is, in the digits and with the point of ASCII; None of others."""
+    return float(text) if _NUMBER.fullmatch(text.strip()) else None
 
 
 def in_si(name: str, value: Any, units: str) -> float:
@@ -45,7 +63,8 @@ def in_si(name: str, value: Any, units: str) -> float:
     name : str
         What it is the value of.
     value : float, str or pint.Quantity
-        A plain number is in SI units already; a text has units, as in "5 MPa".
+        A plain number is in SI units already; a text is one number and one unit, as in "5 MPa",
+        "0.1 MPa/um" or "1 um s^-1".
     units : str
         The SI units.
 
@@ -55,17 +74,17 @@ def in_si(name: str, value: Any, units: str) -> float:
         For what is no finite number, and for units that are unknown or of another kind.
     """
     if isinstance(value, str):
-        number = _of_text(name, value, units)
+        converted: Any = _of_text(name, value, units)
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
-        number = _converted(name, value, value, units)
-    elif type(value) is not bool and isinstance(value, Real):
-        number = float(value)
+        converted = _converted(name, value, value, units)
     else:
+        converted = plain(name, value)
+    if isinstance(converted, bool) or not isinstance(converted, Real):
         remedy = f"Give a number in {units}, or a text with units."
         raise InvalidValue(name, value, "is no quantity", remedy=remedy)
-    if not math.isfinite(number):
+    if not math.isfinite(converted):
         raise InvalidValue(name, value, "must be finite")
-    return number
+    return float(converted)
 
 
 def factor(name: str, stated: str, units: str) -> float:
@@ -74,17 +93,18 @@ def factor(name: str, stated: str, units: str) -> float:
 
 
 def _of_text(name: str, text: str, units: str) -> float:
-    match = _QUANTITY.fullmatch(text)
-    if not match:
-        remedy = f"Write a number and its units, as in '2.5 {units}'."
+    match = _NUMBER.match(text.strip())
+    powers = _powers(text.strip()[match.end() :].strip()) if match else None
+    if match is None or powers is None:
+        example = f"2.5 {units}".removesuffix(" 1")
+        remedy = f"Write a number and its units, as in '{example}', with a decimal point."
         raise InvalidValue(name, text, "is no quantity", remedy=remedy)
-    known, wanted = _parsed(match[2] or "1"), _parsed(units)
-    if known is None:
-        return _by_pint(name, text, units)
-    assert wanted is not None
-    if known[1] != wanted[1]:
+    if not all(unit in _KNOWN for unit, _power in powers):
+        return float(match[0]) * _factor_of_pint(name, text, powers, units)
+    scale, exponents = _product(powers)
+    if exponents != _product(_powers(units.removeprefix("1")) or [])[1]:
         raise _misfit(name, text, units)
-    return float(match[1]) * known[0] / wanted[0]
+    return float(match[0]) * scale
 
 
 def _misfit(name: str, value: Any, units: str) -> InvalidValue:
@@ -92,41 +112,49 @@ def _misfit(name: str, value: Any, units: str) -> InvalidValue:
     return InvalidValue(name, value, rule, remedy=f"Give it in {units}, or a multiple of it.")
 
 
-def _parsed(units: str) -> Unit | None:
-    """Units that are known here, multiplied and divided; None of others."""
+def _powers(units: str) -> list[tuple[str, int]] | None:
+    """The units that a text multiplies and divides, with their powers; None where it does not."""
+    if not _UNIT.fullmatch(units):
+        return None
+    found = _POWERS.findall(units)
+    return [(name, int(power or 1) * (-1 if over else 1)) for over, name, power in found]
+
+
+def _product(powers: Iterable[tuple[str, int]]) -> Unit:
+    """Units that are known here, multiplied."""
     scale, exponents = 1.0, [0, 0, 0]
-    for place, side in enumerate(units.split("/")):
-        for text in filter(None, re.split(r"[\s.*\u00b7]+", side.replace("**", "^"))):
-            match = _POWER.fullmatch(text)
-            if not match or match[1] not in _KNOWN:
-                return None
-            power = int(match[2] or 1) * (-1 if place else 1)
-            size, of = _KNOWN[match[1]]
-            scale *= size**power
-            exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
+    for name, power in powers:
+        size, of = _KNOWN[name]
+        scale *= size**power
+        exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
     return scale, (exponents[0], exponents[1], exponents[2])
 
 
-def _by_pint(name: str, text: str, units: str) -> float:
+def _factor_of_pint(name: str, text: str, powers: Iterable[tuple[str, int]], units: str) -> float:
     try:
         pint = importlib.import_module("pint")
     except ImportError as error:
-        usual = ", ".join(n for n in _KNOWN if n not in ("1", "kg") and n.isascii())
+        usual = ", ".join(n for n in _KNOWN if n != "kg" and n.isascii())
         remedy = f"{_PINT}, write it in {usual}, or give a number in {units}."
         raise InvalidValue(
             name, text, "has units that are not known here", remedy=remedy
         ) from error
+    registry = pint.get_application_registry()
     try:
-        quantity = pint.get_application_registry().Quantity(text)
-    except Exception as error:  # of its own, of tokenize and of Python's parser
+        unit = math.prod(registry.parse_units(unit) ** power for unit, power in powers)
+    except Exception as error:  # of its own, and of Python's parser
         remedy = f"Write it as in '2.5 {units}'."
         rule = f"has units that pint does not know ({error})"
         raise InvalidValue(name, text, rule, remedy=remedy) from error
-    return _converted(name, text, quantity, units)
+    if _converted(name, text, registry.Quantity(0.0, unit), units) != 0.0:
+        raise _misfit(name, text, units)  # a logarithm, of which none is a multiple
+    return float(_converted(name, text, registry.Quantity(1.0, unit), units))
 
 
-def _converted(name: str, value: Any, quantity: Any, units: str) -> float:
+def _converted(name: str, value: Any, quantity: Any, units: str) -> Any:
+    """What a quantity of pint is in SI units."""
     try:
-        return float(quantity.to(units).magnitude)
+        magnitude = quantity.to(units).magnitude
     except Exception as error:
         raise _misfit(name, value, units) from error
+    return plain(name, magnitude)

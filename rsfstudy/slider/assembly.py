@@ -68,6 +68,7 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> Functions:
         ),
         (stress.normal_stress, stress.state_effect, starts[1]),
         (len(pressing.unknowns), *(getattr(pressing, name) for name in _OF_FLUID), starts[2]),
+        pressing is scene.parts.fluid,
         (*(getattr(acting, name) for name in _OF_DYNAMICS), starts[3]),
     )
 
@@ -84,7 +85,11 @@ def _with_numbers(scene: Scene) -> tuple[Any, Any, Any, Any]:
 
 @cache
 def _assembled(
-    law: tuple[Any, ...], stress: tuple[Any, ...], fluid: tuple[Any, ...], dynamics: tuple[Any, ...]
+    law: tuple[Any, ...],
+    stress: tuple[Any, ...],
+    fluid: tuple[Any, ...],
+    inside: bool,
+    dynamics: tuple[Any, ...],
 ) -> Functions:
     """The functions of a combination of parts; the same ones whenever it is asked for."""
     count, of_law, law_effect, dependence, reverses, law_own = law
@@ -92,8 +97,13 @@ def _assembled(
     filled = _of_law(count, of_law, law_own) | _of_stress(stress[0], stress[2], effects)
     if reverses:
         filled["strength"] = bound(friction.reversible, one_way=filled["strength"])
+    dry = filled
     if fluid[0]:
-        filled |= _of_fluid(filled, count, *fluid)
+        filled = filled | _of_fluid(filled, count, *fluid)
+    # a rig knows of what a loading does to normal stress, and not of pressure inside the fault
+    outer = dry if inside else filled
+    filled["outer_stress"] = outer["effective_stress"]
+    filled["outer_stress_change"] = outer["effective_stress_change"]
     filled["states_at"] = bound(states.states_at, **filled)
     filled["moved"] = _moved(filled["STATES"])
     filled["pace"] = forms.pace

@@ -35,12 +35,13 @@ from rsfstudy.slider.slots import (
     balance,
     changes,
     effective_stress,
-    effective_stress_change,
     evolution,
     evolutions,
     felt,
     growth,
     normal_stress,
+    outer_stress,
+    outer_stress_change,
     resting,
     rupture_point,
     rupture_rate,
@@ -90,9 +91,11 @@ class Point(NamedTuple):
         Friction coefficient.
     normal_stress : float
         Effective normal stress over sigma_*.
+    reading : float
+        Friction coefficient as a rig reads it: spring stress over normal stress less the pore
+        pressure outside the fault.
     reading_growth : float
-        Derivative of the friction coefficient that is read, that of spring stress over effective
-        normal stress, with respect to the clock of the equations.
+        Its derivative with respect to the clock of the equations.
     """
 
     log_rate: float
@@ -106,6 +109,7 @@ class Point(NamedTuple):
     unrest: float
     coefficient: float
     normal_stress: float
+    reading: float
     reading_growth: float
 
 
@@ -135,9 +139,9 @@ def reading_growth(
     changes: Numbers,
     p: Numbers,
 ) -> float:
-    """Change of the friction coefficient that is read, ``(mu_* + f)/s``."""
-    ratio = 1.0 + effective_stress(friction, psis, p)[0]
-    ratio_change = effective_stress_change(friction, friction_change, changes, p)
+    """Change of the friction coefficient that is read, ``(mu_* + f)/s``, s outside the fault."""
+    ratio = 1.0 + outer_stress(friction, psis, p)[0]
+    ratio_change = outer_stress_change(friction, friction_change, changes, p)
     return (spring_change - (p[MU_STAR] + spring) / ratio * ratio_change) / ratio
 
 
@@ -272,6 +276,7 @@ def point_at(
         unrest,
         (p[MU_STAR] + friction) / ratio,
         ratio,
+        (p[MU_STAR] + spring) / (1.0 + outer_stress(friction, psis, p)[0]),
         reading_growth,
     )
 

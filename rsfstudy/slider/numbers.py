@@ -27,7 +27,11 @@ class Slider(Part):
         rule=_POSITIVE,
     )
     stiffness_ratio: float | None = number(
-        None, r"$k/k_{cr}(V_*)$", "1", "stiffness over critical stiffness at V_star", rule=_POSITIVE
+        None,
+        r"$k/k_{cr}(V_*)$",
+        "1",
+        "stiffness over critical stiffness at V_star without radiation damping",
+        rule=_POSITIVE,
     )
     stiffness: float | None = number(
         None, r"$k D_c/\sigma_*$", "1", "stiffness", rule=_POSITIVE, scale="sigma_*/D_c"

@@ -53,6 +53,18 @@ class Part:
     #: What the part is called; a part that a field calls for by its value names that field instead.
     name: ClassVar[str]
     called_by: ClassVar[str] = ""
+    #: What follows from the equations of a part and is stated beside them, and the members that
+    #: hold those: a part with one of them of its own inherits no conclusion from another's.
+    conclusions: ClassVar[tuple[str, ...]] = ()
+    equations: ClassVar[frozenset[str]] = frozenset()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls.equations & vars(cls).keys():
+            base = next(kind for kind in cls.__mro__ if "conclusions" in vars(kind))
+            for name in cls.conclusions:
+                if name not in vars(cls):
+                    setattr(cls, name, vars(base)[name])
 
     @classmethod
     def what_it_is(cls) -> object:

@@ -75,8 +75,9 @@ class Scene(Following):
     mu_star : float
         Steady-state friction coefficient at V_*.
     stiffness_ratio : float, optional
-        Stiffness over the critical stiffness at V_*, above which steady sliding is stable. Default:
-        1. With several states a ratio below 1 need not be unstable.
+        Stiffness over the critical stiffness at V_* without radiation damping. Above it steady
+        sliding is stable; with damping also a little below. Default: 1. With several states a ratio
+        below 1 need not be unstable.
     stiffness : float, optional
         Stiffness itself, k D_c/sigma_*, instead of its ratio.
     load_velocity_ratio : float, optional

@@ -57,6 +57,18 @@ def effective_stress_change(
     _open(friction, friction_change, changes, p)
 
 
+def outer_stress(friction: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    """The same of normal stress less the pore pressure outside the fault, which a rig knows of."""
+    _open(friction, psis, p)
+
+
+def outer_stress_change(
+    friction: float, friction_change: float, changes: Numbers, p: Numbers
+) -> float:
+    """Change of that (see `forms`)."""
+    _open(friction, friction_change, changes, p)
+
+
 def state_effect(friction: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
     """State lost to the present stress, and its derivative."""
     _open(friction, ratio, change, p)

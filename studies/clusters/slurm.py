@@ -19,6 +19,7 @@ JOB = {
     "walltime": "02:00:00",
     "queue": "normal",  # your partition
     # "account": "...", "interface": "ib0", as your site asks for
+    # "security": True, so that nobody else on the login node runs code in your name
 }
 JOBS = 4
 

@@ -4,6 +4,7 @@ The functions of the equations are those that SciPy calls. Together with the pla
 folder they are copied, each name in them standing for its compiled copy, and compiled as one. What
 is compiled lies in a folder of its own, named by a digest of all that decides it, which is written
 aside, renamed when complete, and never changed; what does not hold its own digest is thrown away.
+What lies there is run: where others could write to it, nothing is read or kept.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import contextlib
 import functools
 import hashlib
 import json
+import logging
 import os
 import shutil
+import stat
 import sys
 import tempfile
 import time
@@ -32,7 +35,7 @@ from rsfstudy.motion.engines import compiling
 
 #: Functions of this package know their places by name; those of equations are complete.
 _OURS = __package__
-_ENTRY = "motion.py"
+_ENTRY, _DIGESTS = "motion.py", "digests.json"
 #: Modules that are as their version, or that of Python, says.
 _KNOWN_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
 #: Quotients by the numbers of a scene may be products with reciprocals, found once a step; and
@@ -47,6 +50,7 @@ _POINTERS = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
 _LAYOUT = 2
 #: Compiled functions whose addresses are in use.
 _ALIVE: list[Any] = []
+_log = logging.getLogger(__name__)
 
 
 def cache_folder() -> Path:
@@ -175,15 +179,16 @@ def called_by_address(
 
 def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
     """What is compiled, from the folder of that name where it is there and whole."""
-    folder = cache_folder() / name
-    if _whole(folder):
-        with contextlib.suppress(Exception):  # whatever a cache can be damaged by
-            return compile_for(str(folder / _ENTRY))
-    shutil.rmtree(folder, ignore_errors=True)
+    folder = _place(name)
+    if folder is not None:
+        if _whole(folder):
+            with contextlib.suppress(Exception):  # whatever a cache can be damaged by
+                return compile_for(str(folder / _ENTRY))
+        shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
     with compiling.aside():
         try:
-            return _compiled_aside(folder, compile_for)
+            return compile_for("") if folder is None else _compiled_aside(folder, compile_for)
         except OSError:  # nothing can be kept
             return compile_for("")
         finally:
@@ -191,9 +196,42 @@ def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
             compiling.seconds += time.perf_counter() - began
 
 
+def _place(name: str) -> Path | None:
+    """The folder of that name; None where there is no cache, or not for this user alone."""
+    try:
+        cache = cache_folder()
+        cache.parent.parent.mkdir(parents=True, exist_ok=True)
+        for folder in (cache.parent, cache):
+            folder.mkdir(mode=0o700, exist_ok=True)
+        for folder in (cache.parent, cache, cache / name):
+            if folder.exists() and not _is_private(folder):
+                _say_not_private(folder)
+                return None
+    except (OSError, RuntimeError):  # it cannot be made, or the user has no home
+        return None
+    return cache / name
+
+
+@functools.cache
+def _say_not_private(folder: Path) -> None:
+    _log.warning(
+        "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
+        "it. Remove it, or choose another place (XDG_CACHE_HOME).",
+        folder,
+    )
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether nobody else owns a folder, or a link to it, or may write to it."""
+    if not hasattr(os, "geteuid"):  # Windows: no owners, no modes
+        return True
+    found = folder.stat()
+    owners = {found.st_uid, folder.lstat().st_uid}
+    return owners == {os.geteuid()} and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
 def _compiled_aside(folder: Path, compile_for: Callable[[str], Any]) -> Any:
     """Compile in a folder of its own, which is then renamed."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         entry = aside / _ENTRY
@@ -236,18 +274,21 @@ def _jitted(function: Any) -> Any:
 
 def _seal(folder: Path) -> None:
     """Write down the digests of all files."""
-    files = {str(f.relative_to(folder)): _digest(f) for f in folder.rglob("*") if f.is_file()}
-    (folder / "digests.json").write_text(json.dumps(files))
+    (folder / _DIGESTS).write_text(json.dumps(_digests(folder)))
 
 
 def _whole(folder: Path) -> bool:
-    """Whether a folder holds what was written."""
+    """Whether a folder holds what was written, and nothing else."""
     try:
-        files = json.loads((folder / "digests.json").read_text())
-        return all(_digest(folder / name) == digest for name, digest in files.items())
-    except (OSError, ValueError):
+        return bool(json.loads((folder / _DIGESTS).read_text()) == _digests(folder))
+    except (OSError, ValueError, RecursionError):
         return False
 
 
-def _digest(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+def _digests(folder: Path) -> dict[str, str]:
+    """Digest of each file, but for Numba's trials whether it could write, whose names have no dot,
+    and for what is written of them.
+    """
+    files = {str(file.relative_to(folder)): file for file in folder.rglob("*.*") if file.is_file()}
+    files.pop(_DIGESTS, None)
+    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}

@@ -24,7 +24,7 @@ from rsfstudy.motion.compiled.happenings import (
 )
 from rsfstudy.motion.compiled.order_eight import copy
 from rsfstudy.motion.compiled.room import room
-from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, take_step
+from rsfstudy.motion.compiled.steps import TAKEN, begin, cut, elapsed, retake, take_step
 from rsfstudy.motion.compiled.table import (
     BEGIN,
     CHANGE,
@@ -55,6 +55,7 @@ from rsfstudy.motion.handover import (
     room_left,
 )
 from rsfstudy.motion.recording import SAMPLES
+from rsfstudy.motion.timeline import CORRECTIONS
 from rsfstudy.slider.slots import LOAD_VELOCITY
 
 
@@ -220,8 +221,20 @@ def cut_short(now, place, limits):
     if over:
         at_begin = now.started + elapsed(now, place, place.y, limits) - now.lasts
         at_end = passed_at_end(now, place, limits) - now.lasts
-        cut(now, place, located(PASSED, at_begin, at_end, now, place, limits))
+        end_in_time(now, place, located(PASSED, at_begin, at_end, now, place, limits), limits)
     return leaves, over
+
+
+def end_in_time(now, place, clock, limits):
+    """Let the step end where time is over, which dense output tells about a clock (see
+    `timeline.ended`).
+    """
+    rates_at_end = moved(place.stages, STAGES * place.unknowns)
+    for _ in range(CORRECTIONS):
+        retake(now, place, clock)
+        late = passed_at_end(now, place, limits) - now.lasts
+        clock -= late / elapsed(now, place, rates_at_end, limits)
+    evaluate(place.point, place.new, rates_at_end, place.p, place.after)
 
 
 def lands(now, place, limits):

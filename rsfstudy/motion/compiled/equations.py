@@ -19,6 +19,7 @@ from rsfstudy.motion.compiled.table import (
     PSI,
     PSIS,
     RATIO,
+    READING,
     READING_GROWTH,
     SPRING,
     STATE,
@@ -86,6 +87,7 @@ def fill_point(y, rates, p, result):
     result[UNREST] = point.unrest
     result[COEFFICIENT] = point.coefficient
     result[RATIO] = point.normal_stress
+    result[READING] = point.reading
     result[READING_GROWTH] = point.reading_growth
     for i in range(STATES):
         result[PSIS + i] = point.psis[i]

@@ -40,8 +40,9 @@ from rsfstudy.motion.compiled.table import (
     WATCHED,
 )
 from rsfstudy.motion.handover import room_left, weight_of_mass
+from rsfstudy.motion.recording import REGIME as RECORDED_REGIME
 from rsfstudy.motion.recording import SAMPLES, STATES
-from rsfstudy.slider.slots import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, SIZE, STIFFNESS
+from rsfstudy.slider.slots import LOAD_VELOCITY, LOG_LOAD_RATE, SIZE, STIFFNESS
 
 #: What is read off a step beside the watches: how far the regime is from being left, time, and how
 #: far the motion is from its end.
@@ -58,8 +59,6 @@ def quantity(watch, columns, p):
         if watch[OF] == READING:
             return columns[READING_GROWTH]
         return p[LOG_LOAD_RATE] - columns[LOG_RATE]
-    if watch[OF] == READING:
-        return (p[MU_STAR] + columns[SPRING]) / columns[RATIO] - watch[LEVEL]
     return columns[int(watch[OF])] - watch[LEVEL]
 
 
@@ -264,7 +263,8 @@ def record_point(now, rows, passed, columns, p):
     rows[n, 0] = now.time + passed
     rows[n, 1] = now.slip + slipped(now, passed, columns[SPRING], p)
     rows[n, 2], rows[n, 3], rows[n, 4] = columns[LOG_RATE], columns[SPRING], columns[FRICTION]
-    rows[n, 5], rows[n, 6], rows[n, 7] = columns[RATIO], columns[STATE], now.regime
+    rows[n, 5], rows[n, 6], rows[n, 7] = columns[RATIO], columns[STATE], columns[READING]
+    rows[n, RECORDED_REGIME] = now.regime
     for i in range(now.states):
         rows[n, STATES + i] = columns[PSIS + i]
     now.recorded = n + 1

@@ -92,6 +92,14 @@ def attempted(now, room, longest, shortest):
     return 0.0
 
 
+def retake(now, room, clock):
+    """Take the step anew, to a clock within it."""
+    now.end, now.taken, now.is_dense = clock, clock - now.clock, 0
+    room.step[LENGTH] = now.taken
+    evaluate(room.attempt, room.y, room.stages, room.p, room.step)
+    spend(now, STAGES)
+
+
 def unknowns_at(now, room, clock):
     """Fill in the unknowns at a clock within the step."""
     if not now.is_dense:

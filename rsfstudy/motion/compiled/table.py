@@ -62,9 +62,7 @@ BEGIN, CHANGE, END = -1, -2, -3
 
 #: Columns of a point; its states follow.
 LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, UNREST, COEFFICIENT, RATIO = range(10)
-READING_GROWTH, PSIS = 10, 11
-#: What is watched that is no column: the friction coefficient that is read.
-READING = -1
+READING, READING_GROWTH, PSIS = 10, 11, 12
 
 #: Why a call returns: to hand over what it has told; because the motion has ended; because the
 #: regime changes; or because it cannot go on.

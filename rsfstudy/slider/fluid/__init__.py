@@ -6,11 +6,12 @@ and pore pressure is P = (p - p_inf)/sigma_*: no part needs p_inf itself.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.parts import Function, Part, found_in
+from rsfstudy.slider.parts import Function, Numbers, Part, found_in
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,9 +24,24 @@ class Fluid(Part):
     - ``seeped(log_rate, p)``: what they are in steady sliding, where P is 0.
     """
 
+    conclusions = ("highest_pressure",)
+    equations = frozenset({"seepage", "numbers"})
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
     seepage: ClassVar[Function | None] = None
     seeped: ClassVar[Function | None] = None
+
+    def highest_pressure(self, log_rate: float, states: Numbers) -> float:
+        """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_rate`; infinite where
+        none is known.
+
+        Parameters
+        ----------
+        log_rate : float
+            ln(V/V_*).
+        states : tuple of float
+            The unknowns of the fluid now.
+        """
+        return math.inf
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:

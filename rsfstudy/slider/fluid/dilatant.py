@@ -108,6 +108,13 @@ class Dilatant(Fluid):
                 remedy="Give stiffness itself, or raise drainage.",
             )
 
+    def highest_pressure(self, log_rate: float, states: Numbers) -> float:
+        """Pores close by ``V (phi - phi_0 - eps ln(V/V_*))`` at most, which drainage holds at a
+        pressure of that over c*.
+        """
+        closing = max(states[0] - self.dilatancy * log_rate, self.dilatancy)
+        return max(states[1], math.exp(log_rate) * closing / self.drainage)
+
     @property
     def effects(self) -> tuple[str, ...]:
         return ("dilatancy",)

@@ -21,12 +21,6 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-#: What is known of some laws, and what stands for it where it is not.
-_KNOWN: tuple[tuple[str, object], ...] = (
-    ("orbits_close", False),
-    ("scale_free", False),
-    ("stress_left", None),
-)
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
 #: motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
@@ -82,6 +76,8 @@ class LawOfStates(Part):
     )
     regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
 
+    conclusions = ("orbits_close", "scale_free", "stress_left")
+    equations = frozenset({"evolution", "evolutions"})
     #: How many states the law has.
     states: ClassVar[int] = 1
     #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
@@ -101,14 +97,6 @@ class LawOfStates(Part):
     #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
     #: state variable, and its derivative with respect to friction; none for most laws.
     state_effect: ClassVar[Function | None] = None
-
-    def __init_subclass__(cls) -> None:
-        """A law with an evolution of its own does not inherit what is known of another's."""
-        super().__init_subclass__()
-        if {"evolution", "evolutions"} & vars(cls).keys():
-            for name, unknown in _KNOWN:
-                if name not in vars(cls) and getattr(cls, name) != unknown:
-                    setattr(cls, name, unknown)
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:

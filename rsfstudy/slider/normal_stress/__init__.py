@@ -21,6 +21,8 @@ class NormalStress(Part):
     where normal stress is constant.
     """
 
+    conclusions = ("follows_friction", "coupling", "weakest")
+    equations = frozenset({"normal_stress", "state_effect", "numbers"})
     normal_stress: ClassVar[Function | None] = None
 
     @property

@@ -1,0 +1,178 @@
+"""Load point at rest: critical steps where several states may weaken one after the other."""
+
+import contextlib
+import math
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.boundaries import held
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.events import Kind, fall, maximum, rise
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.status import Status
+
+DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"
+CONSTANT = {"normal_stress": "constant"}
+
+#: One state with b < 0, and a dilatant fault whose pressure comes back: the first peak is not the
+#: last.
+LATE = [
+    (
+        DISPLACEMENT,
+        "up",
+        {"law": "two_slip_states", **CONSTANT, "a": 0.01, "b1_over_a": 2.8, "b2_over_a": -0.8,
+         "length_ratio": 0.15, "stiffness_ratio": 1.5},
+    ),
+    (
+        FALL,
+        "down",
+        {"law": "slowness", "normal_stress": "variable", "alpha": 0.0, "phi": 46.0,
+         "mu_star": 0.66, "a": 0.007, "b_over_a": 1.17, "fluid": "dilatant", "dilatancy": 0.011,
+         "drainage": 30.0, "stiffness_ratio": 1.0, "period": 300.0, "reference_rate": 2.6e-8},
+    ),
+]  # fmt: skip
+
+
+def reaches_the_norm(scene: Scene) -> bool:
+    """Whether the motion does, followed without any of what ends it early."""
+    norm = scene.log_norm_rate
+    watches = (rise("log_rate", norm, ends=True), fall("spring", -scene.mu_star, ends=True))
+    # slip that dies out, or that decays for ever
+    with contextlib.suppress(Halt):
+        meter = Meter(20_000, engine=COMPILED)
+        for event in follow(scene, Accuracy(1e-8, engine=COMPILED), meter, watches):
+            if event.kind is Kind.RISE or event.point.log_rate >= norm:
+                return True
+    return False
+
+
+@pytest.mark.parametrize("engine", ["scipy", COMPILED])
+@pytest.mark.parametrize(("of", "direction", "fields"), LATE)
+def test_the_first_peak_of_several_states_is_not_the_last(of, direction, fields, engine):
+    scene = Scene(**fields)
+    outcome = CriticalStep(of=of, direction=direction)(scene, Accuracy(1e-5, engine=engine))
+    assert outcome.status is Status.OK
+    stepped = scene.with_(load_velocity_ratio=0.0)
+    critical = outcome.values[CriticalStep(of=of).headline]
+    for share, reaches in ((0.25, False), (0.9, False), (0.9999, False), (1.0001, True)):
+        at = stepped.with_(**{of: share * critical})
+        assert reaches_the_norm(at) is reaches
+        triggered = Triggered()(at, Accuracy(1e-5, engine=engine))
+        assert triggered.values["unstable"] == reaches
+
+
+def random_scene(draw: np.random.Generator, number: int) -> tuple[str, str, dict[str, object]]:
+    """A kind of step, its direction, and the fields of a scene of several states."""
+    fields = {
+        "a": 10 ** draw.uniform(-2.5, -1.7),
+        "mu_star": draw.uniform(0.4, 0.8),
+        "stiffness_ratio": draw.uniform(0.7, 3.0),
+        "period": 10 ** draw.uniform(-1.0, 2.5),
+        "reference_rate": 10 ** draw.uniform(-9.0, -6.0),
+    }
+    fall_of_stress = number % 4 == 3
+    if fall_of_stress or number % 2:
+        fields |= {"normal_stress": "imposed", "alpha": draw.uniform(0.0, 0.4)}
+    else:
+        fields |= CONSTANT
+    if number % 3 == 2:
+        law = ("slip", "slowness")[number % 2]
+        fields |= {"law": law, "b_over_a": draw.uniform(1.1, 3.0), "fluid": "dilatant"}
+        fields |= {"dilatancy": 10 ** draw.uniform(-4.0, -1.7)}
+        fields |= {"drainage": 10 ** draw.uniform(-3.0, 3.0)}
+    else:
+        law = ("two_slip_states", "two_slowness_states")[number % 2]
+        fields |= {"law": law, "length_ratio": 10 ** draw.uniform(-1.0, 1.0)}
+        fields |= {"b1_over_a": draw.uniform(1.3, 3.0), "b2_over_a": draw.uniform(-0.9, 0.9)}
+    return (FALL, "down", fields) if fall_of_stress else (DISPLACEMENT, "up", fields)
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_no_smaller_step_runs_away(number):
+    """Of random scenes, followed without any of what ends a motion early."""
+    of, direction, fields = random_scene(np.random.default_rng([20, number]), number)
+    measure = CriticalStep(of=of, direction=direction)
+    try:
+        scene = Scene(**fields)
+    except ValueError as refused:
+        assert "no critical stiffness" in str(refused)  # noqa: PT017
+        return
+    outcome = measure(scene, Accuracy(1e-4, engine=COMPILED))
+    stepped = scene.with_(load_velocity_ratio=0.0)
+    if outcome.status is Status.STABLE_FOR_ALL_STEPS:
+        largest = outcome.values[f"{measure.headline}_stable"]
+        assert not any(reaches_the_norm(stepped.with_(**{of: s * largest})) for s in (0.3, 1.0))
+        return
+    assert outcome.status is Status.OK
+    critical = outcome.values[measure.headline]
+    for share in (0.25, 0.5, 0.8, 0.97, 1.02):
+        reaches = reaches_the_norm(stepped.with_(**{of: share * critical}))
+        assert reaches is (share > 1.0)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("drainage", [0.01, 1.0, 100.0])
+def test_pore_pressure_stays_below_its_bound(law, drainage):
+    """It comes as close as the pressure that drainage lets slip build up."""
+    scene = Scene(law=law, **CONSTANT, fluid="dilatant", drainage=drainage, dilatancy=0.01,
+                  stiffness_ratio=2.0, displacement_step=0.5, load_velocity_ratio=0.0)  # fmt: skip
+    points = [
+        event.point
+        for event in follow(
+            scene,
+            Accuracy(1e-6, engine=COMPILED),
+            Meter(20_000, engine=COMPILED),
+            (maximum("log_rate"), *(fall("log_rate", -float(x), ends=x == 4) for x in range(5))),
+        )
+    ]
+    assert len(points) > 4
+    bound = scene.parts.fluid.highest_pressure
+    for now, point in enumerate(points):
+        to_come = points[now:]
+        highest = max(later.log_rate for later in to_come)
+        told = bound(highest, point.psis[1:])
+        assert max(later.psis[-1] for later in to_come) <= told * (1.0 + 1e-6)
+    # slip rate falls slowly against drainage at last: pressure is then in balance
+    last = points[-1]
+    if drainage > 10.0:
+        assert bound(last.log_rate, last.psis[1:]) == pytest.approx(last.psis[-1], rel=0.05)
+
+
+def test_states_that_weaken_as_slip_rate_falls_prove_nothing():
+    """With b < 0 a state rests lower at lower slip rate; with two positive ones all is over as soon
+    as both strengthen.
+    """
+    ends = {}
+    for second in (0.8, -0.8):
+        scene = Scene(law="two_slip_states", **CONSTANT, b1_over_a=2.8, b2_over_a=second,
+                      length_ratio=0.15, stiffness_ratio=1.5, displacement_step=0.05,
+                      load_velocity_ratio=0.0)  # fmt: skip
+        watches = tuple(fall("log_rate", x, ends=x == -20.0) for x in (-5.0, -20.0))
+        meter = Meter(20_000, engine=COMPILED)
+        events = list(follow(scene, Accuracy(1e-6, engine=COMPILED), meter, watches))
+        ends[second] = [held._stays_below_norm(scene, event.point) for event in events[1:]]
+    assert ends == {0.8: [True, True], -0.8: [False, False]}
+
+
+@pytest.mark.parametrize("stiffness_ratio", [1e3, 1e6])
+@pytest.mark.parametrize("of", ["load_velocity_ratio", DISPLACEMENT])
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_springs_far_stiffer_than_critical_end_in_a_status(stiffness_ratio, of, direction):
+    """They follow the load point: a displacement step is critical that takes ln V to the norm by
+    itself, and the closed form for k = k_cr leads beyond the largest number.
+    """
+    scene = Scene(**CONSTANT, stiffness_ratio=stiffness_ratio)
+    measure = CriticalStep(of=of, direction=direction)
+    outcome = measure(scene, Accuracy(1e-4, budget=3_000, engine=COMPILED))
+    if of == DISPLACEMENT and direction == "up":
+        jump = scene.a * scene.log_norm_rate / scene.stiffness
+        assert outcome.values["critical_displacement"] == pytest.approx(jump, rel=1e-8)
+        assert outcome.values["slip_rate_after_closed_form_step"] == math.inf
+    else:
+        assert outcome.status in (Status.STABLE_FOR_ALL_STEPS, Status.WORK_BUDGET_SPENT)

@@ -1,0 +1,280 @@
+"""A quantity is one number and one unit, with or without pint: any other text is refused."""
+
+import math
+import re
+import sys
+from unittest import mock
+
+import numpy as np
+import pint
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from running import called
+
+from rsfstudy import Laboratory, assignments, read_protocol
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.units import _KNOWN, factor, in_si
+
+RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "value"),
+    [
+        ("5 MPa", "Pa", 5e6),
+        ("0.3GPa", "Pa", 3e8),
+        ("12 bar", "Pa", 1.2e6),
+        ("10 um", "m", 1e-5),
+        ("10 \u00b5m", "m", 1e-5),
+        ("1e-3 um/s", "m/s", 1e-9),
+        ("1 um s-1", "m/s", 1e-6),
+        ("35 mm/year", "m/s", 35e-3 / (365.25 * 86400.0)),
+        ("0.05 MPa/um", "Pa/m", 5e10),
+        ("2 min", "s", 120.0),
+        ("0.1 1/s", "1/s", 0.1),
+        ("2e3 kg/m^2", "kg/m^2", 2e3),
+        ("2700 kg*m**-3", "kg/m^3", 2700.0),
+        ("3", "1", 3.0),
+        (7.5, "Pa", 7.5),
+        (np.float64(2.0), "m", 2.0),
+    ],
+)
+def test_usual_units(text, units, value):
+    assert in_si("x", text, units) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "units", "complaint"),
+    [
+        ("5 MPa", "m", "x = '5 MPa': has units of another kind than m. Give it in m"),
+        ("5", "Pa", "has units of another kind than Pa"),
+        ("MPa", "Pa", "x = 'MPa': is no quantity. Write a number and its units"),
+        ("nan MPa", "Pa", "must be finite"),
+        (math.inf, "Pa", "must be finite"),
+        (True, "Pa", "True: is no quantity"),
+        (None, "Pa", "None: is no quantity"),
+    ],
+)
+def test_what_is_no_quantity(value, units, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        in_si("x", value, units)
+
+
+def test_other_units_need_pint(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pint", None)
+    with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
+        in_si("normal_stress", "725 psi", "Pa")
+
+
+def test_quantities_of_pint():
+    registry = pint.get_application_registry()
+    assert in_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
+    assert in_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
+    assert in_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
+    with pytest.raises(InvalidValue, match="another kind than m"):
+        in_si("x", registry.Quantity(3.0, "MPa"), "m")
+    with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
+        in_si("x", "3 bananas", "m")
+
+
+#: Units of stress, of those known here and of those that pint knows.
+STRESSES = ("Pa", "kPa", "MPa", "bar", "kg/m/s^2", "kg*m**-1*s-2", "MPa m/mm", "MPa s / s")
+OF_PINT = ("psi", "inH2O", "N/m^2", "percent MPa", "mPa", "psi um/um")
+#: What has been read as a product of its numbers, ended in a traceback, or never ended.
+WRONG = (
+    "2,5 MPa", "2 5 MPa", "25 MPa 3", "2 MPa!", "2*3 MPa", "1 kPa^999", "5 9**9**9**9",
+    "5 MPa^(9**9**9)", "5 MPa**9**9", "1_000 Pa", "0x1F Pa", "0b1 Pa", "0xF Pa", "\u0665 Pa",
+    "\uff15 MPa", "\u22125 MPa", "5 MPa^1.0", "5 + 3 MPa", "--5 MPa", "5 MPa/", "5 //Pa", "5 * Pa",
+    "5 MPa/m s m/s", "5 1 MPa", "3 1", "5", "", "MPa", "nan MPa", "-inf Pa", "1e999 Pa",
+    "1 MPa +/- 1 MPa", "(5+/-1) MPa", "5 dB MPa", "1.5.2 Pa", "5 nan Pa", "5 Pa; 3",
+)  # fmt: skip
+
+
+def read(text):
+    """What a text of stress is in Pa, or None where it is refused."""
+    try:
+        return in_si("x", text, "Pa")
+    except InvalidValue:
+        return None
+
+
+def read_without_pint(text):
+    with mock.patch.dict(sys.modules, {"pint": None}):
+        return read(text)
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_not_one_number_and_one_unit_is_refused(text):
+    assert (read(text), read_without_pint(text)) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "units"), [("1,4", "1"), ("1,5 s", "s"), ("3 1", "1"), ("5 dB", "1"), ("0 dB", "1")]
+)
+def test_dimensionless_numbers_and_times_too(text, units):
+    with pytest.raises(InvalidValue):
+        in_si("x", text, units)
+
+
+def test_numbers_without_bound_are_refused():
+    with pytest.raises(InvalidValue, match="must be finite"):
+        in_si("x", 10**400, "Pa")
+    with pytest.raises(InvalidValue, match="must be one number"):
+        in_si("x", pint.get_application_registry().Quantity([1.0, 2.0], "Pa"), "Pa")
+
+
+@pytest.mark.parametrize("name", sorted(_KNOWN))
+def test_units_that_both_know_are_the_same(name):
+    """But for the roundings of pint on its way to base units, a few of 1.1e-16."""
+    registry = pint.get_application_registry()
+    quantity = registry.Quantity(1.0, registry.parse_units(name)).to_base_units()
+    size, exponents = _KNOWN[name]
+    assert quantity.magnitude == pytest.approx(size, rel=1e-15)
+    of = {"[mass]": exponents[0], "[length]": exponents[1], "[time]": exponents[2]}
+    assert dict(quantity.dimensionality) == {n: e for n, e in of.items() if e}
+
+
+NUMBERS = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False).map(repr),
+    st.integers(-(10**20), 10**20).map(str),
+    st.sampled_from(["5.", ".5", "+1e3", "1E-3", "007", "-0"]),
+)
+
+
+@given(NUMBERS, st.sampled_from(["", " ", "  ", "\t", "\u00a0"]), st.sampled_from(STRESSES))
+def test_a_number_times_the_factor_of_the_unit(number, between, unit):
+    """To the last bit, with pint and without."""
+    expected = float(number) * factor("x", unit, "Pa")
+    text = f" {number}{between}{unit} "
+    wanted = expected if math.isfinite(expected) else None
+    assert (read(text), read_without_pint(text)) == (wanted, wanted)
+
+
+@given(NUMBERS, st.sampled_from(OF_PINT))
+def test_of_units_that_pint_alone_knows_too(number, unit):
+    expected = float(number) * factor("x", unit, "Pa")
+    text = f"{number} {unit}"
+    assert read(text) == (expected if math.isfinite(expected) else None)
+    assert read_without_pint(text) is None
+
+
+#: Nearly quantities, and anything at all.
+ODD = ("**", "1e3", "nan", "inf", "per", "0x", "e-3", "dB", "degC", "s-1", "m", "um")
+PIECES = st.sampled_from(
+    [*STRESSES, *OF_PINT, *ODD, *"0123456789.,:;_+-*/^!()[]%e xE\t\u00b2\u0665\u22c5\u00b7"]
+)
+TEXTS = st.one_of(
+    st.lists(PIECES, max_size=6).map("".join),
+    st.builds("{} {}{}".format, NUMBERS, st.sampled_from(STRESSES + OF_PINT), PIECES),
+    st.builds("{}{} {}".format, NUMBERS, PIECES, st.sampled_from(STRESSES + OF_PINT)),
+    st.text(max_size=12),
+)
+#: Numbers in the text of a unit: none but one at the beginning that is divided, and whole powers.
+_PLAIN_POWERS = re.compile(r"(?<=[A-Za-z\u00b5\u03bc])(\^|\*\*)?[-+]?[1-9](?![0-9.])")
+
+
+@settings(max_examples=500, suppress_health_check=[HealthCheck.too_slow])
+@given(TEXTS)
+@example("5 kg/m/s^2")
+@example("5 psi*m/m")
+def test_any_text_is_one_number_times_a_factor_or_refused(text):
+    found, without = read(text), read_without_pint(text)
+    assert without in (None, found)
+    if found is None:
+        return
+    begins = [n for n in range(1, len(text) + 1) if _is_number(text[:n])]
+    number, unit = text[: begins[-1]], text[begins[-1] :].strip()
+    assert found == float(number) * factor("x", unit, "Pa")
+    rest = _PLAIN_POWERS.sub("", unit.removeprefix("1") if unit[1:].lstrip()[:1] == "/" else unit)
+    assert not re.search(r"(?<![A-Za-z])\d|[,;:!_+()\[\]%-]", rest), text
+
+
+def _is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# ---- where texts come in -------------------------------------------------------------------------
+
+THREE = ["--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s"]
+NO_RIG: list[str] = []
+
+
+@pytest.mark.parametrize("rig", [THREE, NO_RIG])
+@pytest.mark.parametrize(
+    "wrong", ["b_over_a=1,4", "a=0.01,0.02", "a=0.01:0.02:3", "b_over_a=1_4", "b_over_a=\u0661"]
+)
+def test_a_field_of_one_scene_is_one_number(rig, wrong, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, said = called(["simulate", "--duration", "1", "--set", wrong, *rig])
+    name, _equals, value = wrong.partition("=")
+    assert code == 2
+    assert f"{name} = {value!r}" in said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--normal-stress", "2,5 MPa"],
+        ["--stiffness", "1e5 MPa 3/m"],
+        ["--duration", "1,5 s"],
+        ["--duration", "1_0"],
+        ["--set", "hold_time=1,5 s"],
+    ],
+)
+def test_options_of_a_rig_are_one_quantity(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, said = called(["simulate", *THREE, *words])
+    assert code == 2, said
+    assert "is no quantity" in " ".join(said.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("text", ["1_0", "\u0661"])
+def test_values_of_an_axis_are_numbers_of_one_spelling(text):
+    """Python's own reading takes 1_0 for 10, and digits of any script."""
+    assert assignments.setting(f"a={text}", ()) == ("a", text)  # which no number field takes
+    for spaced in (f"{text}:20:3", f"1:{text}:3", f"1:20:{text}"):
+        with pytest.raises(InvalidValue, match="must read start:stop:count"):
+            assignments.setting(f"a={spaced}", ())
+
+
+def test_values_of_an_axis_that_are_numbers():
+    assert assignments.setting("a=1e-2", ()) == ("a", 0.01)
+    assert assignments.setting("a=1,+2.5,.5", ()) == ("a", [1.0, 2.5, 0.5])
+    assert assignments.setting("a=1:3: 3", ()) == ("a", [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("record", "complaint"),
+    [
+        ("velocity (um/s), duration (9**9**9**9)\n1, 5\n", "duration = '5 9.*is no quantity"),
+        ("velocity (um/s), duration (2 s)\n1, 5\n", "duration = '5 2 s': is no quantity"),
+        ("velocity (um/s), duration ()\n1, 5\n", "another kind than s"),
+        ("velocity (um/s)\n1_0\n", "velocity = '1_0': is no number"),
+        ("velocity (um/s)\n\u0661\n", "is no number"),
+        ('velocity (um/s)\n"1,5"\n', "velocity = '1,5': is no number"),
+        ("velocity (um/s), velocity (mm/s)\n1, 5\n", "velocity'?: stands twice in the header"),
+    ],
+)
+def test_fields_of_a_file_are_one_number_in_one_unit(tmp_path, record, complaint):
+    path = tmp_path / "test.csv"
+    path.write_text(record)
+    with pytest.raises(InvalidValue, match=complaint):
+        read_protocol(path, RIG)
+
+
+def test_long_texts_are_read_in_linear_time(tmp_path):
+    """Cubic time would be 10^14 steps, and never end."""
+    path, blanks = tmp_path / "test.csv", " " * 50_000
+    for header in (f"velocity ({blanks}x", f"velocity{blanks}x", f"{blanks}velocity (um/s{blanks}"):
+        path.write_text(f"{header}\n1\n")
+        with pytest.raises(InvalidValue, match="names no column"):
+            read_protocol(path, RIG)
+    for text in (f"5 Pa{blanks}!", "1" * 50_000 + "!", "5 " + "m" * 50_000 + "!"):
+        assert read(text) is None
