@@ -98,17 +98,9 @@ def test_no_smaller_step_runs_away(number):
     """Of random scenes, followed without any of what ends a motion early."""
     of, direction, fields = random_scene(np.random.default_rng([20, number]), number)
     measure = CriticalStep(of=of, direction=direction)
-    try:
-        scene = Scene(**fields)
-    except ValueError as refused:
-        assert "no critical stiffness" in str(refused)  # noqa: PT017
-        return
+    scene = Scene(**fields)
     outcome = measure(scene, Accuracy(1e-4, engine=COMPILED))
     stepped = scene.with_(load_velocity_ratio=0.0)
-    if outcome.status is Status.STABLE_FOR_ALL_STEPS:
-        largest = outcome.values[f"{measure.headline}_stable"]
-        assert not any(reaches_the_norm(stepped.with_(**{of: s * largest})) for s in (0.3, 1.0))
-        return
     assert outcome.status is Status.OK
     critical = outcome.values[measure.headline]
     for share in (0.25, 0.5, 0.8, 0.97, 1.02):
