@@ -33,6 +33,13 @@ OK, FAILED = 0, 1
 _MOST_SHOWN = 40
 #: Characters of a number, as `short` writes it.
 _A_NUMBER = 10
+#: What is told of a slope, by the ends of names: headings and formats.
+_OF_SLOPES = {
+    "stderr": ("standard error", ".2g"),
+    "misfit": ("largest misfit", ".2g"),
+    "points": ("points", ".0f"),
+    "error": ("numerical error", ".2g"),
+}
 
 
 def declaration(study: Study, output: Path) -> None:
@@ -214,32 +221,28 @@ def _reductions(dataset: xr.Dataset) -> None:
     """Slopes and their like: reductions with a standard error, one row for each point of their
     dimensions.
     """
-    made = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
-    beside = ("stderr", "misfit", "points")
-    for slope in made:
-        names = [slope, *(f"{slope}_{end}" for end in beside)]
-        if not set(names) <= set(dataset.data_vars):
-            continue  # of another kind, or a notebook left some out
-        frame = dataset[names]
-        rows = frame.to_dataframe().reset_index()
+    for slope in (reduction["name"] for reduction in contents.declaration(dataset).reductions):
+        if not {slope, f"{slope}_stderr"} <= set(dataset.data_vars):
+            continue  # of another kind, or a notebook left it out
+        told = {n: about for end, about in _OF_SLOPES.items() if (n := f"{slope}_{end}") in dataset}
         places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
-        numbers = (slope, "standard error", "largest misfit", "points")
-        widths = (_A_NUMBER, len("1.0e-05"), len("1.0e-05"), len("points"))
+        beside = [
+            Column(heading, overflow="fold", min_width=len("1.0e-05"))
+            for heading, _form in told.values()
+        ]
         table = Table(
             *places,
-            *(
-                Column(n, overflow="fold", min_width=w)
-                for n, w in zip(numbers, widths, strict=True)
-            ),
+            Column(slope, overflow="fold", min_width=_A_NUMBER),
+            *beside,
             box=box.SIMPLE_HEAD,
             title=dataset[slope].attrs.get("comment", slope),
             title_justify="left",
         )
-        wanted = [*dataset[slope].dims, *names]
-        for *place, value, error, misfit, points in rows[wanted].itertuples(index=False):
-            table.add_row(
-                *map(short, place), short(value), f"{error:.2g}", f"{misfit:.2g}", str(points)
-            )
+        frame = dataset[[slope, *told]].to_dataframe().reset_index()
+        for row in frame[[*dataset[slope].dims, slope, *told]].itertuples(index=False):
+            first = len(places) + 1
+            forms = (form for _heading, form in told.values())
+            table.add_row(*map(short, row[:first]), *map(format, row[first:], forms))
         console.print(table)
 
 

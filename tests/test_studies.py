@@ -142,6 +142,16 @@ def test_every_number_carries_status_error_and_work(result):
     assert "status" in dataset[headline].attrs["ancillary_variables"]
 
 
+def test_what_is_reduced_carries_the_errors_of_its_cells(result):
+    """A number has an error wherever what it was made of has."""
+    dataset, path = result
+    for reduction in catalogue.load(path.stem).reductions:
+        if reduction.name not in dataset or f"{reduction.of}_error" not in dataset:
+            continue
+        error = dataset[f"{reduction.name}_error"]
+        assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
+
+
 def test_a_plot_outside_of_the_package_is_never_imported(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "os"

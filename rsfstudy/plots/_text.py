@@ -6,6 +6,7 @@ import math
 import re
 from typing import Any
 
+import xarray as xr
 from matplotlib.mathtext import MathTextParser
 
 from rsfstudy.quantity import Quantity
@@ -96,7 +97,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def with_error(value: float, error: float, most: int | None = None) -> str:
-    """A value and its standard error, to the first digit of the error; the value alone where the
+    """A value and its error, to the first digit of the error; the value alone where the
     error is too small to show in at most so many digits behind the point.
     """
     if not math.isfinite(value) or not math.isfinite(error):
@@ -105,6 +106,12 @@ def with_error(value: float, error: float, most: int | None = None) -> str:
         return f"${value:.{most}f}$"
     digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
     return rf"${value:.{digits}f} \pm {error:.{digits}f}$"
+
+
+def slope_with_error(row: xr.Dataset, name: str, most: int | None = None) -> str:
+    """A slope `with_error`: its standard error, which tells of misfit, and the numerical one."""
+    numerical = float(row[f"{name}_error"]) if f"{name}_error" in row else 0.0
+    return with_error(float(row[name]), float(row[f"{name}_stderr"]) + numerical, most)
 
 
 def stiffness(ratio: float) -> str:

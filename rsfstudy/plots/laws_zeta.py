@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from rsfstudy.plots._laws import shade
 from rsfstudy.plots._style import legend, marker
-from rsfstudy.plots._text import with_error
+from rsfstudy.plots._text import slope_with_error
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -32,9 +32,10 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
             colour = shade(float(exponent) / largest)
             label = rf"{stress}, $\epsilon$ = {exponent:g}"
             if "zeta" in row:
-                zeta, error = float(row["zeta"]), float(row["zeta_stderr"])
-                axes.plot(reach, 1.0 + zeta * reach, style, color=colour, linewidth=0.9)
-                label += rf": $\zeta$ = {with_error(zeta, error, 4)}"
+                axes.plot(
+                    reach, 1.0 + float(row["zeta"]) * reach, style, color=colour, linewidth=0.9
+                )
+                label += rf": $\zeta$ = {slope_with_error(row, 'zeta', 4)}"
             points = {"color": colour, "fillstyle": fill, "linestyle": "none"}
             axes.plot(
                 x, row["critical_velocity_ratio"], marker=marker(number), label=label, **points

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots._style import legend, look, marker
-from rsfstudy.plots._text import pretty, stiffness, with_error
+from rsfstudy.plots._text import pretty, slope_with_error, stiffness
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -28,9 +28,8 @@ def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
         style = look(number)
         text = pretty(case)
         if "zeta" in row:
-            text += rf": $\zeta$ = {with_error(float(row['zeta']), float(row['zeta_stderr']))}"
-            fitted = 1.0 + float(row["zeta"]) * reach
-            axes.plot(reach, fitted, **style, linewidth=0.9)
+            text += rf": $\zeta$ = {slope_with_error(row, 'zeta')}"
+            axes.plot(reach, 1.0 + float(row["zeta"]) * reach, **style, linewidth=0.9)
         axes.errorbar(
             x,
             row["critical_velocity_ratio"],

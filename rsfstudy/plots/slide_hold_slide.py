@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from rsfstudy.plots import Panel
 from rsfstudy.plots._axes import log_scale, same_height
 from rsfstudy.plots._style import legend, look, marker
-from rsfstudy.plots._text import number, pretty, with_error
+from rsfstudy.plots._text import number, pretty, slope_with_error
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import quantity
 
@@ -84,7 +84,7 @@ def draw_rate(dataset: xr.Dataset, axes: Axes) -> Axes:
     for case in range(dataset.sizes["case"]):
         row = dataset.isel(case=case)
         rate, error = row["healing_per_decade"], row["healing_per_decade_stderr"]
-        last = with_error(float(rate[-1]), float(error[-1]), 5)
+        last = slope_with_error(row.isel(stiffness=-1), "healing_per_decade", 5)
         label = f"{_case(row)}: {last}"
         x = row["stiffness"] / row["a"]
         axes.errorbar(x, rate, error, marker=marker(case), label=label, **look(case))

@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.plots._style import legend, look, marker
-from rsfstudy.plots._text import pretty, stiffness, with_error
+from rsfstudy.plots._text import pretty, slope_with_error, stiffness
 from rsfstudy.vocabulary import quantity
 
 #: Dimensions the figure has room for.
@@ -65,8 +65,7 @@ def _slope(row: xr.Dataset, drop: str) -> tuple[float, str]:
         return np.nan, ""
     if not bool(_is_straight(row, drop)):
         return np.nan, ": no line fits"
-    slope = float(row[name])
-    return slope, f": {with_error(slope, float(row[f'{name}_stderr']))}"
+    return float(row[name]), f": {slope_with_error(row, name)}"
 
 
 def _is_straight(dataset: xr.Dataset, drop: str) -> xr.DataArray:

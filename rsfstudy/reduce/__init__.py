@@ -2,7 +2,8 @@
 
 A reduction never draws on failed or missing cells: where there are any within its support, the
 result is NaN and says why, unless it is told to leave the failed ones out. Cells that answered
-without a number (such as `stable_for_all_steps`) are left out, and counted.
+without a number (such as `stable_for_all_steps`) are left out, and counted. Numerical errors of
+cells are carried to what is made of them (`rsfstudy.reduce.carried`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
+from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.covered import Covered
 from rsfstudy.reduce.edges import CyclingEdge
@@ -40,6 +42,9 @@ __all__ = [
     "reduced",
 ]
 
+#: What tells of the quality of a result, by the ends of their names.
+_BESIDE = ("error", "stderr", "misfit", "points")
+
 
 def reduced(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
@@ -60,7 +65,8 @@ def reduced(
         support = without_failures(dataset) if despite else dataset
         own = worst(support["status"], support[reduction.of].dims)
         support = known(support, reduction.of, drawn.get(reduction.of, own))
-        made, stated = reduction(support), {q.name: q for q in reduction.quantities}
+        made = carried(reduction, support, reduction(support))
+        stated = {q.name: q for q in reduction.quantities}
         _check_new(reduction, made, dataset)
         for name, values in made.data_vars.items():
             drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
@@ -69,6 +75,8 @@ def reduced(
             about = _about(quantity(str(name), stated_by(dataset) | stated), values)
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
+            if beside := [n for end in _BESIDE if (n := f"{name}_{end}") in made]:
+                about["ancillary_variables"] = " ".join(beside)
             values.attrs = {**about, **despite}
             dataset = dataset.assign({name: values})
             for coordinate in values.dims:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -15,6 +15,9 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES
 
 Data = TypeVar("Data", xr.Dataset, xr.DataArray)
+
+#: Derivatives of a result by cells, each with the place of those on some dimensions.
+Derivatives = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
 ROUNDING = 1e-9
@@ -39,6 +42,15 @@ class Reduction:
         `worst` removes the dimensions that the results do not have.
         """
         return status
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """Derivatives of the result `name` by the cells that it draws on, 0 by those that have no
+        number; none where the errors of cells do not carry over.
+
+        Each is by the cells at the result's own place, or at the place on some dimensions that
+        comes with it; along dimensions that the result does not have, by each of the cells.
+        """
+        return ()
 
     @property
     def quantities(self) -> Sequence[Quantity]:

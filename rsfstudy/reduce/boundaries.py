@@ -10,14 +10,18 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
+from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, failed, refused
+
+#: Change of ln(value) by which derivatives of an interpolant are taken.
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Boundary(Reduction):
     """Boundary between the points of a coordinate whose cells say no and those that say yes.
 
-    Nothing is interpolated: cells that answer yes or no bracket the boundary, and no more.
+    Nothing is interpolated: cells that answer yes or no bracket the boundary, and no more. A cell
+    nearer to the level than its numerical error does not say which.
 
     Parameters
     ----------
@@ -40,7 +44,8 @@ class Boundary(Reduction):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Bracket the boundary along the dimension of `on`, for each point of the others.
 
-        Failed cells refuse their row; cells that answered without a number are left out.
+        Failed cells refuse their row; cells that answered without a number, or without saying yes
+        or no, are left out.
 
         Raises
         ------
@@ -49,6 +54,8 @@ class Boundary(Reduction):
         """
         dimension = dimension_of(dataset, self.on)
         values = dataset[self.of].where(~refused(dataset, self.of, dimension))
+        if f"{self.of}_error" in dataset:
+            values = values.where(~(abs(values - self.level) <= dataset[f"{self.of}_error"]))
         edges = xr.apply_ufunc(
             self._bracket,
             values,
@@ -99,7 +106,8 @@ class Inverse(Reduction):
     ----------
     name : str
         Name of the result; ``<name>_error`` comes with it: what the uncertainty of the level does,
-        and how far interpolants through the neighbours on either side are from the result.
+        how far interpolants through the neighbours on either side are from the result, and what the
+        numerical errors of the cells make of it.
     of : str
         Variable that reaches the level; positive.
     on : str
@@ -142,12 +150,27 @@ class Inverse(Reduction):
             vectorize=True,
         )
         note = f"{self.on} at which {self.of} reaches {self.levels}"
+        missed = "what interpolants through other points, and the uncertainty of the level, change"
         return xr.Dataset(
             {
                 self.name: crossing.assign_attrs(comment=note),
-                f"{self.name}_error": error.assign_attrs(comment=note),
+                f"{self.name}_error": error.assign_attrs(comment=missed),
             }
         )
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """Those of the interpolant by its points, over its slope."""
+        dimension = dimension_of(dataset, self.on)
+        by_cells = xr.apply_ufunc(
+            _moved,
+            dataset[self.of],
+            dataset[self.on].astype(float),
+            self._labelled(dataset, self.levels),
+            input_core_dims=[[dimension], [dimension], []],
+            output_core_dims=[[dimension]],
+            vectorize=True,
+        )
+        return [(by_cells, {})]
 
     def _labelled(self, dataset: xr.Dataset, values: float | Mapping[str, float]) -> xr.DataArray:
         if not isinstance(values, Mapping):
@@ -163,14 +186,29 @@ class Inverse(Reduction):
 def _inverse(
     values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float]:
-    known = np.isfinite(values) & (values > 0.0) & (on > 0.0)
-    x, y = _ascending(np.log(on[known]), np.log(values[known]))
+    x, y, _places = _logarithms(values, on)
     if np.isnan(level) or level <= 0.0 or x.size < 4:
         return np.nan, np.nan
     fine = _reaches(x, y, np.log(level))
     ends = [_reaches(x, y, np.log(level) + d) for d in (-uncertainty, uncertainty)]
     error = _unseen(x, y, np.log(level), fine) + float(np.max(np.abs(fine - np.array(ends))))
     return float(np.exp(fine)), float(np.exp(fine) * error)
+
+
+def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
+    """Derivatives of the place where the level is reached by all values; 0 where there is none."""
+    x, y, places = _logarithms(values, on)
+    slopes = np.zeros(values.size)
+    if np.isnan(level) or level <= 0.0 or x.size < 4:
+        return slopes
+    fine = _reaches(x, y, np.log(level))
+    if np.isnan(fine):
+        return slopes
+    # each value moved in turn: the interpolant is smooth in them, but for kinks
+    moved = PchipInterpolator(x, y + _STEP * np.eye(x.size), axis=1)(fine)
+    rise = float(PchipInterpolator(x, y)(fine, 1))
+    slopes[places] = (moved - np.log(level)) / _STEP / rise * np.exp(fine) / values[places]
+    return slopes
 
 
 def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
@@ -204,6 +242,13 @@ def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
     """Where the interpolant through the points reaches the level; NaN unless at one place only."""
     roots = PchipInterpolator(x, y).solve(level, extrapolate=False)
     return float(roots[0]) if len(roots) == 1 else np.nan
+
+
+def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Logarithms of the coordinate, ascending, and of the values; and which points they are of."""
+    places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (on > 0.0))
+    places = places[np.argsort(on[places])]
+    return np.log(on[places]), np.log(values[places]), places
 
 
 def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,10 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
 from rsfstudy.slider.closed_forms import FORMS
 
 
@@ -38,6 +39,12 @@ class _Against(Reduction):
         """The comparison."""
         raise TypeError(f"{type(self).__name__} compares nothing")
 
+    def slopes(
+        self, values: xr.DataArray, reference: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
+        """Derivatives of the comparison by the value and by the reference."""
+        raise TypeError(f"{type(self).__name__} compares nothing")
+
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """The point itself and the reference: where one failed, there is nothing to compare."""
         reference = status.sel({self.along: self.reference}, drop=True)
@@ -53,6 +60,15 @@ class _Against(Reduction):
         note = self.formula.format(of=self.of, reference=f"its value at {place}")
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """By the cell and by the reference; where they are one, the result is the same whatever it
+        is.
+        """
+        values, place = dataset[self.of], {self.along: self.reference}
+        own, others = self.slopes(values, values.sel(place, drop=True))
+        apart = dataset[self.along] != self.reference
+        return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
+
 
 @dataclass(frozen=True)
 class RelativeDifference(_Against):
@@ -65,6 +81,12 @@ class RelativeDifference(_Against):
         """1 - of/of_reference."""
         return 1.0 - values / reference
 
+    def slopes(
+        self, values: xr.DataArray, reference: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
+        """-1/of_reference and of/of_reference^2."""
+        return -xr.ones_like(values) / reference, values / reference**2
+
 
 @dataclass(frozen=True)
 class Difference(_Against):
@@ -76,6 +98,12 @@ class Difference(_Against):
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """Of - of_reference."""
         return values - reference
+
+    def slopes(
+        self, values: xr.DataArray, reference: xr.DataArray
+    ) -> tuple[xr.DataArray, xr.DataArray]:
+        """1 and -1."""
+        return xr.ones_like(values), -xr.ones_like(values)
 
 
 @dataclass(frozen=True)
@@ -104,8 +132,7 @@ class OverClosedForm(Reduction):
         form = FORMS[self.form]
         if not all(name in dataset.coords for name in form.fields):
             return xr.Dataset()
-        fields = [dataset[name].astype(float) for name in form.fields]
-        exact = xr.apply_ufunc(form.value, *fields, vectorize=True)
+        exact = self._exact(dataset)
         note = f"{form.text}: {form.source}"
         return xr.Dataset(
             {
@@ -115,6 +142,16 @@ class OverClosedForm(Reduction):
                 f"{self.name}_closed_form": exact.assign_attrs(comment=note),
             }
         )
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """One over the closed form."""
+        return [(1.0 / self._exact(dataset), {})]
+
+    def _exact(self, dataset: xr.Dataset) -> xr.DataArray:
+        form = FORMS[self.form]
+        fields = [dataset[name].astype(float) for name in form.fields]
+        exact: xr.DataArray = xr.apply_ufunc(form.value, *fields, vectorize=True)
+        return exact
 
 
 @dataclass(frozen=True)
@@ -159,3 +196,14 @@ class Spread(Reduction):
                 f"{self.name}_points": answered.astype("int32").assign_attrs(comment=note),
             }
         )
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """By the cells that, within their errors, may be the largest and the smallest."""
+        dimension = dimension_of(dataset, self.on)
+        support = within(dataset, self.on, self.within)
+        values, errors = support[self.of], support[f"{self.of}_error"]
+        number = xr.DataArray(
+            np.arange(support.sizes[dimension]), {dimension: support[dimension]}, dimension
+        )
+        reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
+        return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.reduce.base import Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,9 @@ class _Fit(Reduction):
     ----------
     name : str
         Name of the slope; ``<name>_stderr`` (the standard error, which measures the misfit of the
-        law, not numerical error), ``<name>_misfit`` (the largest misfit, in units of `of`) and
-        ``<name>_points`` come with it.
+        law), ``<name>_error`` (what the numerical errors of the cells make of it, where they have
+        any), ``<name>_misfit`` (the largest misfit, in units of `of`) and ``<name>_points`` come
+        with it.
     of : str
         Variable to fit.
     on : str
@@ -59,15 +60,8 @@ class _Fit(Reduction):
         support = within(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        of = support[self.of]
-        # sums over arrays with another memory layout differ in the last bit
-        of = of.copy(data=np.ascontiguousarray(of.values))
-        x = self.abscissa(support[self.on].astype(float))
-        of = of.where(x.notnull())
-        used = of.notnull()
-        x = self.centred(x.where(used), dimension)
-        y = self.centred(self.offset(of), dimension)
-        count = used.sum(dimension)
+        x, y = self._points(support)
+        count = y.notnull().sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
         freedom = count - self.unknowns
@@ -93,6 +87,23 @@ class _Fit(Reduction):
                     "cells within the fitted range failed or are missing"
                 )
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """The weights of least squares."""
+        x, _y = self._points(within(dataset, self.on, self.within))
+        return [((x / (x**2).sum(dimension_of(dataset, self.on))).fillna(0.0), {})]
+
+    def _points(self, support: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+        """Both coordinates of the points as they enter a fit through the origin; NaN for those
+        without a number.
+        """
+        dimension, of = dimension_of(support, self.on), support[self.of]
+        # sums over arrays with another memory layout differ in the last bit
+        of = of.copy(data=np.ascontiguousarray(of.values))
+        x = self.abscissa(support[self.on].astype(float))
+        of = of.where(x.notnull())
+        x = self.centred(x.where(of.notnull()), dimension)
+        return x, self.centred(self.offset(of), dimension)
 
     def offset(self, values: xr.DataArray) -> xr.DataArray:
         """Values less what the law holds fixed."""

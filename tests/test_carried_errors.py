@@ -1,0 +1,215 @@
+"""Numerical errors of cells reach what is made of them."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import call, named_results
+
+from rsfstudy.files import store
+from rsfstudy.files.side_by_side import side_by_side
+from rsfstudy.reduce import (
+    Boundary,
+    DecadeFit,
+    Difference,
+    Inverse,
+    LinearFit,
+    OverClosedForm,
+    ProportionalFit,
+    RelativeDifference,
+    Spread,
+    reduced,
+)
+from rsfstudy.reduce.carried import COMMENT
+from rsfstudy.status import Status
+
+X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
+OF, ON = "critical_velocity_ratio", "a_over_b_minus_a"
+RANDOM = np.random.default_rng(40)
+VALUES = np.sort(1.0 + RANDOM.uniform(0.5, 3.0, (2, 5)))
+ERRORS = RANDOM.uniform(1e-7, 1e-6, (2, 5))
+
+
+def lattice(values=VALUES, errors=ERRORS, status=0) -> xr.Dataset:
+    dims = ("case", "b_over_a")
+    values = np.asarray(values, dtype=float)
+    return xr.Dataset(
+        {
+            OF: (dims, values),
+            f"{OF}_error": (dims, errors + np.zeros(values.shape)),
+            "status": (dims, np.full(values.shape, status, dtype=np.int8)),
+        },
+        coords={
+            "b_over_a": 1.0 + 1.0 / X,
+            ON: ("b_over_a", X),
+            "case": ["reference", "other"],
+        },
+    )
+
+
+AGAINST = {"along": "case", "reference": "reference"}
+KINDS = [
+    ProportionalFit("r", OF, ON, minus=1.0),
+    ProportionalFit("r", OF, ON, within=(0.5, 2.0)),
+    LinearFit("r", OF, ON),
+    DecadeFit("r", OF, ON),
+    Difference("r", OF, **AGAINST),
+    RelativeDifference("r", OF, **AGAINST),
+    OverClosedForm("r", OF, form="velocity_step_at_critical_stiffness"),
+    Spread("r", OF, ON),
+    Spread("r", OF, ON, within=(0.5, 2.0)),
+]
+
+
+def moved_one_by_one(reduction, dataset) -> xr.DataArray:
+    """What the errors of cells change, each cell moved by its own and reduced again, all added."""
+    still, sums = reduced(dataset, (reduction,)).r, 0.0
+    for place in np.ndindex(dataset[OF].shape):
+        other = dataset.copy(deep=True)
+        other[OF][place] += dataset[f"{OF}_error"][place]
+        sums = sums + abs(reduced(other, (reduction,)).r - still)
+    return sums
+
+
+@pytest.mark.parametrize("reduction", KINDS, ids=lambda r: f"{r.kind} {getattr(r, 'within', '')}")
+def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
+    dataset = lattice()
+    error = reduced(dataset, (reduction,)).r_error
+    # 1e-6 of a number is the second order; and the last bits of it
+    expected = moved_one_by_one(reduction, dataset).transpose(*error.dims)
+    np.testing.assert_allclose(error, expected, rtol=1e-5, atol=2e-15)
+    assert error.attrs["comment"] == COMMENT
+    assert error.attrs["long_name"].startswith("numerical error estimate of")
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_an_inverse_has_them_beside_its_own(noise):
+    """Each cell moved, and the uncertainty of the interpolant as it is without them."""
+    values = 1.3 * X**0.8 * (1.0 + noise * RANDOM.uniform(-1.0, 1.0, (2, 5)))
+    inverse = Inverse("r", OF, ON, levels=2.0)
+    exact = reduced(lattice(values, errors=0.0), (inverse,)).r_error
+    dataset = lattice(values)
+    expected = exact + moved_one_by_one(inverse, dataset)
+    np.testing.assert_allclose(
+        reduced(dataset, (inverse,)).r_error, expected, rtol=1e-4, atol=1e-14
+    )
+    assert (expected > exact + 1e-8).all()
+
+
+def test_an_exact_relation_has_no_standard_error_but_that_of_its_cells():
+    """All cells off by the same part: the misfit says nothing, the numerical error covers."""
+    truth, part = 1.0 + 4.0 / 3.0 * X, 3e-8
+    dataset = lattice([truth * (1.0 + part)] * 2, errors=part * truth)
+    fit = LinearFit("slope", OF, ON)
+    result = reduced(dataset, (fit,)).isel(case=0)
+    off = abs(float(result.slope) - 4.0 / 3.0)
+    assert float(result.slope_stderr) < 1e-3 * off
+    assert off <= float(result.slope_error) < 5.0 * off
+
+
+def test_a_reference_is_like_itself_whatever_its_error():
+    for kind in (Difference, RelativeDifference):
+        result = reduced(lattice(), (kind("r", OF, **AGAINST),))
+        assert (result.r_error.sel(case="reference") == 0.0).all()
+
+
+def test_a_cell_of_no_known_error_leaves_it_unknown():
+    """Unless the result does not depend on it."""
+    errors = ERRORS.copy()
+    errors[1, 4] = np.nan
+    fits = (LinearFit("all", OF, ON), LinearFit("some", OF, ON, within=(0.25, 2.0)))
+    result = reduced(lattice(errors=errors), (*fits, Spread("r", OF, ON)))
+    for name in ("all", "r"):
+        assert result[f"{name}_error"].isnull().values.tolist() == [False, True]
+        assert result[name].notnull().all()
+    assert result.some_error.notnull().all()
+
+
+@pytest.mark.parametrize("status", [Status.STABLE_FOR_ALL_STEPS, Status.WORK_BUDGET_SPENT])
+def test_a_cell_without_a_number_has_no_say(status):
+    values, errors = VALUES.copy(), ERRORS.copy()
+    values[1, 4] = errors[1, 4] = np.nan
+    dataset = lattice(values, errors)
+    dataset["status"][1, 4] = int(status)
+    result = reduced(dataset, (LinearFit("r", OF, ON),), despite_failures=True)
+    assert int(result.r_points[1]) == 4
+    only = dataset.isel(b_over_a=slice(4))
+    expected = reduced(only, (LinearFit("r", OF, ON),)).r_error
+    np.testing.assert_allclose(result.r_error[1], expected[1], rtol=1e-12)
+
+
+def test_a_result_that_is_refused_has_no_error():
+    dataset = lattice()
+    dataset["status"][1, 2] = int(Status.WORK_BUDGET_SPENT)
+    result = reduced(dataset, (LinearFit("r", OF, ON),))
+    assert result.r_error.isnull().values.tolist() == [False, True]
+    assert "failed or are missing" in result.r_error.attrs["refused"]
+
+
+def test_cells_without_errors_give_none():
+    result = reduced(lattice().drop_vars(f"{OF}_error"), (LinearFit("r", OF, ON),))
+    assert "r_error" not in result
+    assert "r_error" not in result.r.attrs["ancillary_variables"]
+
+
+def test_a_spread_knows_the_cells_that_may_be_farthest():
+    """The second largest is off by more than what the largest leads by."""
+    values = np.tile([1.0, 1.5, 2.0, 2.999, 3.0], (2, 1))
+    errors = np.tile([1e-6, 1e-6, 1e-6, 1e-2, 1e-6], (2, 1))
+    result = reduced(lattice(values, errors), (Spread("r", OF, ON),))
+    np.testing.assert_allclose(result.r_error, 1e-2 + 1e-6, rtol=1e-9)
+
+
+def test_errors_go_through_several_reductions():
+    chain = (LinearFit("slope", OF, ON), Difference("steeper", "slope", **AGAINST))
+    result = reduced(lattice(), chain)
+    expected = float(result.slope_error.sum())
+    assert float(result.steeper_error.sel(case="other")) == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_boundary_leaves_out_what_is_nearer_to_the_level_than_its_error():
+    values = np.tile([0.0, 0.2, 0.52, 0.9, 1.0], (2, 1))
+    boundary = Boundary("r", OF, ON)
+    sharp = reduced(lattice(values, errors=0.01), (boundary,))
+    blurred = reduced(lattice(values, errors=0.05), (boundary,))
+    assert [float(v[0]) for v in (sharp.r_stable, sharp.r_unstable)] == [0.5, 1.0]
+    assert [float(v[0]) for v in (blurred.r_stable, blurred.r_unstable)] == [0.5, 2.0]
+    assert float(blurred.r_error[0]) == 0.75
+
+
+# ---- in files and in the terminal ---------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def boundary(tmp_path_factory):
+    return named_results("laws_zeta", tmp_path_factory)
+
+
+def test_zeta_is_within_its_numerical_error_of_the_closed_form(boundary):
+    """Where the standard error alone is several times too small."""
+    dataset, _path = boundary
+    zeta = dataset.sel(normal_stress="constant", law_exponent=0.25)
+    off = abs(float(zeta.zeta) - 4.0 / 3.0)
+    assert float(zeta.zeta_stderr) < 1e-8
+    # the largest cell is known to 1e-7 of itself: to 3e-7, over its a/(b-a) of 1
+    assert off <= float(zeta.zeta_error) < 3e-7
+    assert set(dataset.zeta.attrs["ancillary_variables"].split()) == {
+        f"zeta_{end}" for end in ("error", "stderr", "misfit", "points")
+    }
+
+
+def test_slopes_that_differ_within_their_errors_agree(boundary):
+    dataset, _path = boundary
+    near, far = dataset.copy(deep=True), dataset.copy(deep=True)
+    near["zeta"] = near.zeta + 0.5 * near.zeta_error
+    far["zeta"] = far.zeta + 3.0 * far.zeta_error
+    assert side_by_side(dataset, near).agrees
+    assert side_by_side(dataset, far).beyond_errors == ["zeta"]
+
+
+def test_the_table_of_slopes_shows_them(boundary, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    dataset, _path = boundary
+    store.write(dataset, tmp_path / "it.nc")
+    said = call("show", tmp_path / "it.nc").stdout
+    assert "numerical error" in said
+    assert f" {float(dataset.zeta_error[0, 0]):.2g} " in said
