@@ -46,8 +46,8 @@ def repeats(rate: float) -> Claim:
             "inertia": False,
         },
         published=1.0,
-        tolerance=1e-5,
-        reason="a theorem; 100 times the accuracy asked for, since neutral orbits heal no error",
+        tolerance=1e-7,
+        reason="a theorem; the accuracy asked for",
     )
 
 
@@ -107,8 +107,9 @@ study = Study(
             where={**LARGEST, "peak": 2, "inertia": True},
             minus={**LARGEST, "peak": 2, "inertia": False},
             published=0.0,
-            tolerance=1e-3,
-            reason="what mass leaves of a difference in the state after the rupture",
+            tolerance=5e-5,
+            reason="0.05 of the offset of stress, as with other masses, and paths count as merged "
+            "within 2e-3 of its range, 0.6 sigma_*",
         ),
         Claim(
             id="C18",

@@ -23,7 +23,7 @@ def known(law: str, variable: str, published: float) -> Claim:
         variable=variable,
         where={"evolution": law, "normal_stress": "constant", "load_velocity_ratio": 2.0},
         published=published,
-        tolerance=1e-6 * published,
+        tolerance=1e-7 * published,
         reason="the accuracy of the study",
     )
 
@@ -37,8 +37,8 @@ def dynamic(law: str) -> Claim:
         variable="dynamic_slope_scaled",
         where={"evolution": law, "normal_stress": "constant"},
         published=1.0,
-        tolerance=0.15,
-        reason="'scales with', no error stated; ours are 0.97 to 1.15",
+        tolerance=0.5,
+        reason="'scales with' a whole multiple, no error stated: half of (a-b) sigma_*",
     )
 
 

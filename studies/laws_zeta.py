@@ -22,8 +22,9 @@ def zeta(exponent: float) -> Claim:
         variable="zeta",
         where={"law_exponent": exponent, "normal_stress": "constant"},
         published=1.0 / (1.0 - exponent),
-        tolerance=1e-5,
-        reason="exact for an infinite norm; 1e6 lowers the largest step by less",
+        tolerance=1.5e-7,
+        reason="exact for an infinite norm, and 1e6 lowers it by 1e-7 at eps = 0.5; and numerical "
+        "errors of the steps, which allow 7e-8",
     )
 
 

@@ -30,8 +30,8 @@ def vouched(mass: str, phi: float, rate: float) -> Claim:
         variable="critical_stiffness_error",
         where={"mass": mass, "phi": phi, "load_velocity_ratio": rate},
         published=0.0,
-        tolerance=1e-9,
-        reason="central differences of the assembled equations",
+        tolerance=3e-10,
+        reason="central differences of the assembled equations, to 1e-8 of it",
     )
 
 

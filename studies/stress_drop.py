@@ -36,7 +36,7 @@ def _stress(case: str) -> str:
     return case if case == CONSTANT else f"variable, {case}"
 
 
-def slope(drop: str, case: str, published: float, law: str) -> Claim:
+def slope(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
     """C15: slip law slopes at 0.8 k_cr."""
     return Claim(
         id="C15",
@@ -44,9 +44,9 @@ def slope(drop: str, case: str, published: float, law: str) -> Claim:
         source=f"{PAPER}, section 3.5",
         variable=f"{drop}_slope",
         where={"law": "slip", "case": case, "stiffness_ratio": 0.8},
-        published=published,
-        tolerance=0.08 * abs(published),
-        reason="'scales with', no error stated; ours are steeper by 0.1 to 7 %, beyond error",
+        published=multiple * unit,
+        tolerance=0.5 * abs(unit),
+        reason="'scales with' a whole multiple, no error stated: half of the next",
     )
 
 
@@ -98,10 +98,10 @@ study = Study(
     measure=LimitCycle(phases=2),
     reductions=[*fits("static"), *fits("dynamic")],
     claims=[
-        slope("static", CONSTANT, -2.0 * weakening, "2(a-b)"),
-        slope("dynamic", CONSTANT, -weakening, "a-b"),
-        slope("static", VARIABLE, -2.0 * weakening * enhancement, "2(a-b)/(1 - mu_* cot phi)"),
-        slope("dynamic", VARIABLE, -weakening * enhancement, "(a-b)/(1 - mu_* cot phi)"),
+        slope("static", CONSTANT, 2.0, -weakening, "2(a-b)"),
+        slope("dynamic", CONSTANT, 1.0, -weakening, "a-b"),
+        slope("static", VARIABLE, 2.0, -weakening * enhancement, "2(a-b)/(1 - mu_* cot phi)"),
+        slope("dynamic", VARIABLE, 1.0, -weakening * enhancement, "(a-b)/(1 - mu_* cot phi)"),
         falls(CONSTANT),
         falls(VARIABLE),
         Claim(

@@ -46,8 +46,9 @@ def follows(law: str, ratio: float) -> Claim:
         variable="closed_form_departure",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFF},
         published=expected,
-        tolerance=0.1 * expected,
-        reason="second order: (a/K) times the steepest evolution, over b, is 0.003 to 0.02",
+        tolerance=(0.1 if law == "slip" else 0.01) * expected,
+        reason="second order, in (a/K)(b - a)/a = 1/300: three times that by the slowness law, and "
+        "thirty times by the slip law, whose evolution is steeper by ln r and more",
     )
 
 
@@ -75,8 +76,9 @@ def reads_right(law: str, ratio: float) -> Claim:
         variable="apparent_a_minus_b",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 3.0},
         published=a - b,
-        tolerance=1e-6 * a,
-        reason="oscillations die as exp[-(k^ - 1)/2] a D_c: exp(-20) is left",
+        tolerance=5e-8 * a,
+        reason="oscillations die as exp[-(k^ - 1)/2] a D_c: exp(-20) is left; and half of the "
+        "accuracy asked for",
     )
 
 

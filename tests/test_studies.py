@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,6 +47,54 @@ def test_every_verdict_is_the_expected_one(result):
     assert len(table) == len(catalogue.load(result[1].stem).claims)
     assert not table.moved.any(), table.to_string()
     assert not (table.verdict == "not applicable").any()
+
+
+#: Claims that are given more room than `called_for`, and why.
+WIDE = {
+    "accuracy_cost A1": "what a user can plan with, not what integrators happen to do",
+    "dilatancy D1": "eight decimals are given",
+    "dilatancy D3": "truncation of differences, which is not the same at every place",
+    "displacement_boundary C10": "the paper says 'a few percents'",
+    "laws L1": "truncation of differences; laws that are nearly straight have less of it",
+    "laws_cycles L10": "the paper says a whole multiple",
+    "linear_stability C1": "truncation of differences, which is not the same at every place",
+    "normal_stress_steps R5": "a fifth of the first order; the second nearly vanishes in some",
+    "rigid_response C5": "the paper prints one decimal",
+    "slide_hold_slide P1": "the accuracy asked for, of a",
+    "slide_hold_slide P2": "one bound for every stiffness; what is left out falls with it",
+    "slide_hold_slide P3": "3 peaks in 100 are as far off, by where a step ends",
+    "slide_hold_slide P4": "one bound for every stiffness; what is left out falls with 1/k",
+    "stability_map C1": "half of a bracket, which holds the boundary anywhere",
+    "stress_drop C15": "the paper says whole multiples",
+}
+
+
+def called_for(claim, study, dataset) -> float:
+    """The tolerance that is called for by ten times the difference seen, ten times the numerical
+    error of ours, the accuracy asked for, or rounding.
+    """
+    second = claim.minus_variable or claim.variable
+    places = [(claim.variable, claim.where), *([(second, claim.minus)] if claim.minus else [])]
+    errors = [
+        replace(claim, variable=f"{name}_error", where=where, minus={}).verdict(dataset)[0]
+        for name, where in places
+    ]
+    return max(
+        10.0 * abs(claim.verdict(dataset)[0] - claim.published),
+        10.0 * float(np.nansum(errors)),  # NaN where there is no estimate
+        study.accuracy.rtol * abs(claim.published),
+        16.0 * sys.float_info.epsilon * max(1.0, abs(claim.published)),
+    )
+
+
+def test_claims_could_fail(result):
+    """Who gives a claim more room than is called for says why, beside the others."""
+    study = catalogue.load(result[1].stem)
+    for claim in study.claims:
+        named = f"{study.name} {claim.id}"
+        most = called_for(claim, study, result[0])
+        told = f"{named}, {claim.statement}: {claim.tolerance:g} is more than {most:g}"
+        assert claim.tolerance <= most or named in WIDE, told
 
 
 #: Opens the files it is told of with xarray alone, as where rsfstudy is not installed.
