@@ -55,8 +55,8 @@ def displacement(id_: str, law: str, ratio: float, published: float, tolerance: 
         where={"evolution": law, "normal_stress": "constant", "stiffness_ratio": ratio},
         published=published,
         tolerance=tolerance,
-        reason="exact for an infinite norm: 1e6 leaves exp(-32) of it, exp(-16) = 1e-7 at 2 k_cr or "
-        "halfway to the slowness law; its error estimate is 5e-10",
+        reason="exact for an infinite norm: 1e6 leaves exp(-32) of it; exp(-16) = 1e-7 at 2 k_cr "
+        "or halfway to the slowness law; its error estimate is 5e-10",
     )
 
 

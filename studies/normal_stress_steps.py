@@ -26,7 +26,7 @@ FORM = "closed form at constant slip rate, and its first order in a/K"
 def first_rate(step: float) -> float:
     """ln V just after the step."""
     r = 1.0 + step
-    return (mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a
+    return float((mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a)
 
 
 def left(law: str, step: float, ratio: float, slip: float) -> float:
