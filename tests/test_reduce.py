@@ -385,7 +385,7 @@ def test_the_error_of_an_inverse_covers(name, ratios, share):
 def test_an_inverse_whose_bracket_stays_is_not_taken_for_exact():
     x = np.array([0.1, 0.2, 0.4, 0.8, 1.2, 2.4])
     at, error = inverted(x, np.expm1(x), 5.0)
-    assert abs(at - np.log(6.0)) <= error < 0.2
+    assert abs(at - np.log(6.0)) <= error < 0.3  # a quarter of the bracket
 
 
 def test_levels_by_label_and_levels_out_of_reach():

@@ -106,7 +106,7 @@ class Inverse(Reduction):
     ----------
     name : str
         Name of the result; ``<name>_error`` comes with it: what the uncertainty of the level does,
-        how far interpolants through the neighbours on either side are from the result, and what the
+        how far chords through the neighbours on either side are from the result, and what the
         numerical errors of the cells make of it.
     of : str
         Variable that reaches the level; positive.
@@ -150,7 +150,7 @@ class Inverse(Reduction):
             vectorize=True,
         )
         note = f"{self.on} at which {self.of} reaches {self.levels}"
-        missed = "what interpolants through other points, and the uncertainty of the level, change"
+        missed = "distance of chords beside the bracket, and what uncertainty of the level changes"
         return xr.Dataset(
             {
                 self.name: crossing.assign_attrs(comment=note),
@@ -214,28 +214,29 @@ def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
 def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
     """How far the place where a smooth variable reaches the level may be from that found.
 
-    Parabolas through the bracket and one neighbour, on its left and on its right, err to opposite
-    sides where the third derivative keeps its sign. Where it does not, or where there is a
-    neighbour on one side only, the chord tells the rest. The bracket bounds all.
+    Where its slope rises, or falls, all along, the variable lies between the chord of the bracket
+    and the nearer of the chords on either side, extended. Where it does not, or there is a chord on
+    one side only, it may be as far from the chord as the farthest, to either side. The bracket
+    bounds all.
     """
     if np.isnan(fine):
         return np.nan
-    first = int(np.clip(np.searchsorted(x, fine) - 1, 0, x.size - 2))
-    ends = x[first : first + 2]
-    starts = [s for s in (first - 1, first) if 0 <= s <= x.size - 3]
-    through = [_parabola(y[s : s + 3], x[s : s + 3], level) for s in starts]
-    through.append(float(np.interp(level, *_ascending(y[first : first + 2], ends))))
-    return float(min(np.sum(np.abs(np.array(through) - fine)), np.max(np.abs(ends - fine))))
-
-
-def _parabola(y: np.ndarray, x: np.ndarray, level: float) -> float:
-    """The parabola x(y) through three points, at a level; infinite where y is not monotone."""
-    slopes = np.diff(y)
-    if not slopes[0] * slopes[1] > 0.0:
-        return np.inf
-    rises = np.diff(x) / slopes
-    bend = (rises[1] - rises[0]) / (y[2] - y[0])
-    return float(x[0] + (level - y[0]) * (rises[0] + bend * (level - y[1])))
+    slopes = np.diff(y) / np.diff(x)
+    first = int(np.clip(np.searchsorted(x, fine) - 1, 0, slopes.size - 1))
+    chord = x[first] + (level - y[first]) / slopes[first]
+    extended = []
+    for beside, shared in ((first - 1, first), (first + 1, first + 1)):
+        if 0 <= beside < slopes.size:
+            same_way = slopes[beside] * slopes[first] > 0.0
+            reached = x[shared] + (level - y[shared]) / slopes[beside] if same_way else np.inf
+            extended.append(reached)
+    bends = np.diff(slopes[max(first - 1, 0) : first + 2])
+    if bends.size == 2 and bends[0] * bends[1] >= 0.0:
+        nearer = min(extended, key=lambda place: abs(place - chord))
+        off = max(abs(chord - fine), abs(nearer - fine))
+    else:
+        off = abs(chord - fine) + max(abs(place - chord) for place in extended)
+    return float(min(off, np.max(np.abs(x[first : first + 2] - fine))))
 
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
