@@ -34,12 +34,15 @@ class Status(IntEnum):
     NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
     ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"
     SLIP_STOPPED = 16, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
-    NOT_PERIODIC = 17, "the motion goes on without repeating itself after up to 16 events"
+    NOT_PERIODIC = (
+        17,
+        "the motion repeats itself after none of up to 16 events, or 4 periods of forcing",
+    )
 
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
     INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
-    UNVERIFIED = 22, "two formulations disagree: no bracket confirms the value"
+    UNVERIFIED = 22, "two formulations disagree, or errors stay far above what was asked for"
     CELL_RAISED = 23, "the measure raised an exception"
     WORKER_LOST = 24, "the worker process died each time it computed this cell alone"
     PENDING = 25, "not computed yet"

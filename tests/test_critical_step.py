@@ -391,7 +391,9 @@ def test_the_tolerance_does_not_decide_the_status(fields, direction, status):
 
 
 def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
-    """A drop of V_0 that ends in a cycle: by a root of its peak, in 5 times the usual work."""
+    """A drop of V_0 that ends in a cycle: by a root of its peak, in 5 times the usual work. A cycle
+    attracts little: it is not known to much more than seven digits, whatever is asked for.
+    """
     scene = Scene(
         law="slip",
         a=0.007085837776968529,
@@ -403,8 +405,10 @@ def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
         alpha=0.4888343561900566,
     )
     value, error, outcome = found(scene, direction="down")
-    tight = found(scene, direction="down", rtol=1e-9)[0]
-    assert abs(value - tight) <= error
+    tight = CriticalStep(direction="down")(scene, Accuracy(1e-9))
+    assert abs(value - tight.values["critical_velocity_ratio"]) <= error
+    assert tight.status is Status.UNVERIFIED
+    assert "was asked for" in tight.message
     assert error < 1e-5 * (1.0 - value)
     assert outcome.rhs_evaluations < 100_000
 

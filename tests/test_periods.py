@@ -229,3 +229,38 @@ def test_recurrence_counts_events():
 def test_events_that_mean_nothing_are_refused(given):
     with pytest.raises(InvalidValue, match="must be"):
         Bifurcation(**given)
+
+
+def test_the_growth_of_departures_is_that_of_the_motion_alone():
+    """Which way a departure begins is forgotten: by derivatives of each event, along more of them.
+
+    Each event errs by the second order of a step of 1e-4 swings, over a hundredth in which slopes
+    bend: 1e-4.
+    """
+    scene, transient, events = slow(0.853), 24, 16
+    found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
+    seen = came_to(scene, transient + events, 1e-7, to_its_end=True).seen
+    by = ReturnMap(scene, quick(1e-7), Meter(2_000_000, engine=COMPILED))
+    direction, grown = np.array([1.0, -0.3]), []
+    for cycle in seen:
+        begin = np.array(cycle.begin.psis)
+        (slopes,) = by.slopes(begin, 1, scene.a * cycle.swing)
+        direction = slopes @ direction / np.linalg.norm(direction)
+        grown.append(math.log(np.linalg.norm(direction)))
+    expected = np.mean(grown[transient:])
+    assert found["lyapunov_exponent"] == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_growth_of_departures_has_a_standard_error():
+    """Windows of a long motion scatter by about as much around all of it; a cycle has none."""
+    scene, kept, windows = slow(0.853), 32, 12
+    seen = came_to(scene, 32 + windows * kept, 1e-5, to_its_end=True).seen
+    by = ReturnMap(scene, quick(1e-5), Meter(10_000_000, engine=COMPILED))
+    told = [by.growth(seen[: 32 + (1 + n) * kept], kept) for n in range(windows)]
+    means, errors = np.array(told).T
+    scatter = np.std(means, ddof=1)
+    # a mean of variances of five blocks, of twelve windows: known to a factor of two
+    assert 0.5 * scatter < math.sqrt(np.mean(errors**2)) < 5.0 * scatter
+    away = np.abs(means - by.growth(seen, windows * kept)[0])
+    assert np.median(away / errors) < 1.5
+    assert "lyapunov_exponent_stderr" not in Bifurcation(8, 8)(slow(0.95), quick(1e-5)).values

@@ -31,6 +31,9 @@ LONGEST = 16
 #: bend over a hundredth of a swing.
 _STEP = 1e-4
 _WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+#: Events along which a departure turns to where it grows, before growth counts: other directions
+#: lag behind by a factor of ten an event and more.
+_TURNING = 16
 #: How far off a cycle is looked for, over how far ln V swings, and most steps to it.
 _NEAR, _TRIES = 0.1, 12
 #: How many guesses there are at a cycle of one event, and how far off the first may be.
@@ -151,20 +154,28 @@ class ReturnMap:
             now = self.image(now, 1) if number < count - 1 else None
         return tuple(found)
 
-    def growth(self, seen: Sequence[Cycle]) -> float:
-        """By how much small departures grow along events, as a logarithm and in the mean; NaN where
-        they lead away from the motion.
+    def growth(self, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
+        """By how much small departures grow along the last so many events, as a logarithm: mean and
+        its standard error, over as many blocks of events as each has; NaN where they lead away from
+        the motion.
+
+        Which way a departure grows it learns along the events before, or the first half where there
+        are few.
         """
+        seen = seen[-(kept + _TURNING) :]
         step = _STEP * self.scene.a * max(cycle.swing for cycle in seen)
         departure, grown = np.ones(len(seen[0].begin.psis)), []
         for cycle in seen:
             psis, by = np.array(cycle.begin.psis), step * departure / np.linalg.norm(departure)
             ahead, behind = self.image(psis + by, 1), self.image(psis - by, 1)
             if ahead is None or behind is None:
-                return math.nan
+                return math.nan, math.nan
             departure = (ahead - behind) / (2.0 * step)
             grown.append(math.log(np.linalg.norm(departure)))
-        return math.fsum(grown) / len(grown)
+        grown = grown[min(_TURNING, len(grown) // 2) :]
+        blocks = np.array_split(grown, max(2, math.isqrt(len(grown))))
+        means = [block.mean() for block in blocks]
+        return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
 
     def _slopes(self, psis: np.ndarray, step: float) -> np.ndarray | None:
         """Of the states after one event, by differences of order four."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.boundaries.held import excess_of_peak
+from rsfstudy.boundaries.overdamped import levels_of_rise, rises_to_load_point
 from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
@@ -230,7 +231,8 @@ def _orbit(
     """
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
-    watches += [settling(_CLOSE)] if steady.stable else []
+    levels = levels_of_rise(scene) if steady.stable else []
+    watches += [settling(_CLOSE), *levels] if steady.stable else []
     planar, repeating = scene.states == 1, _Repeating(scene, steady, accuracy)
     peaks: list[float] = []
     at_start = -math.inf
@@ -244,6 +246,9 @@ def _orbit(
                     return _Orbit((), reached=True, top_at_start=top)
             elif top >= norm and not heavy:
                 return _Orbit((top,), reached=True)
+        elif event.watch in levels:
+            if rises_to_load_point(scene, event.point):
+                return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
         elif event.kind is Kind.RISE:
             return _Orbit((*peaks, norm + _HIGHER), reached=True)
         elif event.kind is Kind.SETTLED:

@@ -21,6 +21,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import (
     DEFAULT_RTOL,
     LOOSEST_RTOL,
+    MUCH_WORSE,
     TIGHTEST_RTOL,
     Accuracy,
     relative_work,
@@ -147,6 +148,15 @@ class Measure:
             rule = f"are refused by the measure {self.name} ({type(error).__name__}: {error})"
             raise InvalidValue("fields", changes, rule) from error
 
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """By name of a number with a numerical error, what the accuracy asked for is relative to.
+
+        Where the estimate of one stays more than a hundred times above that, an outcome is not ok,
+        but `unverified`. Numbers left out are held to nothing: those that are statistical, or
+        resolved by what the measure is told rather than by the accuracy.
+        """
+        return {}
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The physics: measure one scene, charging `meter`."""
         raise TypeError(f"{type(self).__name__} measures nothing")
@@ -226,6 +236,8 @@ class Measure:
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             found = self._checked(self.find(scene, accuracy, meter))
+            if found[0] is Status.OK:
+                found = self._held_to(accuracy.rtol, scene, *found[1:])
         except Halt as halt:
             found = halt.status, {}, str(halt)
         return Outcome(*found, _count(meter.spent)), meter
@@ -259,6 +271,19 @@ class Measure:
         if np.isfinite(headline).any() if several else math.isfinite(headline):
             return Status.OK, values, outcome.message
         return Status.NOT_FINITE, values, f"{self.headline} = {headline}"
+
+    def _held_to(
+        self, rtol: float, scene: Scene, values: Mapping[str, Value], message: str
+    ) -> tuple[Status, Mapping[str, Value], str]:
+        """An ok outcome, or `unverified` with what is known too badly."""
+        doubts = [message] if message else []
+        for name, scale in self.scales(scene, values).items():
+            error, asked = values.get(f"{name}_error", 0.0), rtol * scale
+            if error > MUCH_WORSE * asked:
+                text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
+                doubts.append(f"{text} was asked for")
+        status = Status.UNVERIFIED if len(doubts) > bool(message) else Status.OK
+        return status, values, "; ".join(doubts)
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""

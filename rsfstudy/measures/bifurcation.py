@@ -65,6 +65,12 @@ _QUANTITIES = (
         "1",
         "logarithm of the growth of small departures per event, in the mean: positive in chaos",
     ),
+    Quantity(
+        "lyapunov_exponent_stderr",
+        "",
+        "1",
+        "standard error of that mean, from blocks of events; only where no cycle attracts",
+    ),
 )
 
 
@@ -78,7 +84,9 @@ class Bifurcation(Measure):
     period doubles. The period is that of a cycle that closes to the accuracy and attracts; without
     one the motion ends as `not_periodic`, with all numbers but those of a period. Peaks of chaotic
     motion have no error estimate, because no accuracy would reproduce them; the number of events in
-    a period has none because it is whole.
+    a period has none because it is whole. The Lyapunov exponent of such a motion is a mean over the
+    events that are kept, with its standard error; that of a cycle is the logarithm of its largest
+    multiplier, and has none.
 
     Parameters
     ----------
@@ -119,6 +127,7 @@ class Bifurcation(Measure):
             "one_event_log10_peak",
             "one_event_log10_peak_error",
             "lyapunov_exponent",
+            "lyapunov_exponent_stderr",
             "peak_spread",
             "critical_stiffness",
         )
@@ -150,8 +159,8 @@ class Bifurcation(Measure):
         values = self._of_events(scene, came.seen[-self.events :])
         values |= _of_one_event(scene, accuracy, came, meter)
         if came.orbit is None:
-            kept = came.seen[-self.events :]
-            values["lyapunov_exponent"] = ReturnMap(scene, accuracy, meter).growth(kept)
+            growth = ReturnMap(scene, accuracy, meter).growth(came.seen, self.events)
+            values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = more_events(max(self.transient, self.events), "transient")
             ended = without_period(scene, came, remedy)
             return Outcome(ended.status, values, ended.message)

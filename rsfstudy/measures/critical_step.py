@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
@@ -100,6 +100,11 @@ class CriticalStep(Measure):
     def work_by_digits(self) -> Mapping[float, float]:
         """As the study accuracy_cost measured it for a rate step."""
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """The change that the step is."""
+        still = 1.0 if self.of == "load_velocity_ratio" else 0.0
+        return {self.headline: abs(values[self.headline] - still)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Find the boundary, then confirm it with a motion on each side.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -104,6 +105,13 @@ class Healing(Reading):
     @property
     def typical_work(self) -> int:
         return 4_000
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Differences of friction, and a, which is what ln V is in it; the displacement, and D_c,
+        over which friction turns.
+        """
+        least = {"healing": scene.a, "relaxation": scene.a, "peak_displacement": 1.0}
+        return {name: abs(values[name]) + scale for name, scale in least.items()}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and once more with smaller tolerances for the errors."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,15 @@ from rsfstudy.slider.steady import steady_sliding
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for that is left of the transient where the record begins, by the
-#: slowest decay of small changes; and the fewest periods before it.
-_LEFT, _FEWEST = 0.1, 2
+#: slowest decay of small changes.
+_LEFT = 0.1
+#: Most periods of forcing after which a response that repeats itself is told as one; how many it is
+#: looked at for, at the end of the transient, and at how many instants in each.
+_LONGEST = 4
+_LOOKED_AT, _INSTANTS = 2 * _LONGEST, 4
+#: How often it is looked at before it is said to repeat nothing, and how many times as many
+#: instants as are kept are looked at to resolve it.
+_PATIENCE, _FINEST = 6, 8
 #: Part by which two records may differ where the response has settled.
 _SAME = 1e-3
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
@@ -50,7 +57,7 @@ _READ = (
         "distortion",
         "",
         "1",
-        "spring stress at the overtones of the forcing, over that at its period",
+        "spring stress at all other periods than that of forcing, over that at it",
     ),
     Quantity(
         "departure_from_linear",
@@ -72,32 +79,50 @@ _OTHERS = (
         "degree",
         "lead of spring stress in small oscillations, by linear theory",
     ),
+    Quantity(
+        "response_period",
+        "",
+        "1",
+        "number of periods of forcing after which the response repeats itself",
+    ),
     Quantity("settled", "", "1", "whether one period of the response is as another later on"),
 )
 
 
+class _Way(NamedTuple):
+    """A response: how long a period of it lasts, how many of forcing that is, and over how many of
+    its own small changes fall to 1/e.
+    """
+
+    lasts: float
+    periods: int
+    fold: float = 0.0
+
+
 class _Record(NamedTuple):
-    """One period of a motion: events spread evenly over it, the last a period after the first; and
-    spring stress and imposed normal stress at all but that, without the trend by which spring
-    stress does not come back, which would be taken for overtones.
+    """One period of a response, of so many periods of forcing: events spread evenly over it, the
+    last a period after the first; and spring stress and imposed normal stress at all but that,
+    without the trend by which spring stress does not come back, which would be taken for overtones.
     """
 
     events: Sequence[Event]
     spring: np.ndarray
     imposed: np.ndarray
     trend: float
+    periods: int
 
     @property
     def drift(self) -> float:
         """What the trend would have made of the response, over that."""
-        amplitude = 2.0 * abs(_harmonics(self.spring)[1]) / len(self.spring)
-        return float(abs(self.trend) / (math.pi * amplitude))
+        amplitude = 2.0 * abs(_harmonics(self.spring)[self.periods]) / len(self.spring)
+        return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
-        """Spring stress at the overtones of the period, over that at the period."""
+        """Spring stress at other periods than that of forcing, over that at it."""
         harmonics = _harmonics(self.spring)
-        return np.asarray(harmonics[2:] / harmonics[1])
+        at = harmonics[self.periods]
+        return np.asarray(np.delete(harmonics, [0, self.periods]) / at)
 
     @property
     def aliasing(self) -> float:
@@ -113,8 +138,33 @@ class _Record(NamedTuple):
 
     @property
     def response(self) -> complex:
-        """Spring stress over imposed normal stress, at the period."""
-        return complex(_harmonics(self.spring)[1] / _harmonics(self.imposed)[1])
+        """Spring stress over imposed normal stress, at the period of forcing."""
+        return self._from_every(1)
+
+    def _from_every(self, stride: int) -> complex:
+        spring, imposed = (_harmonics(x[::stride]) for x in (self.spring, self.imposed))
+        return complex(spring[self.periods] / imposed[self.periods])
+
+    def is_as(self, other: _Record) -> bool:
+        """Whether spring stress is the same: in the median, for where it jumps an instant may come
+        before or after.
+        """
+        apart = np.abs(self.spring - other.spring)
+        return bool(np.median(apart) < _SAME * np.ptp(self.spring))
+
+    @property
+    def unresolved(self) -> float:
+        """Relative error of the response by what the instants do not resolve.
+
+        Twice as many take away half of it where spring stress jumps, and all but its square where
+        it is smooth: from a quarter, half and all of them. Two to a period resolve nothing.
+        """
+        change = abs(self._from_every(2) / self.response - 1.0)
+        several, rest = divmod(len(self.spring) // self.periods, 4)
+        if rest or several < 4:
+            return change
+        before = abs((self._from_every(4) - self._from_every(2)) / self.response)
+        return change * min(1.0, 2.0 * change / before) if before else change
 
 
 @dataclass(frozen=True)
@@ -124,14 +174,18 @@ class NormalStressResponse(Reading):
 
     The motion is followed until the slowest decay of small changes has left a tenth of the accuracy
     asked for, and read then; and once more after a further e-fold of that decay, from which all is
-    told. The response has `settled` where the two agree to a thousandth. Where steady sliding is
-    unstable nothing decays, and nothing is read.
+    told. Strong oscillations may be answered by a response that repeats itself only after 2, 3 or 4
+    periods of forcing, the `response_period`: all is then told of so many. It has `settled` where
+    the two records agree to a thousandth of how far spring stress swings. A response that repeats
+    itself after none of these is `not_periodic`. Where steady sliding is unstable nothing decays,
+    and nothing is read.
 
     Parameters
     ----------
     samples : int
-        Instants in a period at which the motion is looked at, an even number; those, and the first
-        of the next period, are kept along `phase`.
+        Instants in a period of forcing at which the motion is looked at, an even number; up to
+        eight times as many where these do not resolve it to the accuracy. So many of a period of
+        the response, and the first of the next, are kept along `phase`.
 
     References
     ----------
@@ -161,6 +215,18 @@ class NormalStressResponse(Reading):
     def typical_work(self) -> int:
         return 20_000
 
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Of spring stress itself and a, over the amplitude of normal stress. The overtones are
+        resolved by `samples`.
+        """
+        stressed = scene.a / scene.oscillation_amplitude
+        size = values["gain"] + stressed
+        return {
+            "gain": size,
+            "phase_lead": math.degrees(size / values["gain"]),
+            "departure_from_linear": size / values["linear_gain"],
+        }
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Read the response, and once more with smaller tolerances for the errors."""
         loading = scene.parts.loading
@@ -176,63 +242,93 @@ class NormalStressResponse(Reading):
         period = loading.oscillation_period
         frequency = 2.0 * math.pi / period
         linear = response_to_normal_stress(scene, scene.log_load_rate, frequency)
-        waits = -math.log(_LEFT * accuracy.rtol) / decay / period
-        periods = max(_FEWEST, math.ceil(waits)), math.ceil(1.0 / decay / period)
-        first, last = self._follow(scene, period, periods, accuracy, meter)
-        _first, again = self._follow(scene, period, periods, accuracy.refined(), meter)
-        values, finer = _read(last, linear), _read(again, linear)
+        fold = 1.0 / decay / period
+        # looked at once the transient would not be taken for a response, and until it is over
+        faint, over = (-math.log(_LEFT * part) * fold for part in (_SAME, accuracy.rtol))
+        waits = math.ceil(max(faint, over - _LOOKED_AT))
+        start, repeats = self._repeats(scene, waits, accuracy, meter)
+        if not repeats:
+            beside = {"linear_gain": abs(linear), "linear_phase_lead": _degrees(linear)}
+            why = f"it repeats itself after none of 1 to {_LONGEST} periods of forcing"
+            return Outcome(Status.NOT_PERIODIC, {**beside, "settled": 0.0}, why)
+        way = _Way(period * repeats, repeats, fold / repeats)
+        first, last = self._resolved(scene, start, way, accuracy, meter)
+        finer, instants = accuracy.refined(), len(last.spring)
+        start, same = self._repeats(scene, waits, finer, meter)
+        _first, again = self._follow(scene, start, way, instants, finer, meter)
         moved = abs(last.response / first.response - 1.0)
-        unseen = abs(_coarse(last) / last.response - 1.0) + moved + last.drift
-        hidden = {
-            "gain": unseen * values["gain"],
-            "phase_lead": math.degrees(unseen),
-            # what is left of overtones adds up as noise does, and seldom cancels
-            "distortion": 5.0 * float(np.linalg.norm(last.overtones - again.overtones))
-            + last.drift
-            + last.aliasing,
-            "departure_from_linear": unseen * abs(last.response / linear),
-        }
-        errors = {
-            f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
-            + hidden[name]
-            for name, value in values.items()
-        }
+        values = _read(last, linear)
         others = {
             "linear_gain": abs(linear),
             "linear_phase_lead": _degrees(linear),
-            "settled": float(moved < _SAME),
+            "response_period": float(repeats),
+            "settled": float(same == repeats and last.is_as(first)),
         }
-        return Outcome(Status.OK, {**values, **errors, **others, **_shown(scene, last)})
+        errors = _errors(values, linear, last, again, moved, accuracy.rtol)
+        shown = _shown(scene, last.events[:: instants // self.samples])
+        return Outcome(Status.OK, {**values, **errors, **others, **shown})
+
+    def _repeats(
+        self, scene: Scene, waits: int, accuracy: Accuracy, meter: Meter
+    ) -> tuple[Point, int]:
+        """Where a motion is after so many periods of forcing, and those during which it is looked
+        at; and after how many it repeats itself, or 0. It may take longer than small changes do.
+        """
+        period = scene.oscillation_period
+        *_earlier, begin = follow(scene, accuracy, meter, until=waits * period)
+        point, way = begin.point, _Way(_LOOKED_AT * period, _LOOKED_AT)
+        for _ in range(_PATIENCE):
+            seen = self._record(scene, point, way, _LOOKED_AT * _INSTANTS, accuracy, meter)
+            point = seen.events[-1].point
+            # with its trend: of a response of three periods that is a part of it
+            springs = [event.point.spring for event in seen.events[:-1]]
+            spring = np.reshape(springs, (_LOOKED_AT, _INSTANTS))
+            for count in range(1, _LONGEST + 1):
+                apart = np.abs(spring[_LONGEST:] - spring[_LONGEST - count : -count]).max()
+                if apart < _SAME * np.ptp(spring):
+                    return point, count
+        return point, 0
+
+    def _resolved(
+        self, scene: Scene, start: Point, way: _Way, accuracy: Accuracy, meter: Meter
+    ) -> tuple[_Record, _Record]:
+        """Two records at enough instants for the accuracy, or at the most there may be."""
+        instants = way.periods * self.samples
+        most = _FINEST * instants
+        while True:
+            first, last = self._follow(scene, start, way, instants, accuracy, meter)
+            stressed = abs(last.response) * scene.oscillation_amplitude
+            allowed = accuracy.rtol * (1.0 + scene.a / stressed)
+            if instants >= most or last.unresolved <= allowed:
+                return first, last
+            instants *= 2
 
     def _follow(
-        self,
-        scene: Scene,
-        period: float,
-        periods: tuple[int, int],
-        accuracy: Accuracy,
-        meter: Meter,
+        self, scene: Scene, start: Point, way: _Way, instants: int, accuracy: Accuracy, meter: Meter
     ) -> tuple[_Record, _Record]:
-        """Two records of one period, after so many periods, and so many later."""
-        before, between = periods
-        *_earlier, begin = follow(scene, accuracy, meter, until=before * period)
-        first = self._record(scene, begin.point, period, accuracy, meter)
-        point = first.events[-1].point
+        """Two records of a response: from a point, and an e-fold of decay later. What repeats
+        itself later than that is elsewhere then: what lies between is no multiple of 2 or 3.
+        """
+        first = self._record(scene, start, way, instants, accuracy, meter)
+        point, between = first.events[-1].point, math.ceil(way.fold)
+        while math.gcd(between, 6) > 1:
+            between += 1
         if between > 1:
-            wait = (between - 1) * period
+            wait = (between - 1) * way.lasts
             *_earlier, begin = follow(scene, accuracy, meter, start=point, until=wait)
             point = begin.point
-        return first, self._record(scene, point, period, accuracy, meter)
+        return first, self._record(scene, point, way, instants, accuracy, meter)
 
     def _record(
-        self, scene: Scene, start: Point, period: float, accuracy: Accuracy, meter: Meter
+        self, scene: Scene, start: Point, way: _Way, instants: int, accuracy: Accuracy, meter: Meter
     ) -> _Record:
-        """The motion at instants spread evenly over a period, each followed from the one before:
-        exactly then, and not between the steps of an integrator.
+        """The motion at instants spread evenly, each followed from the one before: exactly then,
+        and not between the steps of an integrator.
         """
         events: list[Event] = []
         time = slip = 0.0
-        stride = period / self.samples
-        for number in range(self.samples):
+        stride = way.lasts / instants
+        for number in range(instants):
             moving = list(follow(scene, accuracy, meter, start=start, until=stride))
             if not number:
                 events.append(moving[0])
@@ -242,17 +338,12 @@ class NormalStressResponse(Reading):
             start = end.point
         springs, reliefs = zip(*((e.point.spring, e.point.psis[-1]) for e in events), strict=True)
         trend = springs[-1] - springs[0]
-        spring = np.array(springs[:-1]) - trend * np.arange(self.samples) / self.samples
-        return _Record(events, spring, -np.array(reliefs[:-1]), trend)
+        spring = np.array(springs[:-1]) - trend * np.arange(instants) / instants
+        return _Record(events, spring, -np.array(reliefs[:-1]), trend, way.periods)
 
 
 def _harmonics(values: np.ndarray) -> np.ndarray:
     return np.fft.rfft(values)
-
-
-def _coarse(record: _Record) -> complex:
-    """The response, from every other instant."""
-    return complex(_harmonics(record.spring[::2])[1] / _harmonics(record.imposed[::2])[1])
 
 
 def _degrees(response: complex) -> float:
@@ -270,9 +361,36 @@ def _read(record: _Record, linear: complex) -> dict[str, float]:
     }
 
 
-def _shown(scene: Scene, record: _Record) -> dict[str, np.ndarray]:
+def _errors(
+    values: Mapping[str, float],
+    linear: complex,
+    record: _Record,
+    again: _Record,
+    moved: float,
+    rtol: float,
+) -> dict[str, float]:
+    """Errors of what is read off a record, from another run: with what the response has moved
+    since, what its trend made of it, and what the instants do not resolve.
+    """
+    finer = _read(again, linear)
+    unseen = record.unresolved + moved + record.drift
+    hidden = {
+        "gain": unseen * values["gain"],
+        "phase_lead": math.degrees(unseen),
+        # what is left of overtones adds up as noise does, and seldom cancels
+        "distortion": 5.0 * float(np.linalg.norm(record.overtones - again.overtones))
+        + record.drift
+        + record.aliasing,
+        "departure_from_linear": unseen * values["gain"] / abs(linear),
+    }
+    return {
+        f"{name}_error": error_between(value, finer[name], _BY_CHANCE * rtol) + hidden[name]
+        for name, value in values.items()
+    }
+
+
+def _shown(scene: Scene, events: Sequence[Event]) -> dict[str, np.ndarray]:
     """The record itself."""
-    events = record.events
     time = np.array([event.time for event in events])
     return {
         "time": time,

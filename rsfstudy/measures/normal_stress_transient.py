@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
@@ -29,8 +29,9 @@ _LAST, _STAYS = 0.1, 0.01
 #: ln(V/V_*) within which slip rate must be again where reading begins: the spring has then taken up
 #: what strength changed by.
 _TAKEN_UP = math.log(2.0)
-#: log10(V/V_*) below which the fault is still: friction changes by no slip at all.
-_STILL = -250.0
+#: How often a motion is followed to a slip, each time as long as its slip rate says, and the least
+#: ln(V/V_*) that is taken for one.
+_HOPS, _SLOWEST = 3, -600.0
 #: Direct change over mu_* that is no more than rounding.
 _NONE = 10.0 * ROUNDING
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
@@ -72,27 +73,22 @@ _OTHERS = (
 
 
 class _Record(NamedTuple):
-    """What a motion tells of a step: the instant after it, what was recorded, and friction against
-    slip.
+    """What a motion tells of a step: the instant after it, what was recorded, and friction at the
+    slips where it is read; nowhere, where the spring has not taken up the change of strength.
     """
 
     begin: Event
     rows: np.ndarray
-    friction: CubicHermiteSpline
+    friction: Mapping[float, float]
 
     @property
     def after(self) -> float:
         """Friction at the end of the record."""
         return float(friction_of(self.rows[-1:])[0])
 
-    def with_half_of_its_points(self) -> _Record:
-        """The same, with friction from every other point."""
-        x, known = self.friction.x[::2], self.friction
-        return self._replace(friction=CubicHermiteSpline(x, known(x), known.derivative()(x)))
-
     def left(self, slip: float) -> float:
         """What is left of the transient after so much slip."""
-        return float(self.friction(slip)) - self.after
+        return self.friction.get(slip, math.nan) - self.after
 
 
 @dataclass(frozen=True)
@@ -146,6 +142,17 @@ class NormalStressTransient(Reading):
     def typical_work(self) -> int:
         return 4_000
 
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """The numbers themselves, of a transient that errs by what a is beside its size where it is
+        read last.
+        """
+        ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
+        distance = values["apparent_slip_distance"]
+        size = abs(values["apparent_alpha"] * math.log(ratio)) * math.exp(-self.fit_to / distance)
+        part = 1.0 + scene.a / max(size, ROUNDING * scene.a)
+        names = ("apparent_alpha", "apparent_slip_distance", "evolution_left")
+        return {name: part * abs(values[name]) for name in names}
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and once more with smaller tolerances for the errors."""
         check_leaves_alone(scene)
@@ -166,10 +173,9 @@ class NormalStressTransient(Reading):
             span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
             why = f"from {span} friction does not decay, or is still that of loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
-        sparse = self._read(scene, record.with_half_of_its_points()) or values
         errors = {
-            f"{name}_error": abs(value - sparse[name])
-            + _AT_INSTANTS * error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
+            f"{name}_error": _AT_INSTANTS
+            * error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
             for name, value in values.items()
         }
         rounded = ROUNDING * scene.mu_star / abs(_direct(scene, record) or 1.0)
@@ -197,24 +203,40 @@ class NormalStressTransient(Reading):
         slip = rows[:, OBSERVED.index("slip")]
         if slip.max() < max(self.fit_to, 1.0):
             return None
-        onward = np.append(True, np.diff(np.maximum.accumulate(slip)) > 0.0)
-        onward &= rows[:, OBSERVED.index("log10_slip_rate")] > _STILL
-        kept = rows[onward]
-        rate = 10.0 ** kept[:, OBSERVED.index("log10_slip_rate")]
-        ratio = kept[:, OBSERVED.index("normal_stress_ratio")]
-        # spring stress rises by K (V_0/V - 1) per unit slip
-        slope = scene.stiffness * (scene.load_velocity / rate - 1.0) / ratio
-        spline = CubicHermiteSpline(slip[onward], friction_of(kept), slope)
-        return _Record(begin, rows, spline)
+        rate = rows[:, OBSERVED.index("log10_slip_rate")]
+        taken_up = abs(np.interp(self.fit_from, slip, rate)) * math.log(10.0) <= _TAKEN_UP
+        return _Record(
+            begin, rows, self._at_slips(scene, rows, accuracy, meter) if taken_up else {}
+        )
+
+    def _at_slips(
+        self, scene: Scene, rows: np.ndarray, accuracy: Accuracy, meter: Meter
+    ) -> dict[float, float]:
+        """Friction at the slips where it is read: followed until then, and not between the steps of
+        an integrator; rows tell nearly when that is, and slip rate the rest.
+        """
+        found, passed, moved = dict[float, float](), 0.0, 0.0
+        (stepped, _lasts), start = scene.segments[0], None
+        stress = 1.0 + scene.parts.loading.segments[0].normal_stress
+        for slip in sorted({self.fit_from, 1.0, self.fit_to}):
+            wait = float(np.interp(slip, rows[:, OBSERVED.index("slip")], rows[:, 0])) - passed
+            for _ in range(_HOPS):
+                if 0.0 < wait <= self.record - passed:
+                    *_earlier, end = follow(stepped, accuracy, meter, start=start, until=wait)
+                    passed, moved, start = passed + end.time, moved + end.slip, end.point
+                log_rate = max(end.point.log_rate, _SLOWEST)
+                wait = (slip - moved) / math.exp(log_rate)
+            # spring stress rises by K (V_0/V - 1) per unit slip
+            pulled = scene.stiffness * math.expm1(-log_rate) / stress
+            found[slip] = end.point.reading + pulled * (slip - moved)
+        return found
 
     def _read(self, scene: Scene, record: _Record) -> dict[str, float]:
         """What is read off; nothing where no exponential goes through what is left, or the spring
         has not taken up the change of strength.
         """
         first, last = record.left(self.fit_from), record.left(self.fit_to)
-        slip, rate = (OBSERVED.index(name) for name in ("slip", "log10_slip_rate"))
-        faster = np.interp(self.fit_from, record.rows[:, slip], record.rows[:, rate])
-        if abs(faster) * math.log(10.0) > _TAKEN_UP or not first or not 0.0 < last / first < 1.0:
+        if not first or not 0.0 < last / first < 1.0:
             return {}
         distance = (self.fit_to - self.fit_from) / math.log(first / last)
         size = first * math.exp(self.fit_from / distance)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -74,6 +74,12 @@ class RigidResponse(Measure):
     @property
     def typical_work(self) -> int:
         return 800
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """The distance itself, that ends where stress falls by 1/e of its evolution over D_c."""
+        evolution = abs(values["direct_stress_change"] - values["steady_stress_change"])
+        part = 1.0 + math.e * scene.a / evolution
+        return {"evolution_distance": part * abs(values["evolution_distance"])}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Integrate the one unknown over slip, twice at different tolerances for the error."""

@@ -19,7 +19,7 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.closed_forms import effective_friction
 from rsfstudy.slider.scene import Scene
@@ -29,7 +29,7 @@ from rsfstudy.status import Status
 _FALL = CriticalStep(of="normal_stress_step", direction="down")
 _PULL, _FASTER = CriticalStep(of="displacement_step"), CriticalStep(of="load_velocity_ratio")
 TRIGGERS = (_FALL, _PULL, _FASTER)
-_ENDS = ("", "_error", "_stable", "_unstable")
+_ENDS = ("", "_error", "_stable", "_unstable", "_status")
 _STEPS = tuple(f"{trigger.headline}{end}" for trigger in TRIGGERS for end in _ENDS)
 _STRESSES = (
     "coulomb_stress_of_displacement",
@@ -76,6 +76,15 @@ _QUANTITIES = (
         "direct effect of the critical load point velocity step over the change of Coulomb stress "
         "by the critical displacement step",
     ),
+    *(
+        Quantity(
+            f"{trigger.headline}_status",
+            "",
+            "1",
+            f"status with which the search for a critical {trigger.of} ended, as its flag value",
+        )
+        for trigger in TRIGGERS
+    ),
     Quantity("effective_friction", r"$\mu'$", "1", "effective friction of Coulomb stress"),
 )
 
@@ -86,8 +95,9 @@ class Triggers(Measure):
     the changes of Coulomb stress that the first two are.
 
     After the first two the load point is held, unless the scene states its `load_velocity_ratio`,
-    which the third looks for. A trigger without a critical step leaves its number out, and says why
-    in the message; the slider answers while the first two have theirs.
+    which the third looks for. Each is sought within a work budget of its own, as if it were asked
+    for alone, and has its own status. One without a critical step leaves its number out, and says
+    why in the message; the slider answers while the first two have theirs and none has failed.
     """
 
     name: ClassVar[str] = "triggers"
@@ -123,8 +133,9 @@ class Triggers(Measure):
             return Outcome(Status.NOT_APPLICABLE, message=f"{why} has no one effective friction")
         found = {trigger: _found(trigger, scene, accuracy, meter) for trigger in TRIGGERS}
         values: dict[str, float] = {}
-        for outcome in found.values():
+        for trigger, outcome in found.items():
             values |= {n: float(v) for n, v in outcome.values.items() if n in self.variables}
+            values[f"{trigger.headline}_status"] = float(outcome.status)
         values |= _stresses(scene, *coupling, values)
         told = [
             f"{trigger.of}: {outcome.message or outcome.status.label}"
@@ -155,12 +166,10 @@ def _found(trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: Meter
     if trigger is _FASTER and not settles(_undisturbed(scene)):
         text = "steady sliding at V_* is unstable already"
         return Outcome(Status.UNSTABLE_AT_ANY_STEP, message=text)
-    try:
-        return trigger.find(scene, accuracy, meter)
-    except Halt as halt:
-        if halt.status is Status.WORK_BUDGET_SPENT:
-            raise
-        return Outcome(halt.status, message=str(halt))
+    outcome, own = trigger.metered(scene, accuracy)
+    for regime, spent in own.by_regime.items():
+        meter.add(regime, spent)
+    return outcome
 
 
 def _undisturbed(scene: Scene) -> Scene:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -143,6 +144,20 @@ class VelocityStep(Reading):
     @property
     def typical_work(self) -> int:
         return 8_000
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Frictions themselves, and a for their differences, here over ln r; slip distances end
+        where friction falls by 1/e of the evolution over D_c.
+        """
+        step = self._step(scene)
+        ratio = abs(step.ratio) if isinstance(step, _Step) else math.inf
+        sizes = {about.name: abs(values[about.name]) for about in self.read}
+        for name in ("apparent_a", "apparent_b", "apparent_a_minus_b"):
+            sizes[name] += scene.a / ratio
+        evolution = abs(values["apparent_b"]) * ratio
+        for name in ("apparent_slip_distance", "corrected_slip_distance"):
+            sizes[name] *= 1.0 + math.e * scene.a / evolution
+        return sizes
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and from its peak on to where 1/e is left; and both once more with

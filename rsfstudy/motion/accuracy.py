@@ -16,6 +16,9 @@ DEFAULT_BUDGET = 500_000
 #: The loosest accuracy that decides where to leave the slow manifold: its series in mass turns back
 #: at a change of ln V of 0.08, which a motion that is to leave it beyond would never reach.
 _LOOSEST_SWITCH = 2e-5
+#: How far above what was asked for an error estimate may stay: numbers are then still good to
+#: something near it, and two runs that agree less than that tell nothing of their errors.
+MUCH_WORSE = 100.0
 #: Relative error that rounding alone explains.
 ROUNDING = 1e-13
 

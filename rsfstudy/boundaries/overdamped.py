@@ -1,0 +1,88 @@
+"""Slip rate that rises to that of a fast load point and not beyond: waves carry stress away.
+
+Where radiation takes most of the stress, V follows the spring, over a slip of eta V_0/(K D_c): many
+times D_c, while the state stays as close behind as D_c lets it. An explicit integrator steps by D_c
+all the way. So the motion ends where it has come between two curves in the plane of ln V and state
+that only meet in steady sliding: the state at rest, and a lag behind that which the state makes up
+for faster than it grows. Both are crossed inwards, and between them ln V rises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rsfstudy.motion.events import Watch, rise
+from rsfstudy.slider.equations import evolution_of, relation_of, resting_of
+from rsfstudy.slider.forms import Point
+from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.steady import steady_excess, stress_at
+
+#: Distances in ln V below the load point at which it is asked whether the motion is between them.
+_ASKED = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
+#: The farther curve, over the lag at which a state that rested would be after a slip of D_c; part
+#: of the evolution there that is left to cross it; the nearest place to the load point at which
+#: the curves are looked at, the most apart that such places are, and the step of differences. All
+#: changes are in proportion to the distance where that is small.
+_BEHIND, _INWARDS, _NEAREST, _APART, _STEP = 2.0, 0.25, 1e-4, 0.25, 1e-5
+#: Change of ln V over a slip of D_c, over its distance from the load point, up to which a motion is
+#: as slow as that: to follow it takes hundreds of steps.
+_SLOW = 0.02
+
+
+def levels_of_rise(scene: Scene) -> list[Watch]:
+    """What to be told of to ask `rises_to_load_point`: nothing where the motion is not slow there,
+    or there are several states or mass, of which it knows nothing.
+    """
+    load = scene.log_load_rate
+    if scene.states > 1 or scene.has_mass:
+        return []
+    if not scene.stiffness < _SLOW * (scene.a + scene.dynamics.damping(load)):
+        return []
+    return [rise("log_rate", load - below) for below in _ASKED]
+
+
+def rises_to_load_point(scene: Scene, point: Point) -> bool:
+    """Whether ln V rises from a point to that of the load point and not beyond, as far as places on
+    the way tell.
+    """
+    change, load = _changes(scene), scene.log_load_rate
+    distance = load - point.log_rate
+
+    def farthest(x: float) -> float:
+        return _BEHIND * change(x, 0.0)[1]
+
+    lag = point.state - resting_of(scene, point.log_rate, 0.0)[0]
+    if not 0.0 <= lag <= farthest(point.log_rate):
+        return False
+    several = max(2, round(np.log(distance / _NEAREST) / _APART))
+    for x in (load - np.geomspace(distance, _NEAREST, several)).tolist():
+        rising, growing = change(x, 0.0)
+        lag = farthest(x)
+        step = _STEP * (load - x)
+        slope = (farthest(x + step) - farthest(x - step)) / (2.0 * step)
+        faster, behind = change(x, lag)
+        inwards = slope * faster - behind > _INWARDS * lag
+        if not (rising > 0.0 and growing > 0.0 and faster > 0.0 and inwards):
+            return False
+    return True
+
+
+def _changes(scene: Scene) -> Callable[[float, float], tuple[float, float]]:
+    """Per slip of D_c, at ln(V/V_*) and a lag of the state behind its rest: the changes of both."""
+    relation, evolution = relation_of(scene), evolution_of(scene)
+
+    def at(x: float, lag: float) -> tuple[float, float]:
+        friction = stress_at(scene, steady_excess(scene, x) + lag)
+        if friction is None:
+            return np.nan, np.nan
+        _value, slope, _shift, shift_slope = relation(friction)
+        rest, damping = resting_of(scene, x, 0.0)[0], scene.dynamics.damping(x)
+        pulled = scene.stiffness * float(np.expm1(scene.log_load_rate - x))
+        evolves = evolution(x, rest + lag)
+        faster = (slope * pulled - evolves) / (scene.a + slope * damping)
+        follows = (resting_of(scene, x + _STEP, 0.0)[0] - rest) / _STEP
+        return faster, evolves - shift_slope * (pulled - damping * faster) - follows * faster
+
+    return at

@@ -1,0 +1,95 @@
+"""Triggers, each with its own answer; and fast load points that waves hold a slider back from."""
+
+from __future__ import annotations
+
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.boundaries.overdamped import levels_of_rise, rises_to_load_point
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.triggers import TRIGGERS, Triggers
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.events import Kind, maximum, settling
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.status import Status
+
+#: Waves carry away all that the spring gives: to follow V up to V_0 takes 4,000,000 right-hand
+#: sides, by steps of D_c.
+DAMPED = {
+    "law": "slip",
+    "a": 0.0127,
+    "b_over_a": 1.98,
+    "mu_star": 0.68,
+    "stiffness_ratio": 0.263,
+    "normal_stress": "imposed",
+    "alpha": 0.3,
+}
+
+
+@pytest.mark.parametrize("damping", [8e-5, 4e-4, 1e-3])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_velocity_steps_of_a_damped_slider_are_cheap(law, damping):
+    scene = Scene(**{**DAMPED, "law": law}, radiation_damping=damping)
+    outcome = CriticalStep()(scene, Accuracy(1e-6, 250_000, engine=COMPILED))
+    assert outcome.status is Status.STABLE_FOR_ALL_STEPS, outcome.message
+
+
+@pytest.mark.parametrize("normal_stress", ["constant", "imposed", "variable"])
+@pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
+@pytest.mark.parametrize("ratio", [0.3, 1.5])
+def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
+    """Followed on, it has no maximum before it has come there, to a thousandth."""
+    effect = {} if normal_stress == "constant" else {"alpha": 0.4}
+    slope = {"phi": 70.0} if normal_stress == "variable" else {}
+    damped = {"radiation_damping": 1e-3, "load_velocity_ratio": 2e3, "stiffness_ratio": ratio}
+    scene = Scene(law=law, b_over_a=1.7, normal_stress=normal_stress, **effect, **slope, **damped)
+    accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), Meter(10**6, engine=COMPILED)
+    levels = levels_of_rise(scene)
+    told = [False]
+    for event in follow(scene, accuracy, meter, [maximum("log_rate"), settling(1e-3), *levels]):
+        if event.watch in levels and not told[-1]:
+            told.append(rises_to_load_point(scene, event.point))
+        assert not (event.kind is Kind.MAXIMUM and told[-1])
+        assert event.point.log_rate <= scene.log_load_rate or not told[-1]
+        if event.kind is Kind.SETTLED:
+            break
+    assert told[-1]
+    # and most of the way is left then
+    assert event.point.log_rate > scene.log_load_rate - 0.1
+
+
+def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
+    for fields in ({}, {"inertia": True}, {"law": "two_slip_states", "radiation_damping": 1e-3}):
+        assert levels_of_rise(Scene(**fields, load_velocity_ratio=1e3)) == []
+
+
+def test_oscillations_do_not_rise_to_the_load_point():
+    """Near critical stiffness they overshoot it."""
+    scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
+    start = next(follow(scene, Accuracy(1e-6), Meter(10**5)))
+    assert start.point.log_rate < scene.log_load_rate
+    assert not rises_to_load_point(scene, start.point)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_each_trigger_keeps_its_own_answer(engine):
+    """The velocity step spends the budget; what was found of the others stays, with its status."""
+    scene = Scene(**{**DAMPED, "stiffness_ratio": 1.5}, radiation_damping=1e-9)
+    accuracy = Accuracy(1e-6, engine=engine)
+    costs = [trigger(scene, accuracy).rhs_evaluations for trigger in TRIGGERS]
+    assert max(costs[:2]) < 0.9 * costs[2]
+    budget = int(0.95 * costs[2])
+    outcome = Triggers()(scene, Accuracy(1e-6, budget, engine=engine))
+    found = outcome.values
+    assert outcome.status is Status.WORK_BUDGET_SPENT
+    assert f"load_velocity_ratio: more than {budget} right-hand sides" in outcome.message
+    assert outcome.message.endswith(f"--budget {4 * budget} (budget=) allows more")
+    ends = [found[f"critical_{of}_status"] for of in ("normal_stress_step", "displacement")]
+    assert ends == [Status.OK, Status.OK]
+    assert found["critical_velocity_ratio_status"] == Status.WORK_BUDGET_SPENT
+    alone = CriticalStep(of="displacement_step")(scene, accuracy)
+    assert found["critical_displacement"] == alone.values["critical_displacement"]
+    assert found["coulomb_ratio"] == pytest.approx(1.0, abs=0.1)
+    assert sum(costs[:2]) + budget <= outcome.rhs_evaluations < 1.1 * sum(costs)

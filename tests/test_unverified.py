@@ -1,0 +1,99 @@
+"""A number whose estimate stays a hundred times above what was asked for is no success."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.status import Status
+
+IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
+#: A scene of each measure that errs by what the accuracy leaves.
+ASKED = [
+    (CriticalStep(), Scene()),
+    (CriticalStep(of="displacement_step"), Scene()),
+    (CriticalStep(of="normal_stress_step", direction="down"), Scene(**IMPOSED)),
+    (Healing(phases=2), Scene(stiffness_ratio=30.0, hold_time=100.0)),
+    (
+        NormalStressResponse(samples=32),
+        Scene(**IMPOSED, oscillation_amplitude=0.01, stiffness_ratio=1.5),
+    ),
+    (
+        NormalStressTransient(phases=2),
+        Scene(**IMPOSED, normal_stress_step=0.1, stiffness_ratio=60.0, load_velocity_ratio=1.0),
+    ),
+    (RigidResponse(), Scene(load_velocity_ratio=10.0)),
+    (StepResponse(peaks=2, phases=2), Scene(load_velocity_ratio=1.2, stiffness_ratio=1.3)),
+    (VelocityStep(phases=2), Scene(load_velocity_ratio=10.0, stiffness_ratio=30.0)),
+]
+#: What the samples resolve, and not the accuracy.
+RESOLVED_OTHERWISE = {"distortion"}
+
+
+@dataclass(frozen=True)
+class Known(Measure):
+    """A number known to one part in a hundred, and another to all digits, with a scale or none."""
+
+    relative_to: float = 1.0
+    name: ClassVar[str] = "known_to_a_hundredth"
+    headline = "known"
+    variables: ClassVar[Mapping] = dict.fromkeys(("known", "known_error", "mean", "mean_error"), ())
+    typical_work = 1
+
+    def scales(self, scene, values):
+        return {"known": self.relative_to} if self.relative_to else {}
+
+    def find(self, scene, accuracy, meter):
+        values = {"known": 2.0, "known_error": 0.01, "mean": 1.0, "mean_error": 1.0}
+        return Outcome(Status.OK, values, "as it is")
+
+
+@pytest.mark.parametrize(
+    ("rtol", "relative_to", "status"),
+    [
+        (1e-3, 1.0, Status.OK),
+        (1.1e-4, 1.0, Status.OK),
+        (0.9e-4, 1.0, Status.UNVERIFIED),
+        (0.9e-4, 10.0, Status.OK),
+        (1e-7, 1.0, Status.UNVERIFIED),
+        (1e-7, 0.0, Status.OK),
+    ],
+)
+def test_an_error_is_held_to_a_hundred_times_what_was_asked(rtol, relative_to, status):
+    outcome = Known(relative_to)(Scene(), Accuracy(rtol))
+    assert outcome.status is status
+    assert outcome.values["known"] == 2.0
+    assert outcome.message.startswith("as it is")
+    text = f"known = 2 is known to 0.01, and {rtol:.2g} was asked for"
+    assert (text in outcome.message) == (status is Status.UNVERIFIED)
+
+
+@pytest.mark.parametrize(("measure", "scene"), ASKED, ids=lambda x: getattr(x, "name", ""))
+def test_every_number_with_a_numerical_error_is_held_to_what_was_asked(measure, scene):
+    """And is as good as that, where nothing is hard; at a looser accuracy it errs by more."""
+    names = {name.removesuffix("_error") for name in measure.variables if name.endswith("_error")}
+    for rtol in (1e-4, 1e-7):
+        outcome = measure(scene, Accuracy(rtol, engine=COMPILED))
+        assert outcome.status is Status.OK, outcome.message
+        scales = measure.scales(scene, outcome.values)
+        assert set(scales) == names - RESOLVED_OTHERWISE
+        for name, scale in scales.items():
+            assert math.isfinite(scale)
+            # no laxer than the number, and a, 1/ln r or D_c beside it, ask for
+            assert 0.0 < scale < 100.0 * (1.0 + abs(outcome.values[name])), name
+            assert outcome.values[f"{name}_error"] < 30.0 * rtol * scale, name
