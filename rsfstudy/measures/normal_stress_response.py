@@ -12,8 +12,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading
-from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.stepping import Meter
@@ -30,8 +30,6 @@ from rsfstudy.status import Status
 _LEFT, _FEWEST = 0.1, 2
 #: Part by which two records may differ where the response has settled.
 _SAME = 1e-3
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
 
 _READ = (
     Quantity(
@@ -192,11 +190,19 @@ class NormalStressResponse(Reading):
             + last.aliasing,
             "departure_from_linear": unseen * abs(last.response / linear),
         }
-        errors = {
-            f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
-            + hidden[name]
-            for name, value in values.items()
+        over_imposed = 1.0 / loading.oscillation_amplitude
+        over_spring = over_imposed / values["gain"]
+        # errors of the instants add up as noise does: over the period they cancel for the most part
+        left = math.sqrt(2.0 / self.samples)
+        by_friction = {
+            "gain": left * over_imposed,
+            "phase_lead": math.degrees(left * over_spring),
+            "distortion": over_spring,
+            "departure_from_linear": left * over_imposed / abs(linear),
         }
+        errors = errors_of(values, finer, by_friction, scene, accuracy)
+        for name, more in hidden.items():
+            errors[f"{name}_error"] += more
         others = {
             "linear_gain": abs(linear),
             "linear_phase_lead": _degrees(linear),
