@@ -230,16 +230,16 @@ class NormalStressTransient(Reading):
         self, scene: Scene, record: _Record, values: Mapping[str, float]
     ) -> dict[str, float]:
         """Change of each number by that of the friction it is read from: at `fit_from`, `fit_to`
-        and D_c, and at the end.
+        and D_c, each less that at the end, which may err as much.
         """
         first, last = abs(record.left(self.fit_from)), abs(record.left(self.fit_to))
         distance, direct = values["apparent_slip_distance"], _direct(scene, record)
         longer = distance * distance / (self.fit_to - self.fit_from) * (1.0 / first + 1.0 / last)
         larger = 1.0 / first + self.fit_from * longer / (distance * distance)
         return {
-            "apparent_alpha": values["apparent_alpha"] * larger,
-            "apparent_slip_distance": longer,
-            "evolution_left": 1.0 / direct if direct else math.nan,
+            "apparent_alpha": 2.0 * values["apparent_alpha"] * larger,
+            "apparent_slip_distance": 2.0 * longer,
+            "evolution_left": 2.0 / direct if direct else math.nan,
         }
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:
