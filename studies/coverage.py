@@ -72,7 +72,9 @@ study = Study(
         "normal stress, and each kind of dynamics. Each is measured at the accuracy asked for and "
         "a hundred times tighter: the error that shows, beyond what the tighter run is itself "
         "uncertain by, over the estimate that the first run gave. More scenes by --set "
-        "sample=0:49:50, and other accuracies by --set requested_digits=4,7,9."
+        "sample=0:49:50, other accuracies by --set requested_digits=4,7,9, and the readings of a "
+        "laboratory by --set question: rigid response, velocity step, healing; and, with --set "
+        "normal_stress=imposed, normal stress transient and normal stress response."
     ),
     base=Scene(),
     axes=[

@@ -100,7 +100,8 @@ def random_scenes(
     for number in range(count):
         question, like = kinds[number % len(kinds)]
         scene = random_scene(like, question, 10_000 + number)
-        yield QUESTIONS[question], scene, Accuracy((1e-4, 1e-7, 1e-9)[number // len(kinds) % 3])
+        accuracy = Accuracy((1e-4, 1e-7, 1e-9)[number // len(kinds) % 3])
+        yield QUESTIONS[question].measure, scene, accuracy
 
 
 def cells_of(name: str) -> Iterator[tuple[Measure, Scene, Accuracy]]:

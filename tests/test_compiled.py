@@ -291,7 +291,7 @@ def test_random_scenes_end_alike_within_their_errors(sample):
 def test_dilatant_faults_end_alike_within_their_errors(question, law):
     like = Scene(law=law, fluid="dilatant", dilatancy=0.001, inertia=law == "slip")
     scene = random_scene(like, question, 2)
-    one = agreement.compared(QUESTIONS[question], scene, Accuracy(1e-4))
+    one = agreement.compared(QUESTIONS[question].measure, scene, Accuracy(1e-4))
     assert one.same_end, one.what
     assert not one.worst > 1.0, one.what
 

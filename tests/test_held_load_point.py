@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from rsfstudy import Scene
+from rsfstudy import Scene, simulate
 from rsfstudy.boundaries import held
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggered import Triggered
@@ -93,9 +93,12 @@ def random_scene(draw: np.random.Generator, number: int) -> tuple[str, str, dict
     return (FALL, "down", fields) if fall_of_stress else (DISPLACEMENT, "up", fields)
 
 
+# they end early where slip runs away, and where drainage holds the integrator to short steps
+@pytest.mark.filterwarnings("ignore::rsfstudy.errors.Incomplete")
+@pytest.mark.filterwarnings("ignore::rsfstudy.errors.NoAnswer")
 @pytest.mark.parametrize("number", range(24))
 def test_no_smaller_step_runs_away(number):
-    """Of random scenes, followed without any of what ends a motion early."""
+    """Of random scenes, by `simulate`, which knows of nothing that ends a motion early."""
     of, direction, fields = random_scene(np.random.default_rng([20, number]), number)
     measure = CriticalStep(of=of, direction=direction)
     scene = Scene(**fields)
@@ -104,8 +107,10 @@ def test_no_smaller_step_runs_away(number):
     assert outcome.status is Status.OK
     critical = outcome.values[measure.headline]
     for share in (0.25, 0.5, 0.8, 0.97, 1.02):
-        reaches = reaches_the_norm(stepped.with_(**{of: share * critical}))
-        assert reaches is (share > 1.0)
+        at = stepped.with_(**{of: share * critical})
+        motion = simulate(at, duration=1e4, rtol=1e-6, budget=20_000, engine=COMPILED)
+        highest = math.log(10.0) * motion.log10_slip_rate.max()
+        assert (highest >= scene.log_norm_rate) == (share > 1.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])

@@ -271,7 +271,10 @@ def test_of_no_effect_on_the_state_no_part_is_left(step):
     found = read(NormalStressTransient(), scene)
     assert math.isfinite(found["evolution_left_error"])
     without = NormalStressTransient()(scene.with_(alpha=0.0), Accuracy(engine=COMPILED))
-    assert math.isnan(without.values.get("evolution_left", math.nan))
+    assert without.status is Status.NOT_APPLICABLE
+    assert "no part of that can be left" in without.message
+    assert "evolution_left" not in without.values
+    assert math.isfinite(without.values["apparent_alpha_error"])
 
 
 @pytest.mark.parametrize("samples", [32, 64, 128])

@@ -1,12 +1,15 @@
 """Where there is nothing to read off a velocity step or a hold, and where it is hard to see."""
 
+import importlib
 import math
+import pkgutil
 
 import numpy as np
 import pytest
 from test_readings import PLAIN, read, recorded
 
-from rsfstudy import Scene, protocol, simulate
+from rsfstudy import Scene, measures, protocol, simulate
+from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -135,3 +138,40 @@ def test_one_step_of_the_integrator_may_hold_a_peak_and_what_is_on_either_side(e
     )
     for name in ("apparent_slip_distance", "corrected_slip_distance"):
         assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"] + exact[f"{name}_error"]
+
+
+def every_measure() -> list[Measure]:
+    """Those of rsfstudy, as they are without an argument."""
+    for module in pkgutil.iter_modules(measures.__path__):
+        importlib.import_module(f"{measures.__name__}.{module.name}")
+
+    def below(kind: type) -> list[type]:
+        return [kind, *(one for derived in kind.__subclasses__() for one in below(derived))]
+
+    ours = (kind for kind in below(Measure) if kind.__module__.startswith("rsfstudy."))
+    return [kind() for kind in ours if isinstance(getattr(kind, "name", None), str)]
+
+
+@pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
+def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatch):
+    """Whatever `find` gives: each such number, and its error, is there and finite, or is left out
+    because the measure says that it may be.
+    """
+    whole = {
+        name: np.ones([len(measure.inner_coordinates[dim]) for dim in dims]) if dims else 1.0
+        for name, dims in measure.variables.items()
+    }
+
+    def ended(values) -> Status:
+        monkeypatch.setattr(type(measure), "find", lambda *_asked: Outcome(Status.OK, values))
+        return measure(Scene(), Accuracy()).status
+
+    assert ended(whole) is Status.OK
+    assert measure.headline in whole
+    assert set(measure.optional) <= set(measure.estimated)
+    for name in measure.estimated:
+        for missing in (name, f"{name}_error"):
+            assert ended({**whole, missing: whole[missing] * math.nan}) is Status.NOT_FINITE
+        rest = {n: v for n, v in whole.items() if n not in (name, f"{name}_error")}
+        may_lack = name in measure.optional
+        assert ended(rest) is (Status.OK if may_lack else Status.NOT_FINITE)

@@ -69,6 +69,8 @@ class Measure:
 
     #: File and registry name.
     name: ClassVar[str]
+    #: Numbers with an error estimate that an ok outcome may leave out; its message says why.
+    optional: ClassVar[Sequence[str]] = ()
     #: Whether its motions carry time along: what is compiled before any cell is.
     clocks: ClassVar[tuple[bool, ...]] = (True,)
 
@@ -83,6 +85,12 @@ class Measure:
         number).
         """
         raise TypeError(f"{type(self).__name__} names no variables")
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of the numbers that have an error estimate."""
+        names = self.variables
+        return tuple(name for name in names if f"{name}_error" in names)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -243,7 +251,7 @@ class Measure:
         return Outcome(*found, _count(meter.spent)), meter
 
     def _checked(self, outcome: Outcome) -> tuple[Status, Mapping[str, Value], str]:
-        """What an outcome says, if it is as declared; ok without a finite headline becomes
+        """What an outcome says, if it is as declared; ok without a number that it must have becomes
         `not_finite`.
 
         Raises
@@ -266,11 +274,22 @@ class Measure:
         }
         if outcome.status is not Status.OK:
             return outcome.status, values, outcome.message
-        headline = values.get(self.headline, math.nan)
-        several = isinstance(headline, np.ndarray)
-        if np.isfinite(headline).any() if several else math.isfinite(headline):
-            return Status.OK, values, outcome.message
-        return Status.NOT_FINITE, values, f"{self.headline} = {headline}"
+        lacking = self._lacking(values)
+        if lacking:
+            return Status.NOT_FINITE, values, f"{lacking} = {values.get(lacking, math.nan)}"
+        return Status.OK, values, outcome.message
+
+    def _lacking(self, values: Mapping[str, Value]) -> str | None:
+        """The first number of an ok outcome that is missing or not finite: the headline, and each
+        that has an error estimate, with that, but for those left out that are optional.
+        """
+        left_out = set(self.optional) - set(values)
+        estimated = (name for name in self.estimated if name not in left_out)
+        pairs = ((name, f"{name}_error") for name in estimated)
+        for name in (self.headline, *(name for pair in pairs for name in pair)):
+            if not np.isfinite(values.get(name, math.nan)).any():
+                return name
+        return None
 
     def _held_to(
         self, rtol: float, scene: Scene, values: Mapping[str, Value], message: str

@@ -104,6 +104,7 @@ class Bifurcation(Measure):
     transient: int = 64
     events: int = 32
     name: ClassVar[str] = "bifurcation"
+    optional = ("floquet_multiplier", "one_event_log10_peak")
 
     def __post_init__(self) -> None:
         if self.transient < 0:
@@ -166,7 +167,9 @@ class Bifurcation(Measure):
             return Outcome(ended.status, values, ended.message)
         values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
         values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
-        return Outcome(Status.OK, values)
+        alone = "one_event_log10_peak" in values
+        said = "" if alone else "the motion comes close to no cycle of one event"
+        return Outcome(Status.OK, values, said)
 
     def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
         """What is told of the events that are kept."""

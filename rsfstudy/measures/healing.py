@@ -11,8 +11,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading
-from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
@@ -23,8 +23,6 @@ from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
 #: Distance from steady sliding within which a hold begins in it, in ln V or in the state over b.
 _STEADY = 1e-3
 #: How far friction may turn beside steady sliding, over the local tolerance: up to 1.9 in 7,000
@@ -131,10 +129,10 @@ class Healing(Reading):
         if again.peak is None:
             return peakless
         values, finer = _read(scene, first, first.peak), _read(scene, again, again.peak)
-        errors = {
-            f"{name}_error": error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
-            for name, value in values.items()
-        }
+        # friction peaks where slip rate passes that of the load point, ln V being friction over a
+        turning = 1.0 / (scene.a * first.peak.point.growth) if first.peak.point.growth else math.inf
+        by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
+        errors = errors_of(values, finer, by_friction, scene, accuracy)
         above = again.peak.point.reading - float(friction_of(again.rows)[-1])
         # beside steady sliding friction turns within the tolerance, where two runs may agree
         if above <= max(errors["healing_error"], _TURNS * accuracy.refined().solver):

@@ -12,8 +12,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading
-from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.stepping import Meter
@@ -37,8 +37,6 @@ _LOOKED_AT, _INSTANTS = 2 * _LONGEST, 4
 _PATIENCE, _FINEST = 6, 8
 #: Part by which two records may differ where the response has settled.
 _SAME = 1e-3
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
 
 _READ = (
     Quantity(
@@ -264,7 +262,7 @@ class NormalStressResponse(Reading):
             "response_period": float(repeats),
             "settled": float(same == repeats and last.is_as(first)),
         }
-        errors = _errors(values, linear, last, again, moved, accuracy.rtol)
+        errors = _errors(values, linear, last, again, moved, (scene, accuracy))
         shown = _shown(scene, last.events[:: instants // self.samples])
         return Outcome(Status.OK, {**values, **errors, **others, **shown})
 
@@ -367,12 +365,11 @@ def _errors(
     record: _Record,
     again: _Record,
     moved: float,
-    rtol: float,
+    asked: tuple[Scene, Accuracy],
 ) -> dict[str, float]:
     """Errors of what is read off a record, from another run: with what the response has moved
     since, what its trend made of it, and what the instants do not resolve.
     """
-    finer = _read(again, linear)
     unseen = record.unresolved + moved + record.drift
     hidden = {
         "gain": unseen * values["gain"],
@@ -383,10 +380,18 @@ def _errors(
         + record.aliasing,
         "departure_from_linear": unseen * values["gain"] / abs(linear),
     }
-    return {
-        f"{name}_error": error_between(value, finer[name], _BY_CHANCE * rtol) + hidden[name]
-        for name, value in values.items()
+    over_imposed = 1.0 / asked[0].oscillation_amplitude
+    over_spring = over_imposed / values["gain"]
+    # errors of the instants add up as noise does: over the period they cancel for the most part
+    left = math.sqrt(2.0 / len(record.spring))
+    by_friction = {
+        "gain": left * over_imposed,
+        "phase_lead": math.degrees(left * over_spring),
+        "distortion": over_spring,
+        "departure_from_linear": left * over_imposed / abs(linear),
     }
+    errors = errors_of(values, _read(again, linear), by_friction, *asked)
+    return {name: error + hidden[name.removesuffix("_error")] for name, error in errors.items()}
 
 
 def _shown(scene: Scene, events: Sequence[Event]) -> dict[str, np.ndarray]:

@@ -11,9 +11,9 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading
+from rsfstudy.measures._reading import Reading, errors_of
 from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.motion.accuracy import ROUNDING, Accuracy, error_between
+from rsfstudy.motion.accuracy import ROUNDING, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.readings import friction_of
@@ -34,10 +34,6 @@ _TAKEN_UP = math.log(2.0)
 _HOPS, _SLOWEST = 3, -600.0
 #: Direct change over mu_* that is no more than rounding.
 _NONE = 10.0 * ROUNDING
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
-#: By how much the errors of two runs, at single instants of a stiff machine, differ by chance.
-_AT_INSTANTS = 3.0
 
 _READ = (
     Quantity("apparent_alpha", r"$\alpha$", "1", "normal stress effect on the state, as read off"),
@@ -173,12 +169,13 @@ class NormalStressTransient(Reading):
             span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
             why = f"from {span} friction does not decay, or is still that of loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
-        errors = {
-            f"{name}_error": _AT_INSTANTS
-            * error_between(value, finer[name], _BY_CHANCE * accuracy.rtol)
-            for name, value in values.items()
-        }
-        rounded = ROUNDING * scene.mu_star / abs(_direct(scene, record) or 1.0)
+        errors = errors_of(values, finer, self._by_friction(scene, record, values), scene, accuracy)
+        direct = _direct(scene, record)
+        if abs(direct) <= _NONE * scene.mu_star:
+            why = "friction does not change at once, so that no part of that can be left"
+            del values["evolution_left"], errors["evolution_left_error"]
+            return Outcome(Status.NOT_APPLICABLE, {**values, **errors, **shown}, why)
+        rounded = ROUNDING * scene.mu_star / abs(direct)
         errors["evolution_left_error"] += rounded * abs(values["evolution_left"])
         return Outcome(Status.OK, {**values, **errors, **shown})
 
@@ -242,12 +239,26 @@ class NormalStressTransient(Reading):
         size = first * math.exp(self.fit_from / distance)
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         direct = _direct(scene, record)
-        # of no direct effect on the state no part is left
-        direct = direct if abs(direct) > _NONE * scene.mu_star else math.nan
         return {
             "apparent_alpha": -size / math.log(ratio),
             "apparent_slip_distance": distance,
-            "evolution_left": record.left(1.0) / direct,
+            "evolution_left": record.left(1.0) / direct if direct else math.nan,
+        }
+
+    def _by_friction(
+        self, scene: Scene, record: _Record, values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Change of each number by that of the friction it is read from: at `fit_from`, `fit_to`
+        and D_c, each less that at the end, which may err as much.
+        """
+        first, last = abs(record.left(self.fit_from)), abs(record.left(self.fit_to))
+        distance, direct = values["apparent_slip_distance"], _direct(scene, record)
+        longer = distance * distance / (self.fit_to - self.fit_from) * (1.0 / first + 1.0 / last)
+        larger = 1.0 / first + self.fit_from * longer / (distance * distance)
+        return {
+            "apparent_alpha": 2.0 * values["apparent_alpha"] * larger,
+            "apparent_slip_distance": 2.0 * longer,
+            "evolution_left": 2.0 / direct if direct else math.nan,
         }
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:

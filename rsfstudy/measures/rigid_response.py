@@ -13,6 +13,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._reading import errors_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
@@ -93,8 +94,10 @@ class RigidResponse(Measure):
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
         start, steady = friction_after_step(scene, log_rate), sliding.friction
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._follow(scene, start, level, accuracy.solver, meter)
-        loose, _left, _rows = self._follow(scene, start, level, 10.0 * accuracy.solver, meter)
+        distance, left, rows = self._follow(scene, start, level, accuracy, meter)
+        again, _left, _rows = self._follow(scene, start, level, accuracy.refined(), meter)
+        # where an exponential has 1/e left
+        by_friction = math.e * distance / (start - steady)
         slip = self.inner_coordinates["slip"]
         exponential = steady + (start - steady) * np.exp(-slip)
         departs = (rows[:, 0] - exponential) / (start - steady)
@@ -102,7 +105,13 @@ class RigidResponse(Measure):
             Status.OK,
             {
                 "evolution_distance": distance,
-                "evolution_distance_error": abs(loose - distance) + accuracy.solver * distance,
+                **errors_of(
+                    {"evolution_distance": distance},
+                    {"evolution_distance": again},
+                    {"evolution_distance": by_friction},
+                    scene,
+                    accuracy,
+                ),
                 "direct_stress_change": start,
                 **_asymmetry(scene, log_rate),
                 "steady_stress_change": steady,
@@ -116,7 +125,7 @@ class RigidResponse(Measure):
         )
 
     def _follow(
-        self, scene: Scene, start: float, level: float, tolerance: float, meter: Meter
+        self, scene: Scene, start: float, level: float, accuracy: Accuracy, meter: Meter
     ) -> tuple[float, float, np.ndarray]:
         """Slip at which stress passes the level, stress after D_c, and (stress, state, normal
         stress) at the points.
@@ -129,7 +138,8 @@ class RigidResponse(Measure):
         watches = (rise("friction", level), fall("friction", level))
         # states freed of stress are still those of steady sliding at V_* before the step
         state = (start, *resting_of(scene, 0.0, 0.0)[1:])
-        for event in along(equations, state, tolerance, meter, watches, samples=moments.tolist()):
+        tolerance, samples = accuracy.solver, moments.tolist()
+        for event in along(equations, state, tolerance, meter, watches, samples=samples):
             point = event.point
             if event.watch is not None and math.isnan(distance):
                 distance = event.slip

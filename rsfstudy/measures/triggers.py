@@ -101,6 +101,7 @@ class Triggers(Measure):
     """
 
     name: ClassVar[str] = "triggers"
+    optional = (_FASTER.headline, "direct_stress_of_velocity", "direct_ratio")
     clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     @property
@@ -190,7 +191,8 @@ def _stresses(
     numbers = (pulled, fallen, faster, _quotient(fallen, pulled), _quotient(faster, pulled))
     told = {"effective_friction": friction}
     for name, (value, its_error) in zip(_STRESSES, numbers, strict=True):
-        told |= {name: value, f"{name}_error": its_error}
+        if not math.isnan(value):
+            told |= {name: value, f"{name}_error": its_error}
     return told
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading
+from rsfstudy.measures._reading import Reading, errors_of
 from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
 from rsfstudy.motion.readings import friction_of, unsteady, watched
@@ -29,8 +29,6 @@ from rsfstudy.status import Status
 _LAST, _STAYS = 0.1, 0.01
 #: Part of ln r within which slip is steady before the step.
 _STEADY = 1e-3
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.1
 
 _READ = (
     Quantity("apparent_a", "$a$", "1", "direct effect parameter as read off"),
@@ -171,10 +169,7 @@ class VelocityStep(Reading):
         values = self._read(scene, step, record, accuracy, meter)
         finer = accuracy.refined()
         again = self._read(scene, step, self._follow(scene, step, finer, meter), finer, meter)
-        errors = {
-            f"{name}_error": error_between(value, again[name], _BY_CHANCE * accuracy.rtol)
-            for name, value in values.items()
-        }
+        errors = errors_of(values, again, _by_friction(step, values), scene, accuracy)
         found = {**values, **errors, **self._shown(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"
@@ -272,6 +267,18 @@ class VelocityStep(Reading):
             "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],
         }
+
+
+def _by_friction(step: _Step, values: Mapping[str, float]) -> dict[str, float]:
+    """Change of each number by that of the friction it is read from.
+
+    Where an exponential has 1/e left, b ln r, it falls by b ln r/(e D_c) per displacement.
+    """
+    effects = dict.fromkeys(("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / step.ratio)
+    evolved = values["apparent_b"] * step.ratio
+    over_friction = math.e / evolved if evolved else math.nan
+    distances = ("apparent_slip_distance", "corrected_slip_distance")
+    return dict.fromkeys(values, 1.0) | effects | {n: over_friction * values[n] for n in distances}
 
 
 def _turn(scene: Scene, step: _Step) -> Watch:
