@@ -58,7 +58,7 @@ def tell(asked: argparse.Namespace) -> None:
     for package in (rsfstudy, named_studies):
         (place,) = package.__path__
         if asked.tree not in Path(place).resolve().parents:
-            sys.exit(f"{sys.executable} has {package.__name__} in {place}.\n{remedy(asked.tree)}")
+            sys.exit(f"{sys.executable} has {package.__name__} in {place}.")
     warnings.simplefilter("ignore")
     answers, folder = telling.Answers(), asked.answers.parent
     for engine in ENGINES:
@@ -143,7 +143,7 @@ def compare(asked: argparse.Namespace) -> int:
         folder = (asked.folder or Path(place)).resolve()
         trees = {"reference": asked.reference.resolve(), "ours": HERE}
         found = [answers_of(tree, folder / name, asked) for name, tree in trees.items()]
-    console, passed = Console(), True
+    console, passed = Console(width=None if sys.stdout.isatty() else 140), True
     table = Table("", "identical", "of", "largest difference", "tolerance", "where")
     for name, group in compared(*found):
         most = allowed(name, asked)
@@ -170,7 +170,8 @@ def answers_of(tree: Path, folder: Path, asked: argparse.Namespace) -> dict[str,
     surroundings = {**kept, "XDG_CACHE_HOME": str(folder / "cache")}
     done = subprocess.run([*map(str, words)], cwd=folder, env=surroundings, check=False)
     if done.returncode:
-        sys.exit(f"{tree} told nothing: {interpreter} ended with {done.returncode}.")
+        failed = f"{tree} told nothing: {interpreter} ended with {done.returncode}."
+        sys.exit(f"{failed}\nIs the tree installed there? {remedy(tree)}")
     found: dict[str, Any] = json.loads(answers.read_text())
     return found
 
