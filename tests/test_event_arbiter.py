@@ -4,6 +4,7 @@ more, in time, with the state variable itself, and with event functions of their
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -215,11 +216,13 @@ PROBLEMS = {
 }
 
 
-def theirs(problem: Problem) -> dict[tuple[str, str], list[tuple[float, Known]]]:
+@functools.cache
+def theirs(name: str) -> dict[tuple[str, str], list[tuple[float, Known]]]:
     """Times and values of all events by `solve_ivp`, by kind and quantity.
 
     By an implicit method with mass, where the equations are stiff between ruptures.
     """
+    problem = PROBLEMS[name]
     known = problem.known
     asked = {
         ("maximum", "log_rate"): (lambda y: known(y).growth, -1.0),
@@ -271,7 +274,7 @@ def test_events_are_those_of_equations_written_once_more(name, engine):
     err by a thousandth of that.
     """
     problem = PROBLEMS[name]
-    known, told = theirs(problem), ours(problem, engine)
+    known, told = theirs(name), ours(problem, engine)
     allowed = 20.0 * problem.rtol
     assert {what: len(told.get(what, ())) for what in known} == {
         what: len(events) for what, events in known.items()
