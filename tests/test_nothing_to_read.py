@@ -11,6 +11,7 @@ from test_readings import PLAIN, read, recorded
 from rsfstudy import Scene, measures, protocol, simulate
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
@@ -169,7 +170,7 @@ def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatc
 
     def ended(values) -> Status:
         monkeypatch.setattr(type(measure), "find", lambda *_asked: Outcome(Status.OK, values))
-        return measure(Scene(), Accuracy()).status
+        return measure(scene, Accuracy()).status
 
     whole |= {n: 1e-9 * value for n, value in whole.items() if n.endswith("_error")}
     assert ended(whole) is Status.OK
