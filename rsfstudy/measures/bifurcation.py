@@ -11,12 +11,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import LN10, Cycle
-from rsfstudy.boundaries.periods import Course, Orbit, ReturnMap, course
+from rsfstudy.boundaries.cycles import LN10, Cycle, more_events
+from rsfstudy.boundaries.periods import Course, course
+from rsfstudy.boundaries.return_map import Orbit, ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, more_events, without_period
+from rsfstudy.measures.limit_cycle import (
+    NUDGE,
+    PEAK,
+    PERIOD,
+    SETTLES,
+    cycle_errors,
+    judged,
+    without_period,
+)
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -148,16 +157,18 @@ class Bifurcation(Measure):
         if came is None:
             return SETTLES
         values = self._of_events(scene, came.seen[-self.events :])
-        values |= _of_one_event(scene, accuracy, came, meter)
+        status, why, of_one = _of_one_event(scene, accuracy, came, meter)
+        values |= of_one
         if came.orbit is None:
             kept = came.seen[-self.events :]
             values["lyapunov_exponent"] = ReturnMap(scene, accuracy, meter).growth(kept)
             remedy = more_events(max(self.transient, self.events), "transient")
             ended = without_period(scene, came, remedy)
-            return Outcome(ended.status, values, ended.message)
+            failed = status is not Status.OK
+            return Outcome(status if failed else ended.status, values, why or ended.message)
         values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
         values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
-        return Outcome(Status.OK, values)
+        return Outcome(status, values, why)
 
     def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
         """What is told of the events that are kept."""
@@ -172,26 +183,26 @@ class Bifurcation(Measure):
 
 def _of_one_event(
     scene: Scene, accuracy: Accuracy, came: Course, meter: Meter
-) -> dict[str, float | np.ndarray]:
-    """The cycle of one event, if the motion comes close to one."""
+) -> tuple[Status, str, dict[str, float | np.ndarray]]:
+    """The cycle of one event, if the motion comes close to one; and whether it is known."""
     one = ReturnMap(scene, accuracy, meter).of_one_event(came.seen)
     if one is None:
-        return {}
-    begin, swing = np.array(one.events[0].begin.psis), one.events[0].swing
-    again = ReturnMap(scene, accuracy.refined(), meter).orbit(begin, 1, swing)
+        return Status.OK, "", {}
+    again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.events[0].swing)
     if again is None:
-        return {}
-    chance = _BY_CHANCE * accuracy.rtol
+        return Status.OK, "", {}
     (first, *_), (same, *_) = one.multipliers, again.multipliers
-    peaks = [orbit.events[0].fastest / LN10 for orbit in (one, again)]
-    return {
+    chance = _BY_CHANCE * accuracy.rtol
+    peak, error = float(one.numbers[PEAK]), float(cycle_errors(accuracy, one, again)[PEAK])
+    values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
         "floquet_multiplier_error": error_between(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": peaks[0],
-        "one_event_log10_peak_error": error_between(peaks[0], peaks[1], chance),
+        "one_event_log10_peak": peak,
+        "one_event_log10_peak_error": error,
     }
+    return *judged(accuracy, one, again), values
 
 
 def _growth_of_cycle(orbit: Orbit) -> float:
