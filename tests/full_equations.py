@@ -20,6 +20,7 @@ from rsfstudy import Scene
 _STAGES = 7
 #: Most of the highest term of a step, relative to unknowns of the size of a.
 _TOLERANCE = 1e-13
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 def _collocation(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -134,36 +135,41 @@ class FullEquations:
         """The next section with V rising, and the headline numbers of the event up to there."""
         y, size, fallen = start.copy(), 1e-3, False
         y[-1] = 0.0
-        slowest = fastest = self.load
-        lowest, at_peak = start[0], start[0]
+        slowest = fastest = y
+        lowest, last = start[0], (y, 0.0)
 
         def above(y: np.ndarray) -> float:
             return float(self.log_rate(y)) - self.load
-
-        def missing(y: np.ndarray) -> float:
-            return float(y[1])
 
         while True:
             after, term = self.step(y, size)
             if term > _TOLERANCE:
                 size *= max(0.2, 0.8 * (_TOLERANCE / term) ** (1.0 / _STAGES))
                 continue
-            if missing(y) * missing(after) < 0.0:
-                turn = self._locate(y, size, missing)
-                x = float(self.log_rate(turn))
-                if x > fastest:
-                    fastest, at_peak = x, float(turn[0])
-                slowest = min(slowest, x)
+            if y[1] > 0.0 >= after[1]:
+                peak = self._locate(y, size, lambda at: float(at[1]))
+                fastest = max(fastest, peak, key=self.log_rate)
+            if self.log_rate(y) <= min(self.log_rate(last[0]), self.log_rate(after)):
+                troughs = self._trough(*last), self._trough(y, size)
+                slowest = min(slowest, *troughs, key=self.log_rate)
             if (above(y) > 0.0) is not (above(after) > 0.0) and not np.array_equal(y, start):
                 crossing = self._locate(y, size, above)
                 lowest = min(lowest, float(crossing[0]))
                 if fallen and above(after) > 0.0:
-                    numbers = [crossing[-1], start[0] - lowest, start[0] - at_peak]
-                    rates = np.array([slowest, fastest]) / math.log(10.0)
+                    numbers = [crossing[-1], start[0] - lowest, start[0] - fastest[0]]
+                    rates = self.log_rate(np.array([slowest, fastest])) / math.log(10.0)
                     return crossing, np.array([*numbers, *rates])
-            fallen = fallen or above(after) < 0.0
-            y = after
+            fallen, last, y = fallen or above(after) < 0.0, (y, size), after
             size *= min(3.0, 0.8 * (_TOLERANCE / max(term, 1e-30)) ** (1.0 / _STAGES))
+
+    def _trough(self, y: np.ndarray, size: float) -> np.ndarray:
+        """Where within a step ln V is lowest, by golden section: q is too small there to tell."""
+        low, high = 0.0, size
+        for _ in range(45):
+            places = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+            first, second = (self.log_rate(self.step(y, place)[0]) for place in places)
+            low, high = (low, places[1]) if first < second else (places[0], high)
+        return self.step(y, low)[0]
 
     def _locate(
         self, y: np.ndarray, size: float, what: Callable[[np.ndarray], float]
