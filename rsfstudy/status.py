@@ -39,7 +39,7 @@ class Status(IntEnum):
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
     INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
-    UNVERIFIED = 22, "two formulations disagree: no bracket confirms the value"
+    UNVERIFIED = 22, "two computations disagree: nothing confirms the value as accurately as asked"
     CELL_RAISED = 23, "the measure raised an exception"
     WORKER_LOST = 24, "the worker process died each time it computed this cell alone"
     PENDING = 25, "not computed yet"

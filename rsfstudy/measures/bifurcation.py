@@ -83,11 +83,11 @@ class Bifurcation(Measure):
 
     A cycle of one event is looked for too, whether it attracts or not, close to where the motion
     comes closest to repeating itself. Its Floquet multipliers are the eigenvalues of the derivative
-    of the map of states from one maximum of spring stress to the next: where one passes -1, the
-    period doubles. The period is that of a cycle that closes to the accuracy and attracts; without
-    one the motion ends as `not_periodic`, with all numbers but those of a period. Peaks of chaotic
-    motion have no error estimate, because no accuracy would reproduce them; the number of events in
-    a period has none because it is whole.
+    of the map of spring stress and states from one maximum of spring stress to the next: where one
+    passes -1, the period doubles. The period is that of a cycle that closes to the accuracy and
+    attracts; without one the motion ends as `not_periodic`, with all numbers but those of a period.
+    Peaks of chaotic motion have no error estimate, because no accuracy would reproduce them; the
+    number of events in a period has none because it is whole.
 
     Parameters
     ----------
@@ -164,8 +164,9 @@ class Bifurcation(Measure):
             values["lyapunov_exponent"] = ReturnMap(scene, accuracy, meter).growth(kept)
             remedy = more_events(max(self.transient, self.events), "transient")
             ended = without_period(scene, came, remedy)
-            failed = status is not Status.OK
-            return Outcome(status if failed else ended.status, values, why or ended.message)
+            if status is Status.OK:
+                status, why = ended.status, ended.message
+            return Outcome(status, values, why)
         values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
         values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
         return Outcome(status, values, why)
@@ -202,7 +203,7 @@ def _of_one_event(
         "one_event_log10_peak": peak,
         "one_event_log10_peak_error": error,
     }
-    return *judged(accuracy, one, again), values
+    return *judged(accuracy, one, again, [PEAK]), values
 
 
 def _growth_of_cycle(orbit: Orbit) -> float:
