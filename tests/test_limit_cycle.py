@@ -4,6 +4,7 @@ published numbers.
 
 import functools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -73,8 +74,8 @@ def test_default_accuracy_and_work(case):
 def test_a_slip_rate_near_the_unit_keeps_an_error():
     """Two runs may agree by chance on a logarithm that happens to be zero, the one of V_*."""
     numbers = np.array([30.0, 0.5, 0.4, 0.0, 9.0])
-    values = limit_cycle._headlines(Accuracy(1e-6), numbers, numbers, np.zeros(5))
-    errors = [values[f"{name}_error"] for name in HEADLINES]
+    orbit = SimpleNamespace(numbers=numbers, implied=np.zeros(5))
+    errors = limit_cycle.cycle_errors(Accuracy(1e-6), orbit, orbit)
     assert errors[3] == pytest.approx(0.06e-6 * 4.5, rel=1e-4)
     assert errors[4] == pytest.approx(0.06e-6 * 9.0, rel=1e-4)
     assert errors[0] == pytest.approx(0.06e-6 * 30.0, rel=1e-4)

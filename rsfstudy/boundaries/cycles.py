@@ -6,7 +6,7 @@ A cycle runs from one maximum of spring stress, where V rises through V_0, to th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from operator import attrgetter
@@ -18,13 +18,15 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.recording import Recording, row
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.scene import Scene
 
 LN10 = math.log(10.0)
+#: How many headline numbers a cycle has.
+NUMBERS = 5
 _LOG_RATE, _SPRING = attrgetter("log_rate"), attrgetter("spring")
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
@@ -72,29 +74,27 @@ class Cycle(NamedTuple):
         return self.fastest - self.slowest
 
     def numbers(self) -> np.ndarray:
-        """The headline numbers, in the order of their names."""
+        """The headline numbers, in the order of their names; stress drops are from where the event
+        begins, because the next may begin elsewhere.
+        """
+        highest = self.begin.spring
         return np.array(
             [
                 self.interval,
-                self.highest - self.lowest,
-                self.highest - self.at_peak,
+                highest - self.lowest,
+                highest - self.at_peak,
                 self.slowest / LN10,
                 self.fastest / LN10,
             ]
         )
 
-    def numbers_of_event(self) -> np.ndarray:
-        """The same of one event among others: with stress drops from where it begins, because the
-        next may begin elsewhere.
-        """
-        higher = self.begin.spring - self.end.spring
-        numbers = self.numbers()
-        numbers[1:3] += higher
-        return numbers
-
 
 def cycles(
-    scene: Scene, accuracy: Accuracy, meter: Meter, start: Point | None
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+    start: Point | None,
+    recording: Recording | None = None,
 ) -> Iterator[Cycle | None]:
     """The cycles of a motion, one after the other; None once it has settled to steady sliding.
 
@@ -103,7 +103,8 @@ def cycles(
     """
     watch, ahead = _Watch(start), 0 if start else len(scene.segments) - 1
     swings, asked = list[float](), _asked(scene.log_load_rate)
-    for event in follow(scene, accuracy, meter, asked, start=start, clock=True):
+    motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
+    for event in motion:
         if event.kind is Kind.SEGMENT:
             watch, ahead = _Watch(None), ahead - 1
         if ahead:
@@ -120,21 +121,23 @@ def cycles(
             return
 
 
-def recorded(
-    scene: Scene, start: Point, accuracy: Accuracy, meter: Meter, count: int = 1
-) -> tuple[Cycle | None, np.ndarray]:
-    """The last of so many cycles, and what is recorded along all of them; no cycle where the motion
-    settles instead.
-    """
-    watch, recording = _Watch(start), Recording()
-    asked = _asked(scene.log_load_rate)
-    motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
-    for event in motion:
-        cycle = watch.see(event)
-        count -= cycle is not None
-        if not count or event.kind is Kind.SETTLED:
-            return cycle, recording.seen(scene, until=event)
-    raise AssertionError("a motion never ends by itself")
+def more_events(events: int, name: str = "events") -> str:
+    """How to wait for more events, to be added to a message."""
+    return f"--set {name}={2 * events} ({name}=) waits for more"
+
+
+def orbit_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
+    """What was recorded along cycles that follow each other; their ends, where nothing was."""
+    begin, end = seen[0].begin, seen[-1].end
+    passed = math.fsum(cycle.interval for cycle in seen)
+    slip = scene.load_velocity * passed - (end.spring - begin.spring) / scene.stiffness
+    ends = Recording()
+    ends.add([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)])
+    if recording is None:
+        return ends.seen(scene)
+    # the last step goes beyond the end
+    rows = recording.seen(scene)
+    return np.vstack([rows[rows[:, 0] < passed], ends.seen(scene)[-1:]])
 
 
 @lru_cache(maxsize=256)

@@ -11,12 +11,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import LN10, Cycle
-from rsfstudy.boundaries.periods import Course, Orbit, ReturnMap, course
+from rsfstudy.boundaries.cycles import LN10, Cycle, more_events
+from rsfstudy.boundaries.periods import Course, course
+from rsfstudy.boundaries.return_map import Orbit, ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.measures.limit_cycle import NUDGE, PERIOD, SETTLES, more_events, without_period
+from rsfstudy.measures.limit_cycle import (
+    NUDGE,
+    PEAK,
+    PERIOD,
+    SETTLES,
+    cycle_errors,
+    judged,
+    without_period,
+)
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Quantity
@@ -80,13 +89,13 @@ class Bifurcation(Measure):
 
     A cycle of one event is looked for too, whether it attracts or not, close to where the motion
     comes closest to repeating itself. Its Floquet multipliers are the eigenvalues of the derivative
-    of the map of states from one maximum of spring stress to the next: where one passes -1, the
-    period doubles. The period is that of a cycle that closes to the accuracy and attracts; without
-    one the motion ends as `not_periodic`, with all numbers but those of a period. Peaks of chaotic
-    motion have no error estimate, because no accuracy would reproduce them; the number of events in
-    a period has none because it is whole. The Lyapunov exponent of such a motion is a mean over the
-    events that are kept, with its standard error; that of a cycle is the logarithm of its largest
-    multiplier, and has none.
+    of the map of spring stress and states from one maximum of spring stress to the next: where one
+    passes -1, the period doubles. The period is that of a cycle that closes to the accuracy and
+    attracts; without one the motion ends as `not_periodic`, with all numbers but those of a period.
+    Peaks of chaotic motion have no error estimate, because no accuracy would reproduce them; the
+    number of events in a period has none because it is whole. The Lyapunov exponent of such a
+    motion is a mean over the events that are kept, with its standard error; that of a cycle is the
+    logarithm of its largest multiplier, and has none.
 
     Parameters
     ----------
@@ -158,18 +167,21 @@ class Bifurcation(Measure):
         if came is None:
             return SETTLES
         values = self._of_events(scene, came.seen[-self.events :])
-        values |= _of_one_event(scene, accuracy, came, meter)
+        status, why, of_one = _of_one_event(scene, accuracy, came, meter)
+        values |= of_one
         if came.orbit is None:
             growth = ReturnMap(scene, accuracy, meter).growth(came.seen, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = more_events(max(self.transient, self.events), "transient")
             ended = without_period(scene, came, remedy)
-            return Outcome(ended.status, values, ended.message)
+            if status is Status.OK:
+                status, why = ended.status, ended.message
+            return Outcome(status, values, why)
         values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
         values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
-        alone = "one_event_log10_peak" in values
-        said = "" if alone else "the motion comes close to no cycle of one event"
-        return Outcome(Status.OK, values, said)
+        if status is Status.OK and "one_event_log10_peak" not in values:
+            why = "the motion comes close to no cycle of one event"
+        return Outcome(status, values, why)
 
     def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
         """What is told of the events that are kept."""
@@ -184,26 +196,26 @@ class Bifurcation(Measure):
 
 def _of_one_event(
     scene: Scene, accuracy: Accuracy, came: Course, meter: Meter
-) -> dict[str, float | np.ndarray]:
-    """The cycle of one event, if the motion comes close to one."""
+) -> tuple[Status, str, dict[str, float | np.ndarray]]:
+    """The cycle of one event, if the motion comes close to one; and whether it is known."""
     one = ReturnMap(scene, accuracy, meter).of_one_event(came.seen)
     if one is None:
-        return {}
-    begin, swing = np.array(one.events[0].begin.psis), one.events[0].swing
-    again = ReturnMap(scene, accuracy.refined(), meter).orbit(begin, 1, swing)
+        return Status.OK, "", {}
+    again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.events[0].swing)
     if again is None:
-        return {}
-    chance = _BY_CHANCE * accuracy.rtol
+        return Status.OK, "", {}
     (first, *_), (same, *_) = one.multipliers, again.multipliers
-    peaks = [orbit.events[0].fastest / LN10 for orbit in (one, again)]
-    return {
+    chance = _BY_CHANCE * accuracy.rtol
+    peak, error = float(one.numbers[PEAK]), float(cycle_errors(accuracy, one, again)[PEAK])
+    values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
         "floquet_multiplier_error": error_between(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": peaks[0],
-        "one_event_log10_peak_error": error_between(peaks[0], peaks[1], chance),
+        "one_event_log10_peak": peak,
+        "one_event_log10_peak_error": error,
     }
+    return *judged(accuracy, one, again, [PEAK]), values
 
 
 def _growth_of_cycle(orbit: Orbit) -> float:

@@ -109,11 +109,14 @@ def has_landed(log_rate: float, growth: float, below: float, missing: float, giv
     unnoticed; and see `may_land`.
 
     A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
-    that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there.
+    that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there. So is a
+    fall to one that rises: its trough is above where that is now, by several times the change of
+    ln V by which that trails, which is what is missing over a.
     """
     norm = max(norm_at(log_rate, given), norm_at(below, given))
     has_peak = missing < 0.0 and given.softness * norm**2 > given.landing
-    if growth > 0.0 and (log_rate > below + 1.0 or has_peak):
+    has_trough = missing > 0.1 * given.landing * given.a
+    if (growth > 0.0 and (log_rate > below + 1.0 or has_peak)) or (growth < 0.0 and has_trough):
         return False
     remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_rate - below))
     settled = max(norm / given.norm, weight_of_mass(below, missing, given)) < 0.5

@@ -147,7 +147,7 @@ def starting(scene: Scene) -> Point:
     begun = scene.parts.loading.beginning
     psis = (*psis[: len(psis) - len(begun)], *begun)
     stepped = on_slow_manifold(scene, scene.initial_stress + scene.spring_stress_step, psis)
-    return _at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
+    return at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
 
 
 def _stated(scene: Scene, resting: Numbers) -> tuple[Numbers, float]:
@@ -180,10 +180,10 @@ def jumped(scene: Scene, point: Point) -> Point:
     psis = point.psis[: scene.states]
     after = point._replace(spring=point.spring + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
-    return _at_rate(scene, after, point.log_rate) if scene.has_mass else after
+    return at_rate(scene, after, point.log_rate) if scene.has_mass else after
 
 
-def _at_rate(scene: Scene, point: Point, log_rate: float) -> Point:
+def at_rate(scene: Scene, point: Point, log_rate: float) -> Point:
     """A point with another ln(V/V_*), and the frictional stress that goes with it."""
     excess = scene.a * log_rate + point.psi
     friction = steady.stress_after_jump(scene, excess, point.psis)

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
+from rsfstudy.boundaries.approach import Approach
 from rsfstudy.boundaries.cycles import _asked, cycles
-from rsfstudy.measures.limit_cycle import Approach
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind
@@ -86,8 +86,8 @@ class Problem:
 def problem(scene: Scene) -> Problem:
     """The cycle of a scene, without marks."""
     tight = Accuracy(TIGHTEST_RTOL, budget=BUDGET, engine="compiled")
-    approach = Approach(scene, tight)
-    if not approach.follow(meter("compiled"), 300):
+    approach = Approach(scene, tight, meter("compiled"))
+    if not approach.follow(300):
         raise ValueError(f"no limit cycle: {scene}")
     begin = approach.seen[-1].end
     truth = next(cycles(scene, tight, meter("compiled"), begin))

@@ -1,0 +1,145 @@
+"""The way of a motion of one state to its limit cycle.
+
+One number decides what follows a rise of V through V_0, the spring stress there: the state goes
+with it, and what a departure along the motion changes is forgotten. So two cycles in a row tell the
+derivative of the map from one rise to the next, and where cycles come closer slowly, the motion
+leaps to the fixed point which that implies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsfstudy.boundaries.cycles import LN10, NUMBERS, Cycle, cycles, more_events, orbit_of
+from rsfstudy.boundaries.return_map import Orbit, ReturnMap, section
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Part of their distance to the limit that cycles keep each time: above the first they are leapt
+#: ahead of, above the second they approach none.
+_SLOW_APPROACH, _DIVERGES = 0.03, 0.98
+#: Longest leap, as a part of the swing of ln V.
+_NEAR = 0.1
+
+
+class Approach:
+    """The way to the limit cycle of a scene with one state.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : Meter
+        Charged with the motion.
+
+    Attributes
+    ----------
+    seen : list of Cycle
+        The cycles so far; the last is the limit cycle once `follow` has returned true.
+    """
+
+    def __init__(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> None:
+        self._scene, self._accuracy, self._meter = scene, accuracy, meter
+        self._by = ReturnMap(scene, accuracy, meter)
+        self._noise = accuracy.solver * scene.a
+        self._work = 0
+        self.seen: list[Cycle] = []
+        #: Derivatives of the section at the end of a cycle, and of its numbers below that, by the
+        #: section at its beginning; and whether they are known.
+        self._slopes, self._known = np.zeros((2 + NUMBERS, 2)), False
+        #: What was left to go along the map where the motion leapt last.
+        self._left_at_leap = np.inf
+
+    def follow(self, events: int) -> bool:
+        """Follow cycles until one is the limit cycle; false where the motion settles to steady
+        sliding.
+
+        Raises
+        ------
+        Halt
+            With `work_budget_spent` where none is within so many events.
+        """
+        start = None
+        while True:
+            spent = self._meter.spent
+            for cycle in cycles(self._scene, self._accuracy, self._meter, start):
+                if cycle is None:
+                    return False
+                self._work, spent = self._meter.spent - spent, self._meter.spent
+                self.seen.append(cycle)
+                self._learn()
+                if self._repeats():
+                    return True
+                if len(self.seen) >= events:
+                    text = f"no cycle repeats within {events} events; {more_events(events)}"
+                    raise Halt(Status.WORK_BUDGET_SPENT, text)
+                if self._may_leap():
+                    self._left_at_leap = abs(cycle.end.spring - cycle.begin.spring)
+                    start = self._by.point(section(cycle.begin) + self._ahead)
+                    break
+
+    @property
+    def orbit(self) -> Orbit:
+        """The last cycle, and what it implies of the limit cycle."""
+        last = self.seen[-1:]
+        path = orbit_of(self._scene, last, None)
+        slopes = (self._slopes,)
+        return Orbit(tuple(last), slopes, self._ahead, self._accuracy, self._work, path)
+
+    @property
+    def _return(self) -> float:
+        """Part of its distance to the limit cycle that a cycle keeps: of two directions, the motion
+        forgets one.
+        """
+        return float(np.trace(self._slopes[:2]))
+
+    @property
+    def _ahead(self) -> np.ndarray:
+        """From the section where the last cycle begins to that of the limit cycle."""
+        off = section(self.seen[-1].end) - section(self.seen[-1].begin)
+        return np.asarray(off + self._slopes[:2] @ off / (1.0 - min(self._return, _DIVERGES)))
+
+    def _learn(self) -> None:
+        """Take the derivatives from the last two cycles, as long as numerical errors allow."""
+        if len(self.seen) < 2:
+            return
+        before, now = self.seen[-2:]
+        apart = section(now.begin) - section(before.begin)
+        if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
+            self._known = True
+            ends = section(now.end) - section(before.end)
+            changes = np.append(ends, now.numbers() - before.numbers())
+            way, passed = self._by.along(now.begin)
+            sides = np.column_stack([changes, passed]), np.column_stack([apart, way])
+            self._slopes = sides[0] @ np.linalg.inv(sides[1])
+
+    def _repeats(self) -> bool:
+        """Whether the next cycles would all be the same: as the derivatives say, or because the
+        last two are.
+        """
+        numbers = self.seen[-1].numbers()
+        allowed = 0.3 * self._accuracy.rtol * np.abs(numbers)
+        attracts = self._known and self._return < _DIVERGES
+        if attracts and (np.abs(self._slopes[2:] @ self._ahead) <= allowed).all():
+            return True
+        if len(self.seen) < 2 or self.seen[-2].end != self.seen[-1].begin:
+            return False
+        change = np.abs(numbers - self.seen[-2].numbers())
+        left = min(max(self._return, 0.0), _DIVERGES)
+        return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
+
+    def _may_leap(self) -> bool:
+        """Whether to leap to the fixed point: not where the next cycle comes as close, nor where
+        that is far, because the swings may be headed for steady sliding; and not again where the
+        last leap came no closer, because leaps may go round in a circle.
+        """
+        cycle = self.seen[-1]
+        left = abs(cycle.end.spring - cycle.begin.spring)
+        if not 10.0 * self._noise <= left < 0.5 * self._left_at_leap:
+            return False
+        if not _SLOW_APPROACH < self._return < _DIVERGES:
+            return False
+        slowest, fastest = (self._slopes[2:] @ self._ahead)[-2:] * LN10
+        return bool(abs(fastest - slowest) < _NEAR * cycle.swing)

@@ -1,0 +1,352 @@
+"""Cycles that close, as fixed points of a map from one event of a motion to the next.
+
+An event runs from where V rises through V_0 to the next such instant. Spring stress and states say
+all there is to say there, because V is known: with mass, the spring carries what accelerates the
+slider besides what friction does. So a motion is a map of spring stress and states from one such
+section to the next, and a cycle of n events is a fixed point of its n-th power. The eigenvalues of
+the derivative there are its Floquet multipliers: what becomes of a small departure once around.
+Beyond 1 in size, the cycle repels; at -1, one of twice as many events comes off it.
+
+There is one unknown more than a departure can have directions, as long as mass hardly acts: the
+motion forgets one along itself, which is a change of states at the same spring stress, because
+spring stress is highest there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsfstudy.boundaries.cycles import NUMBERS, Cycle, cycles, orbit_of
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold, regimes
+from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.slider.equations import without_mass
+from rsfstudy.slider.forms import Point
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Step of the differences that give the derivative of the map, over how far ln V swings: its slopes
+#: bend over a hundredth of a swing.
+_STEP = 1e-4
+_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+#: Events along which a departure turns to where it grows, before growth counts: other directions
+#: lag behind by a factor of ten an event and more.
+_TURNING = 16
+#: How far off a cycle is looked for, over how far ln V swings, and most steps to it.
+_NEAR, _TRIES = 0.1, 12
+#: How many guesses there are at a cycle of one event, and how far off the first may be.
+_GUESSES, _AWAY = 3, 0.3
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A cycle that closes after some events.
+
+    Attributes
+    ----------
+    events : tuple of Cycle
+        One after the other.
+    slopes : tuple of ndarray
+        Of each event, the derivatives of the section at its end, and of its numbers below that, by
+        the section at its beginning.
+    ahead : ndarray
+        From the section where the events begin to that of the cycle which they imply.
+    accuracy : Accuracy
+        With which the events were followed.
+    work : int
+        Right-hand sides that took.
+    path : ndarray
+        Rows of what was recorded along the events, or of their ends.
+    """
+
+    events: tuple[Cycle, ...]
+    slopes: tuple[np.ndarray, ...]
+    ahead: np.ndarray
+    accuracy: Accuracy
+    work: int
+    path: np.ndarray
+
+    @property
+    def period(self) -> int:
+        """How many events it has."""
+        return len(self.events)
+
+    @property
+    def begin(self) -> np.ndarray:
+        """The section where the cycle begins."""
+        return np.asarray(section(self.events[0].begin) + self.ahead)
+
+    @property
+    def implied(self) -> np.ndarray:
+        """What the numbers of its first event lack, because its events do not close."""
+        return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The headline numbers of its first event, had its events closed."""
+        return np.asarray(self.events[0].numbers() + self.implied)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers, complex, the largest in size first."""
+        found = np.linalg.eigvals(product(self.slopes)).astype(complex)
+        return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+
+    @property
+    def attracts(self) -> bool:
+        """Whether motions close to it come closer."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def from_largest(self) -> Orbit:
+        """The same, beginning with the event that has the fastest peak."""
+        at = max(range(self.period), key=lambda place: self.events[place].fastest)
+        if not at:
+            return self
+        return replace(
+            self,
+            events=self.events[at:] + self.events[:at],
+            slopes=self.slopes[at:] + self.slopes[:at],
+            ahead=product(self.slopes[:at]) @ self.ahead,
+        )
+
+
+def section(point: Point) -> np.ndarray:
+    """Spring stress and states: all there is to say where V rises through V_0."""
+    return np.array((point.spring, *point.psis))
+
+
+def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
+    """The derivative of the section over several events, one after the other."""
+    size = slopes[0].shape[1]
+    together = np.eye(size)
+    for each in slopes:
+        together = each[:size] @ together
+    return together
+
+
+class ReturnMap:
+    """The map of spring stress and states from one rise of V through V_0 to the next.
+
+    Parameters
+    ----------
+    scene : Scene
+        Whose load point moves.
+    accuracy : Accuracy
+    meter : Meter
+        Charged with the motions.
+    recorded : bool
+        Whether to keep what the motions along a cycle do, besides its ends.
+    """
+
+    def __init__(
+        self, scene: Scene, accuracy: Accuracy, meter: Meter, *, recorded: bool = False
+    ) -> None:
+        self.scene, self.accuracy, self._meter = scene, accuracy, meter
+        self._recorded = recorded
+
+    def point(self, at: np.ndarray) -> Point:
+        """The slider at a section: on the slow manifold, or at V_0 where mass acts there.
+
+        Raises
+        ------
+        Halt
+            Where spring stress leaves no friction of forward slip.
+        """
+        spring, *psis = at.tolist()
+        point = on_slow_manifold(self.scene, spring, tuple(psis))
+        check_start(self.scene, point)
+        return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
+
+    def _acts(self, point: Point) -> bool:
+        """Whether mass acts beyond what the slow manifold holds of it."""
+        if not self.scene.has_mass:
+            return False
+        both = regimes(self.scene, self.accuracy, clock=False)
+        return both.excess(point) >= 0.0
+
+    def events(
+        self, start: np.ndarray, count: int, recording: Recording | None = None
+    ) -> list[Cycle]:
+        """So many events from a section on; fewer where the motion settles or cannot go on."""
+        seen = list[Cycle]()
+        try:
+            moving = cycles(self.scene, self.accuracy, self._meter, self.point(start), recording)
+            for cycle in moving:
+                if cycle is None:
+                    break
+                seen.append(cycle)
+                if len(seen) == count:
+                    break
+        except Halt as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+        return seen
+
+    def image(self, start: np.ndarray) -> np.ndarray | None:
+        """The section one event later, and the numbers of the event below it; None where the motion
+        does not come that far.
+        """
+        seen = self.events(start, 1)
+        return np.append(section(seen[0].end), seen[0].numbers()) if seen else None
+
+    def slopes(self, start: np.ndarray, count: int, scale: float) -> tuple[np.ndarray, ...]:
+        """Derivatives of so many events, one after the other, none of which takes a small step far;
+        fewer where the motion does not come that far. States are of the size of the scale.
+        """
+        found, step = list[np.ndarray](), _STEP * math.sqrt(self.accuracy.refinement) * scale
+        now: np.ndarray | None = start
+        for number in range(count):
+            slopes = None if now is None else self._slopes(now, step)
+            if now is None or slopes is None:
+                break
+            found.append(slopes)
+            after = self.image(now) if number < count - 1 else None
+            now = None if after is None else after[: len(now)]
+        return tuple(found)
+
+    def growth(self, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
+        """By how much small departures grow along the last so many events, as a logarithm: mean and
+        its standard error, over as many blocks of events as each has; NaN where they lead away from
+        the motion.
+
+        Which way a departure grows it learns along the events before, or the first half where there
+        are few.
+        """
+        seen = seen[-(kept + _TURNING) :]
+        step = _STEP * self.scene.a * max(cycle.swing for cycle in seen)
+        departure, grown = np.ones(len(section(seen[0].begin))), []
+        for cycle in seen:
+            start, by = section(cycle.begin), step * departure / np.linalg.norm(departure)
+            ahead, behind = self.image(start + by), self.image(start - by)
+            if ahead is None or behind is None:
+                return math.nan, math.nan
+            departure = (ahead - behind)[: len(start)] / (2.0 * step)
+            grown.append(math.log(np.linalg.norm(departure)))
+        grown = grown[min(_TURNING, len(grown) // 2) :]
+        blocks = np.array_split(grown, max(2, math.isqrt(len(grown))))
+        means = [block.mean() for block in blocks]
+        return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
+
+    def along(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+        """The direction in which the motion passes a section, and what going that way changes of
+        the section and the numbers of an event, as long as mass hardly acts: the time it takes.
+        """
+        scene, states = self.scene, len(point.psis)
+        spring = point.friction + scene.dynamics.radiated(scene.log_load_rate)
+        rates = without_mass(scene, clock=True).rates((spring, *point.psis, 0.0))
+        way, changes = np.array((0.0, *rates[1:-1])), np.zeros(1 + states + NUMBERS)
+        changes[1 + states] = -rates[-1]
+        return way, changes
+
+    def _slopes(self, start: np.ndarray, step: float) -> np.ndarray | None:
+        """Of the section after one event and of its numbers, by differences of order four; along
+        the motion, as it passes on.
+        """
+        point = self.point(start)
+        way, passed = self.along(point)
+        directions = np.linalg.qr(np.column_stack([way, np.eye(len(start))]))[0]
+        columns = list[np.ndarray]()
+        for unit in directions.T:
+            if not columns and not self._acts(point):
+                columns.append(passed / (unit @ way))
+                continue
+            slope = np.zeros(len(start) + NUMBERS)
+            for number, weight in _WEIGHTS:
+                ahead = self.image(start + number * step * unit)
+                behind = self.image(start - number * step * unit)
+                if ahead is None or behind is None:
+                    return None
+                slope += weight * (ahead - behind) / step
+            columns.append(slope)
+        return np.asarray(np.column_stack(columns) @ directions.T)
+
+    def of_one_event(self, seen: Sequence[Cycle]) -> Orbit | None:
+        """The cycle of one event that a motion comes close to, whether it attracts or not."""
+        for near in closest_returns(seen):
+            # where periods have doubled, events go back and forth around it
+            between = 0.5 * (section(near.begin) + section(near.end))
+            orbit = self.orbit(between, 1, near.swing, reach=_AWAY)
+            if orbit is not None:
+                return orbit
+        return None
+
+    def orbit(
+        self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
+    ) -> Orbit | None:
+        """The cycle of so many events, or of a divisor of them, within reach of a section; None
+        where there is none.
+        """
+        scale = self.scene.a * swing
+        slopes = self.slopes(start, count, scale)
+        found = self._solve(start, slopes, scale, reach) if len(slopes) == count else None
+        if found is None:
+            return None
+        count = _events_until_repeat(found.events, scale)
+        if np.abs(found.begin - start).max() > 10.0 * self.accuracy.rtol * scale:
+            slopes = self.slopes(found.begin, count, scale)
+        if len(slopes) < count:
+            return None
+        return replace(found, events=found.events[:count], slopes=slopes[:count])
+
+    def again(self, known: Orbit) -> Orbit | None:
+        """A cycle that is known at another accuracy; None where it does not close."""
+        if known.accuracy == self.accuracy:
+            return known
+        return self._solve(known.begin, known.slopes, self.scene.a * known.events[0].swing, _NEAR)
+
+    def _solve(
+        self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, reach: float
+    ) -> Orbit | None:
+        """The cycle of as many events as derivatives are known of, within reach of a section; None
+        where there is none. By Newton's method with Broyden's corrections.
+        """
+        at, enough, last = start, self.accuracy.rtol * scale, math.inf
+        jacobian = product(slopes) - np.eye(len(start))
+        move = np.zeros(len(start))
+        for _ in range(_TRIES):
+            spent, recording = self._meter.spent, Recording() if self._recorded else None
+            events = self.events(at, len(slopes), recording)
+            if len(events) < len(slopes):
+                return None
+            off = section(events[-1].end) - at
+            if move.any():
+                jacobian += np.outer(off, move) / (move @ move)
+            move = -np.linalg.solve(jacobian, off)
+            size = float(np.abs(move).max())
+            # as close as asked for, or as errors of the motion let it come
+            if size <= enough or 0.5 * last <= size <= 100.0 * enough:
+                path = orbit_of(self.scene, events, recording)
+                work = self._meter.spent - spent
+                return Orbit(tuple(events), tuple(slopes), move, self.accuracy, work, path)
+            at, last = at + move, size
+            if not np.abs(at - start).max() <= reach * scale:
+                return None
+        return None
+
+
+def _events_until_repeat(events: Sequence[Cycle], scale: float) -> int:
+    """After how many of its events a cycle begins anew."""
+    begin = section(events[0].begin)
+    for count in range(1, len(events)):
+        apart = np.abs(section(events[count - 1].end) - begin).max()
+        if len(events) % count == 0 and apart < 1e-4 * scale:
+            return count
+    return len(events)
+
+
+def closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
+    """The events of the later half that came closest to the one before, over how far ln V swings;
+    the closest first.
+    """
+
+    def off(cycle: Cycle) -> float:
+        apart = np.subtract(cycle.end.psis, cycle.begin.psis)
+        return float(np.abs(apart).max()) / cycle.swing
+
+    return sorted(seen[len(seen) // 2 :], key=off)[:_GUESSES]
