@@ -339,7 +339,7 @@ MOTIONS: dict[str, Motion | Track] = {
     ),
     # motions that cannot go on
     "slip, unbounded": Motion({"law": "slip", **CONSTANT, "stress_dependence": 0.5, **SLIPS}),
-    "family, budget spent": Motion({"law": "family", **CONSTANT, **UP}, budget=300),
+    "family, budget spent": Motion({"law": "family", **CONSTANT, **UP}, budget=295),
     "perrin_rice_zheng, normal stress lost": Motion(
         {
             "law": "perrin_rice_zheng",
