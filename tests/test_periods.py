@@ -244,11 +244,11 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone():
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, to_its_end=True).seen
     by = ReturnMap(scene, quick(1e-7), Meter(2_000_000, engine=COMPILED))
-    direction, grown = np.array([1.0, -0.3]), []
+    direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = np.array(cycle.begin.psis)
+        begin = section(cycle.begin)
         (slopes,) = by.slopes(begin, 1, scene.a * cycle.swing)
-        direction = slopes @ direction / np.linalg.norm(direction)
+        direction = slopes[: len(begin)] @ direction / np.linalg.norm(direction)
         grown.append(math.log(np.linalg.norm(direction)))
     expected = np.mean(grown[transient:])
     assert found["lyapunov_exponent"] == pytest.approx(expected, abs=1e-3)
