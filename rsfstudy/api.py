@@ -25,7 +25,7 @@ from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number, compared, differences
 from rsfstudy.files.side_by_side import Comparison, side_by_side
 from rsfstudy.measures import Outcome
-from rsfstudy.motion.engines import COMPILED, check_engine
+from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
 from rsfstudy.progress import compile_with_notice, shown
 from rsfstudy.slider.scene import Scene
 
@@ -74,7 +74,7 @@ def run(
         Forget the finished cells and compute all again.
     rtol : float, optional
         Accuracy of the cells.
-    engine : {"scipy", "compiled"}, optional
+    engine : {"scipy", "python", "compiled"}, or a class, optional
         What integrates motions; compiled, which needs Numba, is much faster.
     budget : int, optional
         Right-hand sides a cell may evaluate before it ends as `work_budget_spent`. Cells that have
@@ -155,10 +155,15 @@ def prepared(
         For anything wrong with the study or the options.
     """
     check_engine(study.accuracy.engine)
-    parts = tuple(study.own_parts.values())
-    digest = own_code.digest(type(study.measure), *parts)
-    code = provenance.code(study.accuracy.engine)
-    task = Task(study.measure, study.accuracy, workers.time_limit, code, parts, digest)
+    task = Task(
+        study.measure,
+        study.accuracy,
+        workers.time_limit,
+        code=provenance.code(study.accuracy.engine),
+        parts=tuple(study.own_parts.values()),
+        steppers=own_stepper(study.accuracy.engine),
+        own_code=own_code.digest(*study.own_classes),
+    )
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent
     ready = runner.Run(study, keeping, task, workers.threads())

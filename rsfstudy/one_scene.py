@@ -32,7 +32,7 @@ def critical_step(
     direction: str = "up",
     *,
     rtol: float = DEFAULT_RTOL,
-    engine: str = SCIPY,
+    engine: Any = SCIPY,
     budget: int = DEFAULT_BUDGET,
 ) -> xr.Dataset:
     """The critical step of one scene.
@@ -49,8 +49,9 @@ def critical_step(
         Steps that increase, or decrease.
     rtol : float
         Relative accuracy of V_0/V_* - 1, of the displacement, or of the logarithm of normal stress.
-    engine : {"scipy", "compiled"}
-        What integrates motions; compiled, which needs Numba, is much faster.
+    engine : {"scipy", "python", "compiled"}, or type
+        What integrates motions; compiled, which needs Numba, is much faster. A stepper of your own
+        is given by its class.
     budget : int
         Right-hand sides it may evaluate before it ends as `work_budget_spent`.
 
@@ -75,7 +76,7 @@ def limit_cycle(
     *,
     events: int = LimitCycle.events,
     rtol: float = DEFAULT_RTOL,
-    engine: str = SCIPY,
+    engine: Any = SCIPY,
     budget: int = DEFAULT_BUDGET,
 ) -> xr.Dataset:
     """The stick-slip limit cycle of one scene.

@@ -7,7 +7,7 @@ import json
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Never
+from typing import Any, Never
 
 import numpy as np
 import xarray as xr
@@ -56,7 +56,7 @@ def simulate(
     duration: float | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
-    engine: str = SCIPY,
+    engine: Any = SCIPY,
 ) -> xr.Dataset:
     """Follow the motion of a scene from the instant after its step.
 
@@ -71,8 +71,9 @@ def simulate(
         Accuracy of the motion.
     budget : int
         Right-hand sides it may cost.
-    engine : {"scipy", "compiled"}
-        What integrates; compiled, which needs Numba, is much faster.
+    engine : {"scipy", "python", "compiled"}, or type
+        What integrates; compiled, which needs Numba, is much faster. A stepper of your own is given
+        by its class.
 
     Returns
     -------
@@ -111,10 +112,11 @@ def simulate(
     if not _is_positive(duration):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
-    check_engine(engine)
+    accuracy = Accuracy(rtol, budget, engine=engine)
+    check_engine(accuracy.engine)
     if not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
-    meter, accuracy = Meter(budget, engine=engine), Accuracy(rtol, budget, engine=engine)
+    meter = Meter(budget, engine=accuracy.engine)
     recording = Recording(list(_REGIMES))
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
     watches = [rise("log_rate", limit)] if limit < math.inf else []
@@ -143,7 +145,7 @@ def simulate(
             "status": status.label,
             "message": message,
             "rtol": rtol,
-            "engine": engine,
+            "engine": accuracy.engine,
             "rhs_evaluations": meter.spent,
             "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
         }

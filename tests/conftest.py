@@ -7,7 +7,7 @@ import gc
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,9 +15,10 @@ from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
 from rsfstudy.compute import clusters, workers
+from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import motion, starting
-from rsfstudy.motion.stepping import Meter, Step
+from rsfstudy.motion.events import Event, Watch, settling
+from rsfstudy.motion.stepping import Meter
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -68,13 +69,23 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
+#: Told at the end of each step: no slider is twice as far from steady sliding as it has ever been.
+EACH_STEP = settling(2.0)
+
+
 def follow(
-    scene: Scene, rtol: float, until: Callable[[Step], bool], budget: int = 2_000_000
+    scene: Scene,
+    rtol: float,
+    until: Callable[[Event], bool],
+    budget: int = 2_000_000,
+    watches: Sequence[Watch] = (),
 ) -> Meter:
-    """Integrate a scene until the callback, which sees every step, says so."""
-    meter = Meter(budget)
-    for step in motion(scene, Accuracy(rtol, budget), meter, starting(scene), clock=True):
-        if until(step):
+    """Follow a scene until the callback says so, which sees its start, the beginning of each regime
+    and the end of each step; and what else is watched for.
+    """
+    meter, watches = Meter(budget), (*watches, EACH_STEP)
+    for event in course.follow(scene, Accuracy(rtol, budget), meter, watches, clock=True):
+        if until(event):
             return meter
     raise AssertionError("a motion never ends by itself")
 

@@ -10,14 +10,18 @@ this one answers too.
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.events import Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.events import Kind, Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.recording import OBSERVED, Recording
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import between_ruptures, rigid
 
@@ -85,7 +89,27 @@ class Track(NamedTuple):
             equations = rigid(scene, self.log_rate)
         meter, how = Meter(self.budget, engine=engine), {"backward": self.backward}
         asked = (equations, self.state, 0.07 * self.rtol, meter, self.watches)
-        return along(*asked, **how, samples=self.samples)
+        if not self.samples:
+            return along(*asked, **how)
+        if "samples" in inspect.signature(along).parameters:  # of another tree
+            return along(*asked, **how, samples=self.samples)
+        return self._recorded(scene, *asked, **how)
+
+    def _recorded(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
+        """The same, and the rows that are recorded of a rigid slider of one state, in their order;
+        all told with the last of them.
+        """
+        recording, events = Recording(at=np.array(self.samples)), []
+        for event in along(*asked, **how, recording=recording):
+            if event.kind is Kind.SAMPLED:
+                break
+            events.append(event)
+        friction = recording.seen(scene)[:, OBSERVED.index("frictional_stress")] - scene.mu_star
+        events += [
+            event._replace(slip=slip, point=asked[0].at((stress,)))
+            for slip, stress in zip(self.samples, friction.tolist(), strict=True)
+        ]
+        return iter(sorted(events, key=lambda event: event.slip))
 
 
 #: A direct effect three times the usual one: rounding of mu_* moves ln V by as much over a.
@@ -334,7 +358,7 @@ MOTIONS: dict[str, Motion | Track] = {
         (0.05,),
         (fall("friction", 0.03), fall("state", -0.1)),
         rows=6,
-        samples=(0.0, 0.5, 1.0, 3.0),
+        samples=(0.0, 0.5, 1.0),
         log_rate=math.log(10.0),
     ),
     # motions that cannot go on

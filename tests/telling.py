@@ -69,7 +69,9 @@ def told(motion: Motion | Track, engine: str, scene: Scene | None = None) -> Tol
         for event in itertools.islice(motion.events(scene, engine), motion.rows):
             events.append(event)
             asked = () if event.watch is None else (event.watch.of, f"{event.watch.level:.6g}")
-            kinds.append(" ".join((event.kind, *asked, event.regime)))
+            # a tree of before says sample
+            kind = "sampled" if event.kind == "sample" else event.kind
+            kinds.append(" ".join((kind, *asked, event.regime)))
     except Halt as halt:
         kinds.append(halt.status.label)
     numbers = {

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
 
 import rsfstudy
@@ -21,7 +22,10 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import WorkPrecision
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import METHODS, Meter, steps
+from rsfstudy.motion.course import along
+from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.steppers.scipy import METHODS
+from rsfstudy.motion.stepping import Meter
 from rsfstudy.reduce import Cheapest, reduced
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.status import Status
@@ -44,11 +48,10 @@ def test_every_right_hand_side_is_counted(method, monkeypatch):
     system, calls = between_ruptures(SCENE, clock=False), []
     counted = replace(system, rate=lambda state, p: (calls.append(state), system.rate(state, p))[1])
     meter = Meter(10**6, {"quasi_static": method})
-    for number, step in enumerate(steps(counted, [0.0, 0.0], 1e-6, meter)):
-        step.state_at(0.5 * (step.start + step.end))
-        if number == 20:
-            break
-    assert meter.spent == len(calls)
+    # within each step it is recorded, which asks for interpolants
+    path = along(counted, (0.0, 0.0), 1e-6, meter, [EACH_STEP], recording=Recording())
+    told = list(itertools.islice(path, 22))
+    assert meter.spent == told[-1].work == len(calls)
     assert meter.steps == 21
     assert (meter.jacobians > 0) == (method in ("Radau", "BDF"))
 

@@ -285,7 +285,7 @@ def test_run_all_is_fine_where_every_study_is(catalogued, tmp_path):
 @pytest.fixture
 def without_numba(monkeypatch):
     """As where Numba is not installed."""
-    monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.engine", None)
+    monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.machine", None)
     engines.compiled_engine.cache_clear()
     yield
     engines.compiled_engine.cache_clear()

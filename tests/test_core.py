@@ -7,15 +7,19 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi, follow
+from conftest import EACH_STEP, cot_phi, follow
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
+from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.regimes import motion, starting
-from rsfstudy.motion.stepping import Halt, Meter, steps
+from rsfstudy.motion.course import along
+from rsfstudy.motion.engines import PYTHON, SCIPY
+from rsfstudy.motion.events import Kind, maximum, minimum
+from rsfstudy.motion.regimes import starting
+from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
@@ -24,6 +28,7 @@ from rsfstudy.slider.equations import (
     log_rate_at,
 )
 from rsfstudy.slider.forms import Point, advance
+from rsfstudy.slider.slots import FIRST_OWN
 from rsfstudy.status import Status
 
 
@@ -43,11 +48,9 @@ def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio
         load = scene.log_load_rate - point.log_rate + steadiness
         return math.exp(steadiness) - steadiness + weakening * (math.exp(load) - load)
 
-    def until(step):
-        held.append(invariant(step.after))
-        if len(held) == 1:
-            held.insert(0, invariant(step.before))
-        return step.end > 300.0  # some ten periods
+    def until(event):
+        held.append(invariant(event.point))
+        return event.clock > 300.0  # some ten periods
 
     follow(scene, 1e-9, until)
     # H is of order 10; its drift is what local errors of 2e-11 add up to
@@ -69,46 +72,30 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
             + weakening * point.log_rate
         )
 
-    def until(step):
+    def until(event):
         # the separatrix repels: what is left of 2e-12 grows with v**lambda
-        amplified = math.exp(max(1.0, weakening) * step.after.log_rate)
-        assert invariant(step.after) == pytest.approx(1.0, abs=1e-10 * amplified)
-        return step.after.log_rate > 6.0
+        amplified = math.exp(max(1.0, weakening) * event.point.log_rate)
+        assert invariant(event.point) == pytest.approx(1.0, abs=1e-10 * amplified)
+        return event.point.log_rate > 6.0
 
     follow(scene, 1e-10, until)
 
 
-def cycle(scene: Scene, rtol: float, number: int, accuracy: Accuracy | None = None):
-    """Recurrence interval, spring stress drop in a sigma_*, and right-hand sides of one stick-slip
-    cycle.
-    """
-    meter = Meter(10**7)
-    times, work = [], []
-    begin, equations, latest, trough = 0.0, None, 0.0, math.inf
-
-    def slower(point):
-        return point.log_rate - scene.log_load_rate
-
-    accuracy = accuracy or Accuracy(rtol, 10**7)
-    for step in motion(scene, accuracy, meter, starting(scene), clock=True):
-        if step.equations is not equations:
-            begin, equations = latest, step.equations
-        unit = scene.inertial_time if equations.regime == "inertial" else 1.0
-        latest = begin + step.state[-1] * unit
-        # spring stress turns where V = V_0; an arrest may pass that between two regimes
-        trough = min(trough, step.before.spring, step.after.spring)
-        if slower(step.before) * slower(step.after) >= 0.0:
+def cycle(
+    scene: Scene, rtol: float, number: int, accuracy: Accuracy | None = None
+) -> tuple[float, float]:
+    """Recurrence interval, and spring stress drop in a sigma_*, of one stick-slip cycle."""
+    accuracy, meter = accuracy or Accuracy(rtol, 10**7), Meter(10**7)
+    # spring stress turns where V = V_0; an arrest may pass that between two regimes
+    turning, times, trough = (maximum("spring"), minimum("spring")), [], math.inf
+    for event in course.follow(scene, accuracy, meter, turning, clock=True):
+        trough = min(trough, event.point.spring)
+        if event.kind is not Kind.MAXIMUM:
             continue
-        clock = step.locate(slower)
-        turning = step.point_at(clock).spring
-        if slower(step.before) > 0.0:
-            trough = min(trough, turning)
-            continue
-        times.append(begin + float(step.state_at(clock)[2]))
+        times.append(event.time)
         if len(times) == number + 1:
-            return times[-1] - times[-2], (turning - trough) / scene.a, meter.spent - work[-1]
+            return times[-1] - times[-2], (event.point.spring - trough) / scene.a
         trough = math.inf
-        work.append(meter.spent)
     raise AssertionError
 
 
@@ -149,16 +136,16 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
         landing = property(lambda _self: 1e-9)
         solver = property(lambda _self: 1e-11)
 
-    scene = Scene(
-        normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
-    )
     exact, _drop, number = REFERENCES["slip"]
-    errors = {
-        weight: abs(
-            cycle(scene, 1e-9, number, Switched(1e-9, 10**7, weight=weight))[0] / exact - 1.0
+
+    def error(weight):
+        scene = Scene(
+            normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
         )
-        for weight in (1e-3, 2e-3)
-    }
+        switched = Switched(1e-9, 10**7, weight=weight)
+        return abs(cycle(scene, 1e-9, number, switched)[0] / exact - 1.0)
+
+    errors = {weight: error(weight) for weight in (1e-3, 2e-3)}
     for weight, error in errors.items():
         assert 0.001 < error / (12.2 * weight) ** 3 < 0.002
     assert 4.0 < errors[2e-3] / errors[1e-3] < 16.0
@@ -176,12 +163,12 @@ def peaks(displacement, accuracy):
         displacement_step=displacement,
     )
     full, meter, begin = by_inertial_time(scene), Meter(10**6), None
-    for step in motion(scene, accuracy, meter, starting(scene)):
-        begin = step.after if begin is None and step.after.log_rate > 10.0 else begin
-        if step.before.growth > 0.0 >= step.after.growth:
+    for event in course.follow(scene, accuracy, meter, [maximum("log_rate"), EACH_STEP]):
+        if event.kind is Kind.MAXIMUM:
             break
+        begin = event.point if begin is None and event.point.log_rate > 10.0 else begin
     assert set(meter.by_regime) == {"slow_manifold"}
-    top = step.point_at(step.locate(lambda point: point.growth))
+    top = event.point
     stops = [lambda _t, y: full.rates(tuple(y))[1]]
     stops[0].terminal, stops[0].direction = True, -1.0
     theirs = solve_ivp(
@@ -285,15 +272,24 @@ def test_rupture_agrees_with_a_second_formulation(law, effects):
         scene.alpha or 0.0,
     )
     stiffness, eps = scene.stiffness, scene.inertial_time
-    stretch = []
+    points = []
 
-    def until(step):
-        if step.equations.regime == "inertial":
-            stretch.append(step)
-        return bool(stretch) and step.equations.regime != "inertial"
+    def until(event):
+        if event.regime == "inertial":
+            points.append(event.point)
+        return len(points) > 3
 
     follow(scene, 1e-9, until)
-    first, last = stretch[0].before, stretch[-1].after
+    # begun anew, at the end of a step, for a time that is no difference of large ones
+    stretch = []
+    again = course.follow(
+        scene, Accuracy(1e-9), Meter(10**6), [EACH_STEP], start=points[3], clock=True
+    )
+    for event in again:
+        if event.regime != "inertial":
+            break
+        stretch.append(event)
+    first, last = stretch[0].point, stretch[-1].point
 
     def rate(_tau, y):
         f, x, theta = y
@@ -313,7 +309,7 @@ def test_rupture_agrees_with_a_second_formulation(law, effects):
         ]
 
     theta = first.imbalance - b * first.log_rate
-    duration = float(stretch[-1].state[-1])
+    duration = stretch[-1].time / eps
     theirs = solve_ivp(
         rate,
         (0.0, duration),
@@ -338,13 +334,13 @@ def test_inertia_is_integrated_only_where_it_acts():
     their cost.
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
-    meter = follow(slow, 1e-7, lambda step: step.end > 100.0)
+    meter = follow(slow, 1e-7, lambda event: event.clock > 100.0)
     assert set(meter.by_regime) == {"slow_manifold"}
     fast = slow.with_(stiffness_ratio=0.8)
     regimes = []
 
-    def until(step):
-        regimes.append((step.equations.regime, step.after.log_rate + math.log(fast.inertial_time)))
+    def until(event):
+        regimes.append((event.regime, event.point.log_rate + math.log(fast.inertial_time)))
         return len(regimes) > 1500
 
     follow(fast, 1e-7, until)
@@ -359,7 +355,7 @@ def test_psi_is_continuous_across_a_displacement_step(displacement):
     ln(sigma/sigma_*), eq. 2.
     """
     scene = Scene(displacement_step=displacement)
-    first = next(motion(scene, Accuracy(), Meter(10**4), starting(scene))).before
+    first = next(course.follow(scene, Accuracy(), Meter(10**4))).point
     assert first.psi == 0.0
     assert first.spring == pytest.approx(scene.stiffness * displacement, rel=1e-15)
     ratio = 1.0 + cot_phi(scene) * first.spring
@@ -374,21 +370,23 @@ def test_mass_follows_a_displacement_step_within_the_inertial_time():
     scene = Scene(normal_stress="constant", displacement_step=20.0, inertia=True)
     fast = scene.inertial_time * math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
     assert fast > 1.0
-    step = next(motion(scene, Accuracy(), Meter(10**5), starting(scene)))
-    assert step.equations.regime == "inertial"
-    assert (step.before.log_rate, step.before.friction) == (0.0, 0.0)
-    assert step.before.spring == scene.spring_stress_step
+    begun = next(course.follow(scene, Accuracy(), Meter(10**5)))
+    assert begun.regime == "inertial"
+    assert (begun.point.log_rate, begun.point.friction) == (0.0, 0.0)
+    assert begun.point.spring == scene.spring_stress_step
 
 
 def test_work_budget_ends_a_motion():
     with pytest.raises(Halt, match="more than 500 right-hand sides") as halted:
-        follow(Scene(stiffness_ratio=1.1, load_velocity_ratio=1.2), 1e-9, lambda _s: False, 500)
+        follow(Scene(stiffness_ratio=1.1, load_velocity_ratio=1.2), 1e-9, lambda _event: False, 500)
     assert halted.value.status is Status.WORK_BUDGET_SPENT
 
 
 def test_slip_without_mass_that_runs_away_is_named():
     with pytest.raises(Halt, match="beyond 10.120") as halted:
-        follow(Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _s: False, 10**4)
+        follow(
+            Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _event: False, 10**4
+        )
     assert halted.value.status is Status.SLIP_RATE_UNBOUNDED
 
 
@@ -414,19 +412,20 @@ def test_a_slider_that_locks_is_named():
         load_velocity_ratio=0.3,
     )
     with pytest.raises(Halt, match="normal stress grew") as halted:
-        follow(scene, 1e-6, lambda step: step.after.log_rate > 30.0)
+        follow(scene, 1e-6, lambda event: event.point.log_rate > 30.0)
     assert halted.value.status is Status.LOCKED
 
 
-def test_equations_that_fail_end_in_a_status_and_not_in_nan():
+@pytest.mark.parametrize("engine", [SCIPY, PYTHON])
+def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
     def rate(state, _p):
-        return [math.nan if state[0] > 1.0 else 1.0]
+        return (math.nan if state[0] > 1.0 else 1.0,)
 
     def point(state, _rates, _p):
-        return Point(*[float(state[0])] * len(Point._fields))
+        return Point(*[float(state[0])] * len(Point._fields))._replace(psis=state)
 
-    system = Equations("broken", ("y",), (1.0,), rate, point, (0.0,) * 6)
+    system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * FIRST_OWN)
+    meter = Meter(10**5, engine=engine)
     with np.errstate(invalid="ignore"), pytest.raises(Halt) as halted:
-        for _step in steps(system, [0.0], 1e-8, Meter(10**5)):
-            pass
+        list(along(system, (0.0,), 1e-8, meter))
     assert halted.value.status in (Status.INTEGRATION_FAILED, Status.WORK_BUDGET_SPENT)

@@ -18,7 +18,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import Kind, rise
-from rsfstudy.motion.handover import GOES_ON, fate, room_left
+from rsfstudy.motion.handover import GOES_ON, margin, termination_of
 from rsfstudy.motion.regimes import starting
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.status import Status
@@ -26,13 +26,13 @@ from rsfstudy.status import Status
 ENGINES = (SCIPY, COMPILED)
 
 
-def test_room_is_left_where_a_motion_goes_on():
+def test_a_margin_is_left_where_a_motion_goes_on():
     rates, stresses = (-700.0, -10.0, 270.0, 280.0), (-1.0, 1e-12, 1e-9, 1.0, 1e6, 1e7)
     for load in (0.0, 1.0):
         for x in rates:
             for stress in stresses:
-                goes_on = fate(x, stress, load) == GOES_ON
-                assert (room_left(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
+                goes_on = termination_of(x, stress, load) == GOES_ON
+                assert (margin(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

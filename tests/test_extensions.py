@@ -17,7 +17,7 @@ import pytest
 from running import call, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.files import restore
@@ -45,6 +45,7 @@ PLACES = {
     "loading_time": {"load_velocity_ratio": 10.0},
     "power_law": {"b_over_a": 2.0, "a": 0.01},
     "own_figure": {"phi": 60.0, "b_over_a": 2.0},
+    "order_four": {"b_over_a": 2.0},
 }
 
 
@@ -129,6 +130,26 @@ def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
 
 
 # ---- the numbers are those of mathematics -------------------------------------------------------
+
+
+def test_a_stepper_of_a_users_own(outside):
+    """V_0/V_* = 1 + a/(b - a) at critical stiffness, constant normal stress and a norm without
+    bound; the norm of 5e-4 takes 5e-3 of it at b/a = 1.5, and 2e-5 at b/a = 2. The accuracy asked
+    for is 1e-4.
+    """
+    found = outside["order_four"]
+    bias = {1.5: 0.02, 2.0: 1e-4}
+    for step in found.dataset.critical_velocity_ratio:
+        b_over_a = float(step.b_over_a)
+        assert float(step) == pytest.approx(1.0 + 1.0 / (b_over_a - 1.0), abs=bias[b_over_a])
+    stepper = catalogue.load(str(found.study))
+    assert stepper.accuracy.engine == "order_four"
+    scene = stepper.base.with_(inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
+    ours, theirs = (limit_cycle(scene, rtol=1e-5, engine=by) for by in ("order_four", "scipy"))
+    assert ours.attrs["engine"] == "order_four"
+    for name in ("recurrence_interval", "static_stress_drop", "max_log10_slip_rate"):
+        allowed = float(ours[f"{name}_error"] + theirs[f"{name}_error"])
+        assert float(ours[name]) == pytest.approx(float(theirs[name]), abs=allowed), name
 
 
 def test_a_hold_and_a_reload(outside):

@@ -31,6 +31,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY
 from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.recording import READ, STATES, Recording
 from rsfstudy.motion.regimes import check_start
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import stability, steady
@@ -209,19 +210,25 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
     """
     scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
-    samples = [0.1, 0.7, 2.0, 5.0]
-    path = along(rigid(scene, x), (start, 0.0, 0.0), 1e-11, Meter(100_000), (), samples=samples)
-    for slip, event in zip(samples, itertools.islice(path, 1, 5), strict=True):
-        _psi, porosity, pressure = event.point.psis
+    recording, meter = Recording(at=np.array([0.1, 0.7, 2.0, 5.0])), Meter(100_000)
+    equations = rigid(scene, x)
+    path = along(equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording)
+    next(event for event in path if event.kind is Kind.SAMPLED)
+    for row, asked in zip(recording.seen(scene), recording.at, strict=True):
+        slip, friction = row[READ.index("slip")], row[READ.index("frictional_stress")] - 0.76
+        porosity, pressure = row[STATES + 1 :]
+        assert slip == asked
         assert porosity == pytest.approx(0.01 * x * -math.expm1(-slip), abs=1e-11)
         exact = -0.01 * x * (math.exp(-slip) - math.exp(-c * slip)) / (c - 1.0)
         assert pressure == pytest.approx(exact, abs=1e-10)
         coefficient = 0.76 + scene.a * x + scene.b * x * math.expm1(-slip)
         stress = (1.0 - exact) * coefficient - 0.76
         # tolerance of a step 1e-11 of the scale a, over hundreds of steps
-        assert event.point.friction == pytest.approx(stress, abs=1e-10)
-        assert event.point.normal_stress == pytest.approx(1.0 - exact, abs=1e-10)
-        assert event.point.coefficient == pytest.approx(coefficient, abs=1e-10)
+        assert friction == pytest.approx(stress, abs=1e-10)
+        ratio = row[READ.index("normal_stress_ratio")]
+        assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
+        point = equations.at((friction, porosity, pressure))
+        assert point.coefficient == pytest.approx(coefficient, abs=1e-10)
 
 
 @pytest.mark.parametrize("stress", STRESS)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +13,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter, steps
+from rsfstudy.motion.course import along
+from rsfstudy.motion.events import Kind
+from rsfstudy.motion.recording import READ, Recording
+from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import laws, steady
 from rsfstudy.slider.assembly import functions
 from rsfstudy.slider.equations import evolution_of, evolutions_of, resting_of, rigid
@@ -62,11 +66,11 @@ def test_laws_agree_close_to_the_steady_state(log_rate, away, b):
 def state_after(law: str, log_rate: float, slipped: float) -> float:
     """State variable of a rigid slider at constant normal stress, integrated over slip."""
     scene = Scene(law=law, normal_stress="constant")
-    for step in steps(rigid(scene, log_rate), [scene.a * log_rate], 1e-12, Meter(10**6)):
-        if step.end >= slipped:
-            point = step.point_at(slipped)
-            return point.imbalance - scene.b * log_rate
-    raise AssertionError
+    recording = Recording(at=np.array([slipped]))
+    begin, meter = (scene.a * log_rate,), Meter(10**6)
+    path = along(rigid(scene, log_rate), begin, 1e-12, meter, recording=recording)
+    next(event for event in path if event.kind is Kind.SAMPLED)
+    return recording.seen(scene)[0, READ.index("state_variable")]
 
 
 @pytest.mark.parametrize("log_rate", [math.log(200.0), math.log(10.0), -math.log(1e4)])

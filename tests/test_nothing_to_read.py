@@ -81,7 +81,7 @@ def drawn(number: int) -> Scene:
         "length_ratio": 10.0 ** draw.uniform(-1.0, 1.0),
     }
     b_over_a = 1.0 + 10.0 ** draw.uniform(-1.0, 0.5)
-    cut_off = {"law": "cut_off", "cutoff_velocity_ratio": 10.0 ** draw.uniform(0.0, 2.0)}
+    cut_off = {"law": "cut_off", "cutoff_velocity_ratio": 10.0 ** draw.uniform(-3.0, 2.0)}
     return Scene(
         normal_stress="constant",
         a=0.01,

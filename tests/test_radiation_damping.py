@@ -15,6 +15,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
 from rsfstudy.status import Status
@@ -121,12 +122,12 @@ def test_a_second_formulation_in_time_agrees(law, effects):
 
     highest = []
 
-    def until(step):
-        highest.append(step)
-        return step.before.growth > 0.0 >= step.after.growth
+    def until(event):
+        highest.append(event.point)
+        return event.kind is Kind.MAXIMUM
 
-    follow(scene, 1e-9, until)
-    peak = highest[-1].point_at(highest[-1].locate(lambda point: point.growth))
+    follow(scene, 1e-9, until, watches=[maximum("log_rate")])
+    peak = highest[-1]
 
     def turning(_time, y):
         return rate(_time, y)[1]

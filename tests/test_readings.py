@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import DOP853, quad, solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize_scalar
 
@@ -15,8 +15,7 @@ from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.stepping import Meter, steps
-from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
+from rsfstudy.slider.equations import LONGEST_STRIDE, between_ruptures, in_rupture, rigid
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")
@@ -254,23 +253,29 @@ def test_the_change_of_what_is_read_is_its_derivative(equations):
     pressure outside the fault, which is the effective one and the pressure inside.
     """
     start = [0.01 * (1.0 + n) for n in range(len(equations.unknowns))]
-    for number, step in enumerate(steps(equations, start, 1e-10, Meter(10**4))):
-        middle, reach = 0.5 * (step.start + step.end), 0.1 * (step.end - step.start)
+    scales = 1e-10 * np.array(equations.scales)
+    steps = DOP853(
+        lambda _clock, state: equations.rates(tuple(state.tolist())), 0.0, start, math.inf,
+        rtol=1e-10, atol=scales, max_step=LONGEST_STRIDE,
+    )  # fmt: skip
+    for _ in range(21):
+        steps.step()
+        begin, end, within = steps.t_old, steps.t, steps.dense_output()
+        middle, reach = 0.5 * (begin + end), 0.1 * (end - begin)
 
-        def reads(clock, step=step):
-            point = step.point_at(clock)
+        def at(clock, within=within):
+            return equations.at(tuple(within(clock).tolist()))
+
+        def reads(clock, at=at):
+            point = at(clock)
             inside = point.psis[-1] if "pore_pressure" in equations.unknowns else 0.0
             return (equations.p[2] + point.spring) / (point.normal_stress + inside)
 
-        assert step.before.reading == pytest.approx(reads(step.start), rel=1e-13)
+        assert at(begin).reading == pytest.approx(reads(begin), rel=1e-13)
         near, far = (reads(middle + n * reach) - reads(middle - n * reach) for n in (1, 2))
         change = (8.0 * near - far) / (12.0 * reach)
-        size = abs(reads(step.end) - reads(step.start)) / abs(step.end - step.start)
-        assert step.point_at(middle).reading_growth == pytest.approx(
-            change, rel=1e-5, abs=1e-4 * size + 1e-9
-        )
-        if number == 20:
-            return
+        size = abs(reads(end) - reads(begin)) / abs(end - begin)
+        assert at(middle).reading_growth == pytest.approx(change, rel=1e-5, abs=1e-4 * size + 1e-9)
 
 
 def test_a_hold_of_a_longer_protocol_is_read_from_where_it_begins():

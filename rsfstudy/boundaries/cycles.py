@@ -18,7 +18,7 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.recording import Recording, row
+from rsfstudy.motion.recording import Recording, row, up_to
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.forms import Point
@@ -136,8 +136,7 @@ def orbit_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -
     if recording is None:
         return ends.seen(scene)
     # the last step goes beyond the end
-    rows = recording.seen(scene)
-    return np.vstack([rows[rows[:, 0] < passed], ends.seen(scene)[-1:]])
+    return up_to(recording.seen(scene), ends.seen(scene)[-1])
 
 
 @lru_cache(maxsize=256)

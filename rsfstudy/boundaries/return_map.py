@@ -22,8 +22,9 @@ import numpy as np
 
 from rsfstudy.boundaries.cycles import NUMBERS, Cycle, cycles, orbit_of
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold, regimes
+from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import without_mass
 from rsfstudy.slider.forms import Point
@@ -167,8 +168,9 @@ class ReturnMap:
         """Whether mass acts beyond what the slow manifold holds of it."""
         if not self.scene.has_mass:
             return False
-        both = regimes(self.scene, self.accuracy, clock=False)
-        return both.excess(point) >= 0.0
+        missing = point.spring - point.friction
+        given = limits(self.scene, self.accuracy)
+        return weight_of_mass(point.log_rate, missing, given) >= 1.0
 
     def events(
         self, start: np.ndarray, count: int, recording: Recording | None = None

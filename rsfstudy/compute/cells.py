@@ -26,6 +26,7 @@ from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.files.journal import Finished, Layout
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import compiling
 from rsfstudy.slider import fields
@@ -63,10 +64,11 @@ class Task:
         CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
     code : mapping
         Versions of all that decides a number, which every worker must have.
-    parts : tuple of type
-        Parts of the slider that are the user's own.
+    parts, steppers : tuple of type
+        Parts of the slider, and a stepper, that are the user's own.
     own_code : str
-        Digest of the code of the measure and the parts, where they are a user's own: the same.
+        Digest of the code of the measure, the parts and the stepper, where they are a user's own:
+        the same.
     home : str
         The process that made the task.
     """
@@ -76,6 +78,7 @@ class Task:
     time_limit: float = TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
     parts: tuple[type[Part], ...] = ()
+    steppers: tuple[type, ...] = ()
     own_code: str = "none"
     home: str = _HERE
 
@@ -121,10 +124,12 @@ def sendable(task: Task) -> bytes:
     Raises
     ------
     InvalidValue
-        Where the measure or a part of the slider cannot be serialized.
+        Where the measure, a part of the slider or a stepper cannot be serialized.
     """
     for part in task.parts:
         _dumped(part, "part", part.name)
+    for stepper in task.steppers:
+        _dumped(stepper, "engine", task.accuracy.engine)
     return _dumped(task, "measure", task.measure.name)
 
 
@@ -160,7 +165,7 @@ def _received(sent: bytes) -> Task:
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
                 "mix. Give the workers the same versions"
             )
-    classes = type(task.measure), *task.parts
+    classes = type(task.measure), *task.parts, *task.steppers
     if own_code.digest(*classes) != task.own_code:
         names = " or ".join(kind.__name__ for kind in classes)
         raise RunError(
@@ -206,6 +211,7 @@ def on_worker(sent: bytes, batch: bytes) -> bytes:
         compiling.aside = _limits.lifted
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
         fields.know(task.parts)
+        engines.know(task.steppers)
         for key, cell in _unpacked(batch):
             finished.append(task.layout.finished(key, *computed(task, cell)))
             if time.monotonic() - began > _WORKER_HANDS_OVER:

@@ -13,7 +13,7 @@ from rsfstudy.declare.cell import Rows
 from rsfstudy.declare.study import Study
 from rsfstudy.declare.table import Table
 from rsfstudy.measures import Measure
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.slider.scene import Scene
 
 _KEY = np.dtype("V16")
@@ -21,7 +21,7 @@ _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: Time a batch should last in s, and the most cells it may hold: as many are lost with the machine.
 _SECONDS_PER_TASK, LARGEST_BATCH = 0.3, 5000
 #: Typical time of one right-hand side in s, by engine, with its share of everything else.
-_SECONDS_PER_RHS = {SCIPY: 1.2e-5, COMPILED: 5e-7}
+_SECONDS_PER_RHS = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
 #: Cells that are named at a time: their numbers are in memory meanwhile.
 _NAMED_AT_A_TIME = 50_000
 
@@ -228,4 +228,4 @@ def estimated_cost(plan: Plan) -> tuple[int, float]:
     """
     accuracy = plan.study.accuracy
     work = len(plan.different) * plan.study.measure.expected_work(accuracy)
-    return round(work), work * _SECONDS_PER_RHS[accuracy.engine]
+    return round(work), work * _SECONDS_PER_RHS.get(accuracy.engine, _SECONDS_PER_RHS[SCIPY])

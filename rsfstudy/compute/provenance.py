@@ -57,7 +57,7 @@ def fingerprint(study: Study) -> dict[str, Any]:
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
-        "own_code": own_code.digest(type(study.measure), *study.own_parts.values()),
+        "own_code": own_code.digest(*study.own_classes),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
         "methods": [list(pair) for pair in study.accuracy.methods],

@@ -23,6 +23,7 @@ from rsfstudy.declare.wording import short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
 from rsfstudy.slider.fields import (
@@ -209,6 +210,11 @@ class Study:
             parts |= own_named(axis.fields, axis.rows)
         parts |= {part.name: part for part in self.base.own_parts}
         return dict(sorted(parts.items()))
+
+    @cached_property
+    def own_classes(self) -> tuple[type, ...]:
+        """The measure, and parts and stepper that are the user's own: what own code starts at."""
+        return type(self.measure), *self.own_parts.values(), *own_stepper(self.accuracy.engine)
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:

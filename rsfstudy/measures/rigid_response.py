@@ -17,6 +17,7 @@ from rsfstudy.measures._reading import errors_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
+from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import resting_of, rigid
 from rsfstudy.slider.scene import Scene
@@ -130,26 +131,25 @@ class RigidResponse(Measure):
         """Slip at which stress passes the level, stress after D_c, and (stress, state, normal
         stress) at the points.
         """
-        at = self.inner_coordinates["slip"]
-        rows: list[tuple[float, float, float]] = []
-        distance = left = math.nan
+        at, distance = self.inner_coordinates["slip"], math.nan
+        recording = Recording(at=np.union1d(at, [1.0]))
         equations = rigid(scene, scene.log_load_rate)
-        moments = np.union1d(at, [1.0])
         watches = (rise("friction", level), fall("friction", level))
         # states freed of stress are still those of steady sliding at V_* before the step
         state = (start, *resting_of(scene, 0.0, 0.0)[1:])
-        tolerance, samples = accuracy.solver, moments.tolist()
-        for event in along(equations, state, tolerance, meter, watches, samples=samples):
-            point = event.point
+        tolerance, complete = accuracy.solver, False
+        for event in along(equations, state, tolerance, meter, watches, recording=recording):
             if event.watch is not None and math.isnan(distance):
                 distance = event.slip
-            if event.kind is Kind.SAMPLE and event.slip == 1.0:
-                left = point.friction
-            if event.kind is Kind.SAMPLE and event.slip in at:
-                rows.append((point.friction, point.state, point.normal_stress))
-            if len(rows) == len(at) and not math.isnan(distance):
-                return distance, left, np.array(rows)
-        raise AssertionError("a motion never ends by itself")
+            complete = complete or event.kind is Kind.SAMPLED
+            if complete and not math.isnan(distance):
+                break
+        names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
+        columns = [READ.index(name) for name in names]
+        slips, *values = recording.seen(scene)[:, columns].T
+        values[0] = values[0] - scene.mu_star
+        rows = np.stack(values, axis=1)
+        return distance, float(rows[slips == 1.0, 0][0]), rows[np.isin(slips, at)]
 
 
 def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: np.ndarray) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from numbers import Real
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import ENGINES, SCIPY
+from rsfstudy.motion.engines import SCIPY, named
 
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
@@ -36,15 +36,16 @@ class Accuracy:
         Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
     methods : tuple of (str, str)
         Regimes and the SciPy integrators that serve them, where not the default one.
-    engine : {"scipy", "compiled"}
-        What integrates motions.
+    engine : {"scipy", "python", "compiled"}, or type
+        What integrates motions; or a stepper of the user's own, given by its class, for which its
+        name stands from then on.
     refinement : float
         Part of the usual tolerances that the integration is given; see `refined`.
 
     Raises
     ------
     InvalidValue
-        For an rtol outside 1e-11 to 1e-2, a budget below 1, an unknown engine, or integrators for
+        For an rtol outside 1e-11 to 1e-2, a budget below 1, what is no engine, or integrators for
         an engine that has its own.
     """
 
@@ -67,8 +68,7 @@ class Accuracy:
             )
         if self.budget < 1:
             raise InvalidValue("budget", self.budget, "must be at least 1")
-        if self.engine not in ENGINES:
-            raise InvalidValue("engine", self.engine, "is unknown", choices=ENGINES)
+        object.__setattr__(self, "engine", named(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"are SciPy's, and the engine is {self.engine}"
             raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")

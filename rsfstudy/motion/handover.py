@@ -93,20 +93,22 @@ def begins_slow(log_rate: float, below: float, missing: float, given: Limits) ->
     return slow and slip_of_rise(log_rate, below, given) <= given.landing
 
 
-def may_land(log_rate: float, given: Limits) -> bool:
+def may_return(log_rate: float, given: Limits) -> bool:
     """Whether ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
     straight back in its turn.
     """
     return norm_at(log_rate, given) < 0.5 * given.norm
 
 
-def has_landed(log_rate: float, growth: float, below: float, missing: float, given: Limits) -> bool:
+def has_returned(
+    log_rate: float, growth: float, below: float, missing: float, given: Limits
+) -> bool:
     """Whether the full equations have done their work at ln(V/V_*) and its growth, where the slow
     manifold has ln(V/V_*) `below`, and friction differs from spring stress by what is `missing`.
 
     The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
     (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
-    unnoticed; and see `may_land`.
+    unnoticed; and see `may_return`.
 
     A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
     that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there. So is a
@@ -123,7 +125,7 @@ def has_landed(log_rate: float, growth: float, below: float, missing: float, giv
     return settled and remaining < given.landing
 
 
-def fate(log_rate: float, normal_stress: float, load_velocity: float) -> int:
+def termination_of(log_rate: float, normal_stress: float, load_velocity: float) -> int:
     """Whether a motion goes on: not where normal stress vanishes, or normal stress or slip rate
     grow without bound, or slip stops.
 
@@ -140,10 +142,10 @@ def fate(log_rate: float, normal_stress: float, load_velocity: float) -> int:
     return GOES_ON
 
 
-def room_left(log_rate: float, normal_stress: float, load_velocity: float) -> float:
+def margin(log_rate: float, normal_stress: float, load_velocity: float) -> float:
     """How far ln V and the logarithm of normal stress are from where a motion ends: positive where
     it goes on.
     """
     stress = math.log(max(normal_stress, LEAST_STRESS))
-    room = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_rate)
-    return min(room, log_rate - SLOWEST) if load_velocity == 0.0 else room
+    left = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_rate)
+    return min(left, log_rate - SLOWEST) if load_velocity == 0.0 else left

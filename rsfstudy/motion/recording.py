@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rsfstudy.motion.events import Event
 from rsfstudy.slider.forms import Point
@@ -24,8 +25,9 @@ OBSERVED = (
 )
 #: The same, and what a rig reads.
 READ = (*OBSERVED, "friction_coefficient")
-#: Columns behind those: the regime, and from this one on the states.
-REGIME, STATES = len(READ), len(READ) + 1
+#: Columns behind those: the regime; the place within a step, 0 where a regime begins and `SAMPLES`
+#: at the end of each step; and from this one on the states.
+REGIME, PLACE, STATES = range(len(READ), len(READ) + 3)
 #: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
 #: they still differ in other units, where each is rounded anew.
 _APART, _LEAST = 4, 1e-290
@@ -41,9 +43,14 @@ class Recording:
     ----------
     regimes : list of str
         Those of the motion, as they came.
+    at : ndarray, optional
+        Times at which to record, in D_c/V_*, or slips in D_c of a rigid slider; they must not fall.
+        Without it, all of the motion is recorded, evenly within each step. Where a segment of
+        loading begins at such a time, what it ends with is recorded.
     """
 
     regimes: list[str] = field(default_factory=list)
+    at: np.ndarray | None = None
     _rows: list[np.ndarray] = field(default_factory=list)
     _ended: int = 0
 
@@ -53,12 +60,27 @@ class Recording:
             self.regimes.append(regime)
         return self.regimes.index(regime)
 
-    def add(self, rows: Sequence[tuple[float, ...]] | np.ndarray) -> None:
-        """Rows as `row` makes them."""
+    def left(self) -> np.ndarray:
+        """What is still to be recorded of what was asked for."""
+        assert self.at is not None
+        return np.asarray(self.at, dtype=float)[sum(map(len, self._rows)) :]
+
+    def add(self, rows: Sequence[tuple[float, ...]]) -> None:
+        """Add rows as `row` makes them."""
         self._rows.append(np.array(rows, dtype=float))
+
+    def take(self, rows: np.ndarray, regimes: Sequence[str]) -> None:
+        """Take in rows as the loop makes them, in which regimes are numbered as in a list."""
+        if self.at is not None and not np.isnan(rows[0, 0]):
+            rows[:, 0] = self.at[len(self.at) - len(self.left()) :][: len(rows)]
+        numbers = np.array([self.number(name) for name in regimes])
+        rows[:, REGIME] = numbers[rows[:, REGIME].astype(int)]
+        self._rows.append(rows)
 
     def ends_at(self, time: float) -> None:
         """What was taken in since the last such time, or the start, has ended at this one."""
+        if self.at is not None:
+            return
         for rows in self._rows[self._ended :]:
             np.minimum(rows[:, 0], time, out=rows[:, 0])
         if self._ended < len(self._rows):
@@ -74,20 +96,20 @@ class Recording:
         table = np.concatenate([part[:, :columns] for part in rows])
         if until is not None:
             last = row(until.time, until.slip, until.point, self.number(until.regime))
-            table = np.vstack([table[table[:, 0] < until.time], last[:columns]])
+            table = up_to(table, np.array(last[:columns]))
         table[:, 2] /= math.log(10.0)
         table[:, 3:5] += scene.mu_star
         return table
 
 
 def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
-    """What is recorded of a point: the quantities of `READ`, less scales and offsets, the
-    regime, and the states.
+    """What is recorded of a point: the quantities of `READ`, less scales and offsets, the regime,
+    the place within a step, and the states.
     """
     stresses = point.spring, point.friction, point.normal_stress
     return (
         *(time, slip, point.log_rate, *stresses, point.state, point.reading),
-        *(regime, *point.psis),
+        *(regime, 0.0, *point.psis),
     )
 
 
@@ -98,7 +120,7 @@ def strictly_later(table: np.ndarray) -> np.ndarray:
     of one that holds the same; where they differ, it follows a few floating-point numbers later, as
     do rows of a rupture shorter than the spacing of those numbers.
     """
-    same = (np.diff(np.delete(table, REGIME, axis=1), axis=0) == 0.0).all(axis=1)
+    same = (np.diff(np.delete(table, [REGIME, PLACE], axis=1), axis=0) == 0.0).all(axis=1)
     table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
     times, earliest = table[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):
@@ -108,19 +130,93 @@ def strictly_later(table: np.ndarray) -> np.ndarray:
     return table
 
 
+def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Rows up to one within a step, or at its end, evenly spaced in what is left of the step. Its
+    time tells where in the step it is.
+    """
+    after = int(np.searchsorted(table[:, 0], last[0]))
+    place = int(table[after, PLACE]) if after < len(table) else 0
+    begin = after - place
+    if not place or begin + SAMPLES >= len(table):  # nothing was recorded beyond it
+        return np.vstack([table[:after], last])
+    part, times = float(place), table[begin : begin + SAMPLES + 1, 0]
+    if times[place] > last[0] > times[place - 1]:
+        late = np.polynomial.Polynomial(_COEFFICIENTS @ (times - last[0]))
+        sides = (place - 1.0) / _HALF - 1.0, place / _HALF - 1.0
+        if late(sides[0]) < 0.0 < late(sides[1]):
+            part = _HALF * (1.0 + brentq(late, *sides))
+    within = begin + part / SAMPLES * np.arange(1.0, SAMPLES)
+    rows, last = _at_rows(table, table[:, PLACE], within), last.copy()
+    rows[:, REGIME], rows[:, PLACE], last[PLACE] = last[REGIME], range(1, SAMPLES), SAMPLES
+    return np.vstack([table[: begin + 1], rows, last])
+
+
 def along_path(
     table: np.ndarray, points: int, names: Sequence[str] = OBSERVED
 ) -> dict[str, np.ndarray]:
     """What was seen, by the names of the first columns, at points spread evenly along the path,
     half by its length in time, ln V and stress, half by the steps the integrator took, which are
-    short where the path bends.
+    short where the path bends. Each extreme of slip rate and of stress is one of the points.
     """
-    table = table[:, : len(names)]
-    table = table[np.append(True, (np.diff(table, axis=0) != 0.0).any(axis=1))]
+    if not len(table):
+        return {name: np.full(points, np.nan) for name in names}
     seen = table[:, [OBSERVED.index(n) for n in ("time", "log10_slip_rate", "shear_stress")]]
     spread = np.ptp(seen, axis=0)
-    strides = np.abs(np.diff(seen, axis=0) / np.where(spread > 0.0, spread, 1.0)).sum(axis=1)
-    strides = strides / strides.sum() + 1.0 / len(strides)
-    path = np.concatenate([[0.0], np.cumsum(strides)])
-    at = np.linspace(0.0, path[-1], points)
-    return {name: np.interp(at, path, table[:, i]) for i, name in enumerate(names)}
+    lengths = np.abs(np.diff(seen, axis=0) / np.where(spread > 0.0, spread, 1.0)).sum(axis=1)
+    total = lengths.sum()
+    lengths = lengths / (total if total > 0.0 else 1.0) + 1.0 / max(len(lengths), 1)
+    path = np.concatenate([[0.0], np.cumsum(lengths)])
+    at = np.interp(np.linspace(0.0, path[-1], points), path, np.arange(len(table)))
+    for column in ("log10_slip_rate", "shear_stress") if points > 2 else ():
+        values = table[:, OBSERVED.index(column)]
+        for sign in (1.0, -1.0):
+            extreme = _extreme(sign * values, table[:, PLACE])
+            at[1:-1][np.argmin(np.abs(at[1:-1] - extreme))] = extreme
+    found = _at_rows(table[:, : len(names)], table[:, PLACE], at)
+    # times of a rupture may differ by less than rounding
+    found[:, 0] = np.maximum.accumulate(found[:, 0])
+    return dict(zip(names, found.T, strict=True))
+
+
+#: Coefficients of the polynomial through the values at the places of a step, by those values: in
+#: places from its middle, over half of them.
+_HALF = 0.5 * SAMPLES
+_COEFFICIENTS = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
+
+
+def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values between rows, at numbers of rows and parts: of the polynomial through those of the
+    step.
+    """
+    after = np.minimum(np.ceil(at).astype(int), len(values) - 1)
+    # from one regime to the next there is nothing between
+    jumps = places[after] == 0.0
+    begin = np.where(jumps, np.rint(at), after - places[after]).astype(int)
+    part = np.where(jumps, 0.0, at - begin)
+    powers = (part[:, None] / _HALF - 1.0) ** np.arange(SAMPLES + 1.0)
+    rows = np.minimum(begin[:, None] + np.arange(SAMPLES + 1), len(values) - 1)
+    found = np.asarray(np.einsum("ij,ijk->ik", powers @ _COEFFICIENTS, values[rows]))
+    at_a_row = part == np.rint(part)
+    found[at_a_row] = values[(begin + part.astype(int))[at_a_row]]
+    return found
+
+
+def _extreme(values: np.ndarray, places: np.ndarray) -> float:
+    """Number of the row, and part to the next, where values are largest."""
+    top = int(np.argmax(values))
+    for after in (top, top + 1):  # the step it lies in, or ends, and the one that begins with it
+        if after >= len(values) or not places[after]:
+            continue
+        begin = after - int(places[after])
+        if begin + SAMPLES >= len(values):
+            continue
+        c = (_COEFFICIENTS @ values[begin : begin + SAMPLES + 1]).tolist()
+        at = (top - begin) / _HALF - 1.0
+        for _ in range(4):
+            slope = sum(n * c[n] * at ** (n - 1) for n in range(1, len(c)))
+            bend = sum(n * (n - 1) * c[n] * at ** (n - 2) for n in range(2, len(c)))
+            at -= slope / bend if bend else 0.0
+        place = _HALF * (1.0 + at)
+        if abs(place - (top - begin)) < 1.0 and 0.0 <= place <= SAMPLES:
+            return begin + place
+    return float(top)

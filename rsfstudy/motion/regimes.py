@@ -4,7 +4,6 @@ it does.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
 from scipy.optimize import newton
@@ -12,7 +11,7 @@ from scipy.optimize import newton
 from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import Limits
-from rsfstudy.motion.stepping import Halt, Meter, Step, steps
+from rsfstudy.motion.stepping import Halt
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
     Equations,
@@ -20,7 +19,6 @@ from rsfstudy.slider.equations import (
     in_rupture,
     normal_stress_at,
     resting_of,
-    without_mass,
 )
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading import Segment
@@ -36,98 +34,11 @@ class Regimes(NamedTuple):
     fast: Equations
     limits: Limits
 
-    def begins_slow(self, start: Point) -> bool:
-        """Whether a motion begins on the slow manifold."""
-        below, missing = self.below(start)
-        return handover.begins_slow(start.log_rate, below, missing, self.limits)
-
-    def below(self, point: Point) -> tuple[float, float]:
-        """ln(V/V_*) on the slow manifold with the same spring stress and states, and the stress by
-        which friction differs from that of the spring there.
-        """
-        assert self.slow.balance is not None
-        log_rate, friction, _shift = self.slow.balance(point.spring, point.psis, self.slow.p)
-        return log_rate, point.spring - friction
-
-    def excess(self, point: Point) -> float:
-        """Positive where the slow manifold has to be left."""
-        missing = point.spring - point.friction
-        return handover.weight_of_mass(point.log_rate, missing, self.limits) - 1.0
-
-    def has_landed(self, point: Point) -> bool:
-        """Whether the full equations have done their work."""
-        if not handover.may_land(point.log_rate, self.limits):
-            return False
-        below, missing = self.below(point)
-        return handover.has_landed(point.log_rate, point.growth, below, missing, self.limits)
-
 
 def regimes(scene: Scene, accuracy: Accuracy, *, clock: bool) -> Regimes:
     """The regimes of a scene with mass."""
     slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene, clock=clock)
     return Regimes(slow, fast, handover.limits(scene, accuracy))
-
-
-def motion(
-    scene: Scene,
-    accuracy: Accuracy,
-    meter: Meter,
-    start: Point,
-    *,
-    clock: bool = False,
-) -> Iterator[Step]:
-    """Integrate a scene from a point, step by step, for as long as the caller asks.
-
-    A scene without inertia is one quasi-static integration. With inertia, the slow manifold is
-    followed up to `Accuracy.switch_weight`, the full equations above it; each stretch has a time
-    of its own that starts at zero, because a rupture is shorter than the spacing of floating-point
-    numbers around the time at which it happens.
-
-    Parameters
-    ----------
-    scene : Scene
-    accuracy : Accuracy
-    meter : Meter
-        Charged with the work, by regime.
-    start : Point
-        Where to start; see `starting` and `on_slow_manifold`.
-    clock : bool
-        Carry time along.
-
-    Yields
-    ------
-    Step
-
-    Raises
-    ------
-    Halt
-        With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
-        the equations end, or as `steps` does.
-    """
-
-    def guarded(equations: Equations, state: Numbers) -> Iterator[Step]:
-        return _guarded(scene, steps(equations, state, accuracy.solver, meter))
-
-    if not scene.has_mass:
-        yield from guarded(without_mass(scene, clock=clock), slow_state(start, clock))
-        return
-    both, point = regimes(scene, accuracy, clock=clock), start
-    if both.begins_slow(start):
-        point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
-    while True:
-        point = yield from _rupture(both, guarded(both.fast, fast_state(point, clock)))
-        point = yield from _climb(both, guarded(both.slow, slow_state(point, clock)))
-
-
-def slow_state(point: Point, clock: bool) -> Numbers:
-    """Unknowns at a point between ruptures."""
-    return (point.spring, *point.psis, 0.0) if clock else (point.spring, *point.psis)
-
-
-def fast_state(point: Point, clock: bool) -> Numbers:
-    """Unknowns at a point of a rupture."""
-    unknowns = (point.spring, point.log_rate, point.friction, *point.psis[1:])
-    return (*unknowns, 0.0) if clock else unknowns
 
 
 def starting(scene: Scene) -> Point:
@@ -231,43 +142,6 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     if scene.load_velocity == 0.0:
         text = f"{text}, where slip backwards dies out under a load point at rest"
         raise Halt(Status.SHEAR_STRESS_REVERSED, text)
-
-
-def _climb(both: Regimes, moving: Iterator[Step]) -> Generator[Step, None, Point]:
-    """The slow manifold, until slip is fast enough for mass to act; returns the last point."""
-    for step in moving:
-        if both.excess(step.after) >= 0.0 > both.excess(step.before):
-            step = step.until(step.locate(both.excess))
-            yield step
-            return step.after
-        yield step
-    raise AssertionError("steps() never ends by itself")
-
-
-def _rupture(both: Regimes, moving: Iterator[Step]) -> Generator[Step, None, Point]:
-    """The full equations, until mass no longer matters; returns the last point."""
-    for step in moving:
-        yield step
-        if both.has_landed(step.after):
-            return step.after
-    raise AssertionError("steps() never ends by itself")
-
-
-def _guarded(scene: Scene, moving: Iterator[Step]) -> Iterator[Step]:
-    """Pass steps on until the motion cannot go on, the last up to there."""
-
-    def room(point: Point) -> float:
-        return handover.room_left(point.log_rate, point.normal_stress, scene.load_velocity)
-
-    for step in moving:
-        point = step.after
-        end = handover.fate(point.log_rate, point.normal_stress, scene.load_velocity)
-        if end == handover.GOES_ON:
-            yield step
-            continue
-        if room(step.before) > 0.0:
-            yield step.until(step.locate(room))
-        raise halted(end, point.normal_stress)
 
 
 def halted(end: int, normal_stress: float) -> Halt:

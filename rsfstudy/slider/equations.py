@@ -82,6 +82,11 @@ class Equations:
         changes: Numbers = self.rate(state, self.p)
         return changes
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether slip is the clock."""
+        return self.regime == RIGID
+
     def at(self, state: Numbers) -> Point:
         """What the slider does."""
         now: Point = self.point(state, self.rate(state, self.p), self.p)

@@ -22,8 +22,7 @@ from rsfstudy.boundaries.approach import Approach
 from rsfstudy.boundaries.cycles import _asked, cycles
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind
-from rsfstudy.motion.regimes import motion
+from rsfstudy.motion.events import Kind, rise, settling
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
 from rsfstudy.slider.equations import IN_RUPTURE, between_ruptures
@@ -140,13 +139,13 @@ def marked(it: Problem, rtol: float) -> Problem:
 def paths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
     """How long the path is in each of the three stretches of a cycle."""
     lengths, regime, load = list[float](), "", scene.log_load_rate
-    for step in motion(scene, accuracy, meter("scipy"), begin, clock=True):
-        if step.equations.regime != regime:
-            regime = step.equations.regime
+    watches = rise("log_rate", load), settling(2.0)
+    for event in follow(scene, accuracy, meter("scipy"), watches, start=begin, clock=True):
+        if event.regime != regime:
+            regime = event.regime
             lengths.append(0.0)
-        lengths[-1] = step.end
-        if len(lengths) == 3 and step.before.log_rate < load <= step.after.log_rate:
-            lengths[-1] = step.locate(lambda point: point.log_rate - load)
+        lengths[-1] = event.clock
+        if len(lengths) == 3 and event.kind is Kind.RISE:
             break
     return lengths
 

@@ -1,8 +1,8 @@
 """Compiles the motion of a combination of parts, once, and finds it again in a cache on disk.
 
-The functions of the equations are those that SciPy calls. Together with the plain functions of this
-folder they are copied, each name in them standing for its compiled copy, and compiled as one. What
-is compiled lies in a folder of its own, named by a digest of all that decides it, which is written
+The functions are those of plain Python, but for a few (`calls.IN_PLACE`). They are copied, each
+function that they name or close over standing for its compiled copy, and compiled as one. What is
+compiled lies in a folder of its own, named by a digest of all that decides it, which is written
 aside, renamed when complete, and never changed; what does not hold its own digest is thrown away.
 What lies there is run: where others could write to it, nothing is read or kept.
 """
@@ -10,6 +10,7 @@ What lies there is run: where others could write to it, nothing is read or kept.
 from __future__ import annotations
 
 import contextlib
+import dis
 import functools
 import hashlib
 import json
@@ -31,10 +32,9 @@ import numba
 import numpy as np
 from numba.core import config
 
+from rsfstudy.motion.compiled.calls import IN_PLACE
 from rsfstudy.motion.engines import compiling
 
-#: Functions of this package know their places by name; those of equations are complete.
-_OURS = __package__
 _ENTRY, _DIGESTS = "motion.py", "digests.json"
 #: Modules that are as their version, or that of Python, says.
 _KNOWN_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
@@ -47,7 +47,7 @@ _OPTIONS: Mapping[str, Any] = {
 }
 _POINTERS = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
 #: Changes where what is kept is laid out or named in another way.
-_LAYOUT = 2
+_LAYOUT = 3
 #: Compiled functions whose addresses are in use.
 _ALIVE: list[Any] = []
 _log = logging.getLogger(__name__)
@@ -57,35 +57,6 @@ def cache_folder() -> Path:
     """Where compiled motions are kept: in the folder that the system has for such things."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "rsfstudy" / "compiled"
-
-
-def filled(function: Callable[..., Any], places: Mapping[str, Any]) -> Callable[..., Any]:
-    """A copy of a function of this folder, and of those it reaches, with names for other things.
-
-    What reaches no such name is no copy, so that it is compiled once for all.
-    """
-    copies: dict[int, Callable[..., Any]] = {}
-
-    def reaches(plain: Any) -> bool:
-        if not isinstance(plain, types.FunctionType) or not plain.__module__.startswith(_OURS):
-            return False
-        names = [name for name in plain.__code__.co_names if name in plain.__globals__]
-        return any(name in places or reaches(plain.__globals__[name]) for name in names)
-
-    def copy(plain: Any) -> Any:
-        if not reaches(plain):
-            return plain
-        if id(plain) not in copies:
-            known, reached = plain.__globals__, {}
-            for name in plain.__code__.co_names:
-                if name in known:
-                    reached[name] = places[name] if name in places else copy(known[name])
-            copies[id(plain)] = types.FunctionType(
-                plain.__code__, {**known, **reached}, plain.__name__
-            )
-        return copies[id(plain)]
-
-    return copy(function)  # type: ignore[no-any-return]
 
 
 def digest_of(signature: Any, *functions: Callable[..., Any]) -> str:
@@ -116,6 +87,8 @@ class _Content:
             self._text(f"function {number}")
             if not known:
                 self._code(value.__code__, value.__globals__)
+                for cell in value.__closure__ or ():
+                    self.add(_compilable(cell.cell_contents))
         elif isinstance(value, tuple | list | frozenset):
             parts = sorted(value, key=repr) if isinstance(value, frozenset) else value
             self._text(f"{len(value)} together")
@@ -138,9 +111,9 @@ class _Content:
                 self._code(constant, known)
             else:
                 self.add(constant)
-        for name in code.co_names:
+        for name in _globals_of(code):
             self._text(name)
-            value = known.get(name)
+            value = _compilable(known.get(name))
             if not isinstance(value, types.ModuleType):
                 self.add(value)
             elif value.__name__.partition(".")[0] not in _KNOWN_BY_VERSION:
@@ -162,17 +135,14 @@ def called_from_python(function: Callable[..., Any], signature: Any) -> Any:
     return _kept(digest_of(signature, function), compile_for)
 
 
-def called_by_address(
-    functions: Sequence[Callable[..., Any]], places: Mapping[str, Any]
-) -> tuple[int, ...]:
-    """Addresses of compiled functions of pointers to numbers, their names filled in."""
-    ready = [filled(function, places) for function in functions]
+def called_by_address(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
+    """Addresses of compiled functions of pointers to numbers."""
 
     def compile_for(entry: str) -> list[Any]:
-        roots = (_reaching(function, entry) for function in ready)
+        roots = (_reaching(function, entry) for function in functions)
         return [numba.cfunc(_POINTERS, cache=bool(entry), **_OPTIONS)(root) for root in roots]
 
-    pointers = _kept(digest_of(_POINTERS, *ready), compile_for)
+    pointers = _kept(digest_of(_POINTERS, *functions), compile_for)
     _ALIVE.append(pointers)
     return tuple(pointer.address for pointer in pointers)
 
@@ -252,13 +222,16 @@ def _reaching(function: Any, entry: str = "") -> Any:
     Its own name tells its content: a linker takes functions of one name for one function, wherever
     they come from, and Numba numbers its names anew in each process.
     """
-    reached = {
-        name: _jitted(value)
-        for name in function.__code__.co_names
-        if isinstance(value := function.__globals__.get(name), types.FunctionType)
-    }
+    named = {name: function.__globals__.get(name) for name in _globals_of(function.__code__)}
+    reached = {name: _jitted(value) for name, value in named.items() if _is_function(value)}
+    cells = tuple(
+        types.CellType(_jitted(value) if _is_function(value) else value)
+        for value in (cell.cell_contents for cell in function.__closure__ or ())
+    )
     code = function.__code__.replace(co_filename=entry) if entry else function.__code__
-    copy = types.FunctionType(code, {**function.__globals__, **reached}, function.__name__)
+    copy = types.FunctionType(
+        code, {**function.__globals__, **reached}, function.__name__, None, cells or None
+    )
     content = _Content()
     content.add(function)
     copy.__qualname__ = f"{function.__name__}_{content.digest.hexdigest()[:32]}"
@@ -266,8 +239,28 @@ def _reaching(function: Any, entry: str = "") -> Any:
 
 
 @functools.cache
+def _globals_of(code: types.CodeType) -> tuple[str, ...]:
+    """Names of the globals that a function reads, without those of attributes."""
+    reads = (i.argval for i in dis.get_instructions(code) if i.opname == "LOAD_GLOBAL")
+    return tuple(dict.fromkeys(reads))
+
+
+def _is_function(value: Any) -> bool:
+    return isinstance(value, types.FunctionType)
+
+
+def _compilable(value: Any) -> Any:
+    """What the compiler is given for a value that a function names."""
+    return IN_PLACE.get(value, value) if _is_function(value) else value
+
+
 def _jitted(function: Any) -> Any:
     """A compiled function that only others call; those of several equations share it."""
+    return _compiled_inside(_compilable(function))
+
+
+@functools.cache
+def _compiled_inside(function: Any) -> Any:
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_reaching(function), **_OPTIONS, **inner)
 

@@ -1,18 +1,22 @@
-"""Pointers to numbers, and calls from the compiled motion to the compiled equations of a scene, by
-their addresses.
+"""What the compiler has in place of functions of the loop: pointers to numbers, calls of equations
+by their addresses, and the steps of order eight.
 
-The motion is compiled once, for all equations; the equations once for each combination of parts.
+The loop is compiled once, for all equations; the equations once for each combination of parts.
 Arrays would be passed from function to function as ten words each, and counted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from rsfstudy.motion import calls, steppers
+from rsfstudy.motion.steppers import order_eight
 
 _POINTER = types.CPointer(types.float64)
 #: ``function(y, rates, p, result)``: all pointers to numbers, of which some are not read.
@@ -60,3 +64,15 @@ def first_of(array):
 def moved(pointer, numbers):
     """A pointer so many numbers further on."""
     return _moved(pointer, numbers)
+
+
+#: What stands in place of which function.
+IN_PLACE: Mapping[Any, Any] = {
+    calls.evaluate: evaluate,
+    calls.first_of: first_of,
+    calls.moved: moved,
+    steppers.begin: order_eight.begin,
+    steppers.attempt: order_eight.attempt,
+    steppers.unknowns_at: order_eight.unknowns_at,
+    steppers.retake: order_eight.retake,
+}

@@ -1,66 +1,133 @@
-"""What is compiled: the course of motions, once for all; and the equations of a combination of
-parts.
-"""
+"""The loop of motions, compiled once for all; and the equations of a combination of parts."""
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numba
+import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
-from rsfstudy.motion.compiled import equations, unrolled
+from rsfstudy.motion import layout
+from rsfstudy.motion.columns import filling
 from rsfstudy.motion.compiled.building import called_by_address, called_from_python
-from rsfstudy.motion.compiled.course import advance
 from rsfstudy.motion.compiled.refusal import check_raises_nothing, refused
-from rsfstudy.motion.compiled.table import NOW
 from rsfstudy.motion.handover import Limits
-from rsfstudy.slider.parts import Function
+from rsfstudy.motion.loop import advance
+from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, without_mass
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene import Scene
 
 _ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
-_ADDRESSES = types.int64[:, ::1]
 _LIMITS = types.UniTuple(types.float64, len(Limits._fields))
+_PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY))
+
+
+class Compiled:
+    """The loop, compiled."""
+
+    def initial(self, fields: tuple[tuple[str, float], ...]) -> bytes:
+        return _initial(fields)
+
+    def state(self, initial: bytes, called_with: tuple[float, ...]) -> CompiledState:
+        return CompiledState(initial, called_with)
+
+    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        return _table(*(addresses(system) for system in systems))
+
+    def passed(self, array: np.ndarray) -> np.ndarray:
+        return array
+
+    def numbers(self, p: Numbers) -> np.ndarray:
+        return np.array(p)
+
+    def advance(self) -> Any:
+        return compiled_loop()
+
+
+class CompiledState:
+    """The state of a motion as a record."""
+
+    def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
+        self._bytes = bytearray(initial)
+        layout.CALLED_WITH.pack_into(self._bytes, 0, *called_with)
+        self.memory = np.frombuffer(self._bytes, layout.MOTION)
+
+    def says(self) -> tuple[int, ...]:
+        """Right-hand sides by regime, steps, events, rows, and Jacobians."""
+        return layout.SAYS.unpack_from(self._bytes, layout.CALLED_WITH.size)
+
+    def field(self, name: str) -> float:
+        """One of its fields."""
+        return float(self.memory[name][0])
+
+
+def prepare(scene: Scene, *, clock: bool) -> None:
+    """Compile what motions of such a scene need, with time or without it, or find it in the cache.
+    What carries no time may also be a path that leaves mass out.
+
+    Raises
+    ------
+    InvalidValue
+        Where a part of the scene cannot be compiled.
+    """
+    compiled_loop()
+    if scene.has_mass:
+        addresses(between_ruptures(scene, clock=clock))
+        addresses(in_rupture(scene, clock=clock))
+    if not (scene.has_mass and clock):
+        addresses(without_mass(scene, clock=clock))
+
+
+@lru_cache(maxsize=256)
+def _initial(fields: tuple[tuple[str, float], ...]) -> bytes:
+    """The state that motions begin with, as bytes: records are copied one field after the other."""
+    memory = np.zeros(1, layout.MOTION)
+    for name, value in fields:
+        memory[name] = value
+    return memory.tobytes()
 
 
 @cache
-def course() -> Any:
-    """The compiled course of motions."""
-    memory = types.Array(numba.from_dtype(NOW), 1, "C")
-    arrays = _ARRAY, _ARRAY, _ADDRESSES, _ARRAY, _ARRAY, _TABLE, _TABLE, _TABLE
-    return called_from_python(advance, types.int64(memory, *arrays, _LIMITS, _ARRAY))
+def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
+    """The table of addresses; both regimes know of the balance between ruptures."""
+    rows = np.zeros((2, layout.FUNCTIONS), dtype=np.int64)
+    rows[layout.SLOW, : len(slow)], rows[layout.FAST, : len(fast)] = slow, fast
+    rows[layout.FAST, -1] = rows[layout.SLOW, -1]
+    return rows
 
 
 @cache
-def addresses(
-    rate: Function,
-    point: Function,
-    balance: Function | None,
-    unknowns: int,
-    states: int,
-    numbers: int,
-) -> tuple[int, ...]:
-    """Where the compiled functions of a system of equations are, in the order of `Room`.
+def compiled_loop() -> Any:
+    """The compiled loop of motions."""
+    memory = types.Array(numba.from_dtype(layout.MOTION), 1, "C")
+    tables = _ARRAY, _ARRAY, _TABLE, _TABLE, types.int64
+    signature = types.int64(memory, _ARRAY, _ARRAY, _ARRAY, _PLAN, *tables)
+    return called_from_python(advance, signature)
 
-    Parameters
-    ----------
-    rate, point, balance : callable
-        The functions of floats of `slider.equations.Equations`.
-    unknowns, states, numbers : int
-        How many it has.
+
+def addresses(equations: Equations) -> tuple[int, ...]:
+    """Where the compiled functions of a system of equations are, in the order of `Filling`.
 
     Raises
     ------
     InvalidValue
         Where a function of a part cannot be compiled, or raises.
     """
-    for function in (rate, point):
-        check_raises_nothing(function)
-    places = equations.places(rate, point, balance, unknowns, states, numbers)
-    wanted = [equations.fill_rates, equations.fill_point, unrolled.attempt(unknowns)]
-    wanted += [equations.fill_balance] if balance is not None else []
-    try:
-        return called_by_address(wanted, places)
-    except NumbaError as error:
-        raise refused(error) from error
+    return _addresses(tuple(function for function in filling(equations) if function), equations)
+
+
+_ADDRESSES: dict[tuple[Any, ...], tuple[int, ...]] = {}
+
+
+def _addresses(functions: tuple[Any, ...], equations: Equations) -> tuple[int, ...]:
+    if functions not in _ADDRESSES:
+        for function in (equations.rate, equations.point):
+            check_raises_nothing(function)
+        try:
+            _ADDRESSES[functions] = called_by_address(functions)
+        except NumbaError as error:
+            raise refused(error) from error
+    return _ADDRESSES[functions]

@@ -1,4 +1,4 @@
-"""Where the compiled motion finds and leaves its numbers."""
+"""Where the loop of motions finds and leaves its numbers: the state of a motion, and its tables."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ import struct
 
 import numpy as np
 
-#: What a motion remembers from one call to the next; first what it is called with, and what it
-#: has to say of itself.
-NOW = np.dtype(
+#: The state of a motion, which it keeps from one call to the next; first what it is called with,
+#: and what it has to say of itself.
+MOTION = np.dtype(
     [
         ("lasts", "f8"),  # time at which to end
         ("time", "f8"),  # time, slip and spring stress at the start
         ("slip", "f8"),
         ("spring", "f8"),
-        ("budget", "i8"),  # right-hand sides, in all and spent by regime
-        ("spent_slow", "i8"),
+        ("budget", "i8"),  # right-hand sides that it may spend
+        ("records", "i8"),  # when the slider is recorded
+        ("spent_slow", "i8"),  # right-hand sides, by regime
         ("spent_fast", "i8"),
         ("steps", "i8"),
-        ("told", "i8"),  # rows of the table of events, and of the recording
+        ("events", "i8"),  # rows of the table of events, and of the recording
         ("recorded", "i8"),
+        ("jacobians", "i8"),
         ("direction", "f8"),  # of the clock: 1 or -1
         ("tolerance", "f8"),
         ("finer", "f8"),  # part of the longest steps at this tolerance
@@ -28,15 +30,19 @@ NOW = np.dtype(
         ("end", "f8"),
         ("taken", "f8"),  # length of the step; its end may have been brought forward
         ("length", "f8"),  # of the next step
+        ("resolved", "f8"),  # longest step within which dense output is as accurate as is wanted
         ("regime", "i8"),
         ("begins", "i8"),  # what to tell before the first event of a regime
-        ("ends_by_fate", "i8"),  # whether the motion ends where it cannot go on
+        ("terminates", "i8"),  # whether the motion ends where it cannot go on
         ("has_mass", "i8"),  # whether there are two regimes
         ("has_clock", "i8"),  # whether time is an unknown
-        ("strides", "i8"),  # whether the clock is length along the path, which limits steps
+        ("limits_steps", "i8"),  # whether the clock is length along the path, which limits steps
+        ("slip_is_clock", "i8"),  # whether the clock is slip
+        ("sampled", "i8"),  # how often the slider was recorded at values asked for
+        ("target", "f8"),  # time that is looked for
         ("at_point", "i8"),  # whether it begins at the last point of one before, not where y is
         ("is_dense", "i8"),  # whether dense output of the step is there
-        ("fate", "i8"),  # why the motion cannot go on, and normal stress there
+        ("termination", "i8"),  # why the motion cannot go on, and normal stress there
         ("stress", "f8"),
         ("unknowns", "i8"),  # between ruptures, and in them
         ("unknowns_fast", "i8"),
@@ -44,21 +50,25 @@ NOW = np.dtype(
     ]
 )
 #: The same as bytes: fields of records take much longer to write and to read.
-CALLED_WITH, SAYS = struct.Struct("=4dq"), struct.Struct("=5q")
-#: Rows of the table of addresses; and how many functions of equations have theirs there, of which
-#: the last may be missing (see `machine.addresses`).
+CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring", "budget", "records"
+CALLED_WITH, SAYS = struct.Struct("=4d2q"), struct.Struct("=6q")
+#: Rows of the table of functions; and how many equations have there, of which the last may be
+#: missing (see `columns.Filling`).
 SLOW, FAST = 0, 1
 FUNCTIONS = 4
 
 #: Columns of the table of watches.
 WATCHED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
-MAXIMUM, MINIMUM, RISE, FALL, SETTLED, MOMENT = range(6)
+MAXIMUM, MINIMUM, RISE, FALL, SETTLED = range(5)
+
+#: When the slider is recorded: never, evenly within each step, or at clocks or times asked for.
+NEVER, WITHIN_STEPS, AT_CLOCKS, AT_TIMES = range(4)
+
 
 #: Columns of the table of events; from POINT on, those of a point.
 CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
-#: Codes of events that are not asked for; those of others are the places of their watches, behind
-#: which come the samples.
-BEGIN, CHANGE, END = -1, -2, -3
+#: Codes of events that are not asked for; those of others are the places of their watches.
+BEGIN, CHANGE, END, SAMPLED = -1, -2, -3, -4
 
 #: Columns of a point; its states follow.
 LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, UNREST, COEFFICIENT, RATIO = range(10)
@@ -67,3 +77,5 @@ READING, READING_GROWTH, PSIS = 10, 11, 12
 #: Why a call returns: to hand over what it has told; because the motion has ended; because the
 #: regime changes; or because it cannot go on.
 HANDS_OVER, ENDED, CHANGES, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH = range(7)
+#: What `steps.take_step` returns where it has taken one.
+TAKEN = -1

@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
-from rsfstudy.motion.compiled import equations
-
 #: Stages of a step, of its dense output beyond the step's end, and rows of that.
 STAGES, EXTRA, ROWS = 12, 3, 7
 ALL_STAGES = STAGES + 1 + EXTRA
@@ -35,17 +33,25 @@ _WEIGHTS: Mapping[str, np.ndarray] = {
 #: tolerance, and its local error over what is allowed.
 LENGTH, TOLERANCE, ERROR, SIZES = 0, 1, 2, 3
 
-Steps = Callable[..., None]
+Function = Callable[..., Any]
+
+
+def attempt(rate: Function, unknowns: int, numbers: Function) -> Function:
+    """One step by rates of so many unknowns: ``attempt(y, stages, p, step)``.
+
+    From `y`, whose rates are the first stage, it fills in the other stages, the unknowns at its
+    end, and its local error over what is allowed. `numbers` makes the tuple of numbers that `rate`
+    reads of `p`.
+    """
+    made: Function = _source(unknowns)(rate, numbers)
+    return made
 
 
 @cache
-def attempt(unknowns: int) -> Steps:
-    """One step from `y`, whose rates are the first stage: fills in the other stages, the unknowns
-    at its end, and its local error over what is allowed.
-    """
+def _source(unknowns: int) -> Function:
+    """What makes such steps of ``rate_of`` and ``numbers``."""
     n, scales = range(unknowns), SIZES + unknowns
     lines = [
-        "def attempt(y, stages, p, step):",
         f"step[{ERROR}] = math.nan",
         "of_scene = numbers(p)",
         f"length, tolerance = step[{LENGTH}], step[{TOLERANCE}]",
@@ -71,16 +77,14 @@ def attempt(unknowns: int) -> Steps:
         f"error = abs(length) * fifth / math.sqrt(both * {unknowns}.0) if both != 0.0 else 0.0",
         f"step[{ERROR}] = error",
     ]
-    return _made(lines, _sums())
+    inner = "\n        ".join(["def attempt(y, stages, p, step):", *lines])
+    return _made("attempts", "rate_of, numbers", [inner, "return attempt"], _sums())
 
 
 @cache
 def _sums() -> dict[str, Any]:
     """Weighted sums of the rates in all stages, as functions: compiled once for all equations."""
-    return {
-        name: _made([f"def {name}({_rates(name)}):", f"return {_terms(name)}"], {})
-        for name in _WEIGHTS
-    }
+    return {name: _made(name, _rates(name), [f"return {_terms(name)}"], {}) for name in _WEIGHTS}
 
 
 def _call(name: str, unknown: int) -> str:
@@ -98,15 +102,9 @@ def _terms(name: str) -> str:
     return " + ".join(f"{float(x)!r} * k{s}" for s, x in enumerate(_WEIGHTS[name]) if x)
 
 
-def _made(lines: Sequence[str], known: Mapping[str, Any]) -> Steps:
+def _made(name: str, arguments: str, lines: Sequence[str], known: Mapping[str, Any]) -> Function:
     """The function that some lines define."""
-    made: dict[str, Any] = {
-        **known,
-        "__name__": __name__,
-        "math": math,
-        "rate_of": equations.rate_of,
-        "numbers": equations.numbers,
-    }
-    exec("\n    ".join(lines), made)
-    function: Steps = made[lines[0].removeprefix("def ").partition("(")[0]]
+    made: dict[str, Any] = {**known, "__name__": __name__, "math": math}
+    exec("\n    ".join([f"def {name}({arguments}):", *lines]), made)
+    function: Function = made[name]
     return function

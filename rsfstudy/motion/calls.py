@@ -1,0 +1,22 @@
+"""What the loop of motions asks of its arrays and equations, in plain Python.
+
+Uncompiled, arrays are memoryviews, and an equation is a function that fills one. The compiler has
+pointers and addresses in their place (`compiled.calls`).
+"""
+
+from __future__ import annotations
+
+
+def evaluate(function, y, rates, p, result):
+    """Have a function of the equations fill `result`."""
+    function(y, rates, p, result)
+
+
+def first_of(array):
+    """An array from its first number on."""
+    return array
+
+
+def moved(array, numbers):
+    """An array from so many numbers further on."""
+    return array[numbers:]

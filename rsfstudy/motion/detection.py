@@ -1,0 +1,260 @@
+"""Events within a step: located where a quantity changes sign, and reported in their order."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rsfstudy.motion.calls import moved
+from rsfstudy.motion.handover import margin, weight_of_mass
+from rsfstudy.motion.layout import (
+    CHANGE,
+    CLOCK,
+    CODE,
+    ENDS,
+    FARTHEST,
+    FRICTION,
+    GROWTH,
+    KIND,
+    LEVEL,
+    LOG_RATE,
+    MAXIMUM,
+    MINIMUM,
+    OF,
+    POINT,
+    RATIO,
+    READING,
+    READING_GROWTH,
+    REGIME,
+    RISE,
+    SETTLED,
+    SLIP,
+    SLOW,
+    SPENT,
+    SPRING,
+    TIME,
+    UNREST,
+    WAITS,
+    WATCHED,
+)
+from rsfstudy.motion.steppers import unknowns_at
+from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
+from rsfstudy.slider.slots import LOAD_VELOCITY, LOG_LOAD_RATE, SIZE, STIFFNESS
+
+#: What is read off a step beside the watches: how far the regime is from being left, time less that
+#: which is looked for, and how far the motion is from its end.
+#: Not whole numbers, of each of which the compiler would make a case of its own.
+EXCESS, PASSED, MARGIN = -1.0, -2.0, -3.0
+#: Where something happens between two points.
+NOWHERE, BEFORE, AFTER = range(3)
+_MOST_ITERATIONS = 100
+
+
+def quantity(watch, columns, p):
+    """What changes sign where it happens: a slope, or the distance from a level."""
+    if watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM:
+        if watch[OF] == LOG_RATE:
+            return columns[GROWTH]
+        if watch[OF] == READING:
+            return columns[READING_GROWTH]
+        return p[LOG_LOAD_RATE] - columns[LOG_RATE]
+    return columns[int(watch[OF])] - watch[LEVEL]
+
+
+def watch_of(space, number):
+    """One of the watches."""
+    return moved(space.watches, len(WATCHED) * number)
+
+
+def waits(space):
+    """Whether the asker can wait for anything; for the beginning then, too."""
+    found = False
+    for w in range(space.watched):
+        found = found or watch_of(space, w)[WAITS] != 0.0
+    return found
+
+
+def excess(motion, columns, limits):
+    """Not negative where the slow manifold has to be left; always negative elsewhere."""
+    if motion.regime != SLOW or not motion.has_mass:
+        return -1.0
+    missing = columns[SPRING] - columns[FRICTION]
+    return weight_of_mass(columns[LOG_RATE], missing, limits) - 1.0
+
+
+def happens(watch, before, after, direction):
+    """Whether a quantity that changes so has done what is watched for."""
+    upwards = watch[KIND] == RISE or watch[KIND] == MINIMUM
+    # against the clock, slopes change sign the other way round
+    if direction < 0.0 and (watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM):
+        upwards = not upwards
+    if upwards:
+        return before < 0.0 <= after
+    return before > 0.0 >= after
+
+
+def reading(what, clock, motion, space, limits):
+    """The quantity of a watch, `EXCESS`, `PASSED` or `MARGIN`, at a clock within the step."""
+    if what == PASSED:
+        unknowns_at(motion, space, clock)
+        return motion.started + elapsed(motion, space, space.within, limits) - motion.target
+    point_within(motion, space, clock)
+    if what == EXCESS:
+        return excess(motion, space.between, limits)
+    if what == MARGIN:
+        return margin(space.between[LOG_RATE], space.between[RATIO], space.p[LOAD_VELOCITY])
+    return quantity(watch_of(space, int(what)), space.between, space.p)
+
+
+def located(what, at_begin, at_end, motion, space, limits):
+    """Clock within the step at which a reading, given at both ends, changes sign: Brent's method,
+    to 1e-13 of the step.
+    """
+    width = abs(motion.end - motion.clock)
+    finest, relative = (1e-15 * width, 1e-15) if what == PASSED else (1e-13 * width, 1e-14)
+    latest, best, other = motion.clock, motion.end, motion.clock
+    at_latest, at_best, at_other = at_begin, at_end, at_begin
+    move = earlier = best - latest
+    for _ in range(_MOST_ITERATIONS):
+        if at_latest != 0.0 and at_best != 0.0 and (at_latest < 0.0) != (at_best < 0.0):
+            other, at_other = latest, at_latest
+            move = earlier = best - latest
+        if abs(at_other) < abs(at_best):
+            latest, best, other = best, other, best
+            at_latest, at_best, at_other = at_best, at_other, at_best
+        enough = 0.5 * (finest + relative * abs(best))
+        half = 0.5 * (other - best)
+        if at_best == 0.0 or abs(half) < enough:
+            return best
+        tried = half
+        if abs(earlier) > enough and abs(at_best) < abs(at_latest):
+            tried = guess(latest, best, other, at_latest, at_best, at_other)
+            if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
+                tried = move = half
+        else:
+            move = half
+        earlier, move = move, tried
+        latest, at_latest = best, at_best
+        best += move if abs(move) > enough else math.copysign(enough, half)
+        at_best = reading(what, best, motion, space, limits)
+    return best
+
+
+def guess(latest, best, other, at_latest, at_best, at_other):
+    """How far from the best point the root is: by a line, or by inverse quadratic interpolation."""
+    if latest == other:
+        return -at_best * (best - latest) / (at_best - at_latest)
+    to_latest = (at_latest - at_best) / (latest - best)
+    to_other = (at_other - at_best) / (other - best)
+    numerator = at_other * to_other - at_latest * to_latest
+    return -at_best * numerator / (to_other * to_latest * (at_other - at_latest))
+
+
+def add_event(motion, events, code, clock, passed, columns, p):
+    """Add an event to the table."""
+    n = motion.events
+    events[n, CODE], events[n, REGIME], events[n, CLOCK] = code, motion.regime, clock
+    events[n, TIME] = motion.time + passed
+    events[n, SLIP] = slipped(motion, clock, passed, columns[SPRING], p)
+    events[n, SPENT] = motion.spent_slow + motion.spent_fast
+    for i in range(events.shape[1] - POINT):
+        events[n, POINT + i] = columns[i]
+    motion.events = n + 1
+
+
+def report_end(motion, space, events, code, limits):
+    """Tell of the end of the step, by a code."""
+    passed = passed_at_end(motion, space, limits)
+    add_event(motion, events, float(code), motion.end, passed, space.after, space.p)
+
+
+def slipped(motion, clock, passed, spring, p):
+    """Slip since the start: the clock of a rigid slider; else from the spring, ``f = f_0 + K (V_0 t
+    - slip)``.
+    """
+    if motion.slip_is_clock:
+        return clock
+    return motion.slip + (p[LOAD_VELOCITY] * passed - (spring - motion.spring) / p[STIFFNESS])
+
+
+def report_beginning(motion, space, last, events, limits):
+    """Tell that a regime has begun, and what happened on the way to it from the last point of the
+    one before: at the more extreme of both, or at the first beyond a level. Returns whether that
+    ends the motion.
+    """
+    p, passed = space.p, passed_at_begin(motion, space, limits)
+    add_event(motion, events, float(motion.begins), motion.clock, passed, space.before, p)
+    if motion.begins != CHANGE:
+        return False
+    for w in range(space.watched):
+        watch = watch_of(space, w)
+        jumps = between(watch, last, p, space.before, p)
+        if jumps != NOWHERE:
+            columns = last if jumps == BEFORE else space.before
+            add_event(motion, events, float(w), motion.clock, passed, columns, p)
+            if watch[ENDS]:
+                return True
+    return False
+
+
+def between(watch: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
+    """Whether what is watched for happens where a motion jumps from the last point of one regime or
+    segment to the first of another: `NOWHERE`, or at the more extreme one, or the first beyond the
+    level, which is `BEFORE` or `AFTER` the jump.
+    """
+    if watch[KIND] == SETTLED:
+        return NOWHERE
+    if not happens(watch, quantity(watch, last, p_last), quantity(watch, first, p_first), 1.0):
+        return NOWHERE
+    x, y = last[LOG_RATE], first[LOG_RATE]
+    kept = (watch[KIND] == MAXIMUM and x > y) or (watch[KIND] == MINIMUM and x < y)
+    return BEFORE if kept and watch[OF] == LOG_RATE else AFTER
+
+
+def detect(motion, space, limits):
+    """Find when each thing watched for happens within the step; NaN where it does not. Returns how
+    many do.
+    """
+    count, p = 0, space.p
+    for w in range(space.watched):
+        watch = watch_of(space, w)
+        space.when[w] = math.nan
+        if watch[KIND] == SETTLED:
+            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[UNREST] / p[SIZE])
+            watch[FARTHEST] = max(watch[FARTHEST], away)
+            if away < watch[LEVEL] * watch[FARTHEST]:
+                space.when[w] = motion.end
+        else:
+            before, after = quantity(watch, space.before, p), quantity(watch, space.after, p)
+            if happens(watch, before, after, motion.direction):
+                space.when[w] = located(float(w), before, after, motion, space, limits)
+        if not math.isnan(space.when[w]):
+            count += 1
+    return count
+
+
+def report(motion, space, events, limits):
+    """Tell what happens within the step, in its order. Returns 0 where nothing does, 1 where the
+    asker can wait for it, 2 where not, and 3 where it ends the motion.
+    """
+    urgent, p = 0, space.p
+    for _ in range(detect(motion, space, limits)):
+        first = -1
+        for w in range(space.watched):
+            later = first >= 0 and motion.direction * (space.when[w] - space.when[first]) >= 0.0
+            if not math.isnan(space.when[w]) and not later:
+                first = w
+        clock = space.when[first]
+        space.when[first] = math.nan
+        if clock == motion.end:
+            passed = passed_at_end(motion, space, limits)
+            add_event(motion, events, float(first), clock, passed, space.after, p)
+        else:
+            point_within(motion, space, clock)
+            passed = motion.started + elapsed(motion, space, space.within, limits)
+            add_event(motion, events, float(first), clock, passed, space.between, p)
+        watch = watch_of(space, first)
+        urgent = max(urgent, 1 if watch[WAITS] else 2)
+        if watch[ENDS]:
+            return 3
+    return urgent

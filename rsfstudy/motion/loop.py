@@ -1,0 +1,276 @@
+"""The loop of all motions: step by step through their regimes, until it is time to hand over.
+
+Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
+or not, with whatever stepper, events are found here. `running` calls it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rsfstudy.motion.calls import evaluate, first_of, moved
+from rsfstudy.motion.detection import (
+    EXCESS,
+    MARGIN,
+    PASSED,
+    excess,
+    located,
+    report,
+    report_beginning,
+    report_end,
+    waits,
+)
+from rsfstudy.motion.handover import (
+    GOES_ON,
+    Limits,
+    begins_slow,
+    has_returned,
+    margin,
+    may_return,
+    termination_of,
+)
+from rsfstudy.motion.layout import (
+    BEGIN,
+    CHANGE,
+    CHANGES,
+    END,
+    ENDED,
+    FAST,
+    FRICTION,
+    FUNCTIONS,
+    GROWTH,
+    HALTED,
+    HANDS_OVER,
+    LOG_RATE,
+    NO_LENGTH,
+    PSIS,
+    RATIO,
+    SAMPLED,
+    SLOW,
+    SPRING,
+    TAKEN,
+    WATCHED,
+)
+from rsfstudy.motion.recording import SAMPLES
+from rsfstudy.motion.sampling import record, record_begin
+from rsfstudy.motion.steppers import begin, retake
+from rsfstudy.motion.steps import (
+    cut,
+    elapsed,
+    halve_unresolved,
+    passed_at_begin,
+    passed_at_end,
+    take_step,
+)
+from rsfstudy.motion.workspace import copy, workspace
+from rsfstudy.slider.slots import LOAD_VELOCITY
+
+#: How often the clock at which a step is to end is looked for.
+CORRECTIONS = 2
+
+
+def advance(memory, y, last, block, plan, watches, samples, events, rows, stepper):
+    """Follow a motion from where `memory` and `y` are.
+
+    Parameters
+    ----------
+    memory : array of MOTION, shape (1,)
+        The state of the motion.
+    y : array
+        Unknowns, and behind them their rates.
+    last : array
+        The last point of the regime before; at first, the point at which to begin.
+    block : array
+        Memory for the workspace of a regime.
+    plan : tuple
+        Scales of the unknowns, of which those in a rupture follow those between ruptures; the table
+        of functions, a row for each regime; the limits of the regimes; and the numbers of the
+        scene.
+    watches, samples : array
+        What is watched for, one row of numbers after the other, and when to record.
+    events, rows : array
+        What happens, and what is recorded.
+    stepper : Stepper
+        What takes the steps.
+
+    Returns
+    -------
+    int
+        Why it returns.
+    """
+    motion = memory[0]
+    motion.events = motion.recorded = 0
+    scales, functions, numbers, p = plan
+    y, scales, block = first_of(y), first_of(scales), first_of(block)
+    last, p = first_of(last), first_of(p)
+    limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
+    if motion.at_point:
+        begin_at(motion, y, last, functions, block, limits, p)
+    end = CHANGES
+    while end == CHANGES:
+        unknowns, first = motion.unknowns, 0
+        if motion.regime == FAST:
+            unknowns, first = motion.unknowns_fast, motion.unknowns
+        space = workspace(
+            block,
+            y,
+            unknowns,
+            moved(scales, first),
+            motion.states,
+            functions[motion.regime],
+            first_of(watches),
+            len(watches) // len(WATCHED),
+            p,
+            stepper,
+        )
+        end = through_regime(motion, space, last, samples, events, rows, limits)
+        if end == CHANGES:
+            motion.regime, motion.begins = FAST - motion.regime, CHANGE
+            enter(motion, y, last)
+            if is_full(motion, space.watched, events, rows):
+                end = HANDS_OVER
+    return end
+
+
+def is_full(motion, watched, events, rows):
+    """Whether the tables have no room for all that one more step may add to them."""
+    full = len(events) - motion.events < 2 * watched + 4
+    return full or (len(rows) > 0 and len(rows) - motion.recorded < 2 * SAMPLES)
+
+
+def begin_at(motion, y, last, functions, below, limits, p):
+    """Begin in the regime that a point is for; `below` takes in the slow manifold there."""
+    motion.at_point, motion.regime = 0, SLOW
+    enter(motion, y, last)
+    if motion.has_mass:
+        evaluate(functions[SLOW, FUNCTIONS - 1], y, y, p, below)
+        if not begins_slow(last[LOG_RATE], below[0], last[SPRING] - below[1], limits):
+            motion.regime = FAST
+            enter(motion, y, last)
+
+
+def enter(motion, y, last):
+    """Begin a regime at the last point of one before."""
+    y[0] = last[SPRING]
+    if motion.regime == FAST:
+        y[1], y[2] = last[LOG_RATE], last[FRICTION]
+        for i in range(1, motion.states):
+            y[2 + i] = last[PSIS + i]
+        y[2 + motion.states] = 0.0
+    else:
+        for i in range(motion.states):
+            y[1 + i] = last[PSIS + i]
+        y[1 + motion.states] = 0.0
+
+
+def through_regime(motion, space, last, samples, events, rows, limits):
+    """Follow one regime; returns why it ends, or why the call has to."""
+    if motion.begins:
+        begin(motion, space)
+        motion.resolved = math.inf
+    else:
+        copy(moved(space.y, space.unknowns), space.rates, space.unknowns)
+    evaluate(space.point, space.y, space.rates, space.p, space.before)
+    while True:
+        taken = take_step(motion, space)
+        if taken != TAKEN:
+            return taken
+        if motion.records:
+            halve_unresolved(motion, space)
+        evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
+        if math.isnan(space.after[LOG_RATE]):
+            return NO_LENGTH
+        if motion.terminates and not goes_on(motion, space, limits):
+            return HALTED
+        leaves, over = cut_short(motion, space, limits)
+        if motion.begins:
+            record_begin(motion, space, rows, limits)
+            if report_beginning(motion, space, last, events, limits):
+                return ENDED
+        complete = motion.records and record(motion, space, rows, samples, over, limits)
+        urgent = report(motion, space, events, limits)
+        if motion.begins == BEGIN and not waits(space):
+            urgent = max(urgent, 2)
+        motion.begins = 0
+        if urgent == 3:
+            return ENDED
+        if complete:
+            urgent = 2
+            report_end(motion, space, events, SAMPLED, limits)
+        if over:
+            report_end(motion, space, events, END, limits)
+            return ENDED
+        if leaves or returns(motion, space, limits):
+            motion.started = passed_at_end(motion, space, limits)
+            copy(space.after, last, PSIS + motion.states)
+            return CHANGES
+        if motion.terminates and motion.termination != GOES_ON:
+            return HALTED
+        move_on(motion, space)
+        if urgent == 2 or is_full(motion, space.watched, events, rows):
+            copy(space.rates, moved(space.y, space.unknowns), space.unknowns)
+            return HANDS_OVER
+
+
+def goes_on(motion, space, limits):
+    """Whether a motion does, if only through this step: that then ends where the motion does."""
+    columns, velocity = space.after, space.p[LOAD_VELOCITY]
+    motion.stress = columns[RATIO]
+    motion.termination = termination_of(columns[LOG_RATE], motion.stress, velocity)
+    if motion.termination == GOES_ON:
+        return True
+    at_begin = margin(space.before[LOG_RATE], space.before[RATIO], velocity)
+    at_end = margin(columns[LOG_RATE], columns[RATIO], velocity)
+    if at_begin <= 0.0:
+        return False
+    cut(motion, space, located(MARGIN, at_begin, at_end, motion, space, limits))
+    return True
+
+
+def cut_short(motion, space, limits):
+    """Let the step end where the regime has to be left, and where time is over; whether it is."""
+    before, after = excess(motion, space.before, limits), excess(motion, space.after, limits)
+    leaves = after >= 0.0 > before
+    if leaves:
+        cut(motion, space, located(EXCESS, before, after, motion, space, limits))
+    over = passed_at_end(motion, space, limits) >= motion.lasts
+    if over:
+        motion.target = motion.lasts
+        at_begin = passed_at_begin(motion, space, limits) - motion.lasts
+        at_end = passed_at_end(motion, space, limits) - motion.lasts
+        end_in_time(motion, space, located(PASSED, at_begin, at_end, motion, space, limits), limits)
+    return leaves, over
+
+
+def end_in_time(motion, space, clock, limits):
+    """Let the step end where time is over.
+
+    Dense output tells the clock. Where stability limits steps it is far less accurate than their
+    ends: the step is taken anew to that clock, and again with what time it was missing.
+    """
+    for _ in range(CORRECTIONS):
+        retake(motion, space, clock)
+        late = passed_at_end(motion, space, limits) - motion.lasts
+        clock -= late / elapsed(motion, space, space.rates_at_end, limits)
+    evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
+
+
+def returns(motion, space, limits):
+    """Whether the full equations have done their work."""
+    if motion.regime == SLOW or not may_return(space.after[LOG_RATE], limits):
+        return False
+    columns, below = space.after, space.between
+    space.within[0] = columns[SPRING]
+    for i in range(motion.states):
+        space.within[1 + i] = columns[PSIS + i]
+    evaluate(space.balance, space.within, space.within, space.p, below)
+    missing = columns[SPRING] - below[1]
+    return has_returned(columns[LOG_RATE], columns[GROWTH], below[0], missing, limits)
+
+
+def move_on(motion, space):
+    """The end of a step is the beginning of the next."""
+    motion.clock = motion.end
+    copy(space.new, space.y, space.unknowns)
+    copy(space.rates_at_end, space.rates, space.unknowns)
+    copy(space.after, space.before, PSIS + motion.states)

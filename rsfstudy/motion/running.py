@@ -1,0 +1,399 @@
+"""Runs the loop of motions, and makes events of the tables that it fills."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rsfstudy.motion import layout, workspace
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.columns import filling
+from rsfstudy.motion.detection import BEFORE, NOWHERE, between
+from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
+from rsfstudy.motion.events import Event, Kind, Watch
+from rsfstudy.motion.handover import Limits
+from rsfstudy.motion.loop import advance
+from rsfstudy.motion.recording import SAMPLES, STATES, Recording
+from rsfstudy.motion.regimes import Regimes, halted
+from rsfstudy.motion.regimes import regimes as regimes_of
+from rsfstudy.motion.stepping import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
+from rsfstudy.slider.equations import Equations, without_mass
+from rsfstudy.slider.forms import Point
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Rows of the tables of events and of recordings that one call may fill.
+_EVENTS, _RECORDED = 64, 4096
+_KINDS = {
+    Kind.MAXIMUM: layout.MAXIMUM,
+    Kind.MINIMUM: layout.MINIMUM,
+    Kind.RISE: layout.RISE,
+    Kind.FALL: layout.FALL,
+    Kind.SETTLED: layout.SETTLED,
+}
+_COLUMNS = {
+    "log_rate": layout.LOG_RATE,
+    "growth": layout.GROWTH,
+    "spring": layout.SPRING,
+    "friction": layout.FRICTION,
+    "psi": layout.PSI,
+    "state": layout.STATE,
+    "imbalance": layout.IMBALANCE,
+    "unrest": layout.UNREST,
+    "coefficient": layout.COEFFICIENT,
+    "normal_stress": layout.RATIO,
+    "reading": layout.READING,
+    "": 0,
+}
+#: What is told beside what was asked for: the codes of these count from the end.
+_BESIDE = [(kind, None) for kind in (Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
+#: Where the states of a point begin in a line of the table of events; and where the numbers of a
+#: `Point` are that come before its states, and behind them.
+_OF_STATES = layout.POINT + layout.PSIS
+_BEFORE = slice(layout.POINT, layout.POINT + Point._fields.index("psis"))
+_BEHIND = slice(_BEFORE.stop, _OF_STATES)
+#: Makes a named tuple of a tuple, in half the time that its name takes.
+_named = tuple.__new__
+_TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
+_NO_MASS = (math.nan,) * len(Limits._fields)
+
+
+class Machine(Protocol):
+    """What runs the loop: as it stands, or compiled."""
+
+    def initial(self, fields: tuple[tuple[str, float], ...]) -> Any:
+        """What motions begin with that have these numbers in their state, and others 0."""
+
+    def state(self, initial: Any, called_with: tuple[float, ...]) -> Any:
+        """The state of a motion: its `memory`, and what it `says` of itself."""
+
+    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        """The table of functions of the regimes."""
+
+    def passed(self, array: np.ndarray) -> Any:
+        """An array as the loop takes it."""
+
+    def numbers(self, p: Numbers) -> Any:
+        """The numbers of a scene as the loop takes them."""
+
+    def advance(self) -> Any:
+        """The loop."""
+
+
+class Plain:
+    """The loop as it stands."""
+
+    def initial(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
+        return {**dict.fromkeys(layout.MOTION.names or (), 0), **dict(fields)}
+
+    def state(self, initial: dict[str, float], called_with: tuple[float, ...]) -> PlainState:
+        return PlainState(initial, called_with)
+
+    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        rows = np.zeros((2, layout.FUNCTIONS), dtype=object)
+        for row, system in zip(rows, systems, strict=False):
+            row[:] = filling(system)
+        rows[layout.FAST, -1] = rows[layout.SLOW, -1]
+        return rows
+
+    def passed(self, array: np.ndarray) -> memoryview:
+        return memoryview(array)  # type: ignore[arg-type]
+
+    def numbers(self, p: Numbers) -> Numbers:
+        return p
+
+    def advance(self) -> Any:
+        return advance
+
+
+class PlainState:
+    """The state of a motion in plain Python."""
+
+    def __init__(self, initial: dict[str, float], called_with: tuple[float, ...]) -> None:
+        called = zip(layout.CALLED_WITH_FIELDS, called_with, strict=True)
+        self._now = SimpleNamespace(**{**initial, **dict(called)})
+        self.memory = [self._now]
+
+    def says(self) -> tuple[int, ...]:
+        """Right-hand sides by regime, steps, events, rows, and Jacobians."""
+        now = self._now
+        return (
+            *(now.spent_slow, now.spent_fast, now.steps),
+            *(now.events, now.recorded, now.jacobians),
+        )
+
+    def field(self, name: str) -> float:
+        """One of its fields."""
+        return float(getattr(self._now, name))
+
+
+class _Plan(NamedTuple):
+    """What all motions by the same equations begin and are called with.
+
+    Attributes
+    ----------
+    machine : Machine
+    initial : object
+        What they begin with.
+    called : tuple
+        The argument `plan` of the loop.
+    systems : tuple of Equations
+        Those of the regimes they go through.
+    """
+
+    machine: Any
+    initial: Any
+    called: tuple[Any, ...]
+    systems: tuple[Equations, ...]
+
+
+def segment(
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+    start: Point,
+    watches: Sequence[Watch],
+    *,
+    origin: Numbers,
+    lasts: float,
+    clock: bool,
+    recording: Recording | None,
+) -> Iterator[Event]:
+    """Events of one segment of loading; the last is its end, unless one ends the motion earlier.
+
+    Parameters
+    ----------
+    scene, accuracy, meter, start, watches, clock, recording
+        As those of `course.follow`.
+    origin : tuple of float
+        Time, slip and spring stress where the segment begins.
+    lasts : float
+        How long it lasts.
+    """
+    plan = _planned(scene, accuracy, meter, clock=clock)
+    count = max(len(system.unknowns) for system in plan.systems)
+    begins = np.empty(2 * count), _columns_of(start)
+    return _events(plan, (lasts, *origin), begins, meter, watches, recording)
+
+
+def path(
+    equations: Equations,
+    state: Numbers,
+    tolerance: float,
+    meter: Meter,
+    watches: Sequence[Watch],
+    *,
+    backward: bool,
+    recording: Recording | None,
+) -> Iterator[Event]:
+    """Events along one system of equations; the arguments are those of `course.along`."""
+    fields = _fields(tolerance, equations)
+    fields |= {"direction": -1.0 if backward else 1.0, "slip_is_clock": equations.is_rigid}
+    plan = _plan(_machine(meter), fields, equations)
+    begins = np.array((*state, *state)), np.empty(layout.PSIS + equations.states)
+    return _events(plan, (math.inf, 0.0, 0.0, 0.0), begins, meter, watches, recording)
+
+
+def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> _Plan:
+    """What all motions of a scene at an accuracy have in common; found once."""
+    key = "plan", meter.engine == COMPILED, accuracy.rtol, accuracy.refinement, clock
+    if key not in scene.made:
+        both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
+        slow = both.slow if both else without_mass(scene, clock=clock)
+        fields = _fields(accuracy.solver, slow, both)
+        fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
+        scene.made[key] = _plan(_machine(meter), fields, slow, both)
+    found: _Plan = scene.made[key]
+    return found
+
+
+def _machine(meter: Meter) -> Machine:
+    """What runs the loop."""
+    machine: Machine = compiled_engine().Compiled() if meter.engine == COMPILED else Plain()
+    return machine
+
+
+def _fields(tolerance: float, slow: Equations, both: Regimes | None = None) -> dict[str, float]:
+    """What the state of a motion holds at first, by an integrator of that tolerance."""
+    tolerance = max(tolerance, TIGHTEST)
+    return {
+        "tolerance": tolerance,
+        # what limits a step must differ between two tolerances whose results are to tell errors
+        "finer": (tolerance / TOLERANCE_OF_STRIDES) ** 0.125,
+        "begins": layout.BEGIN,
+        "limits_steps": not slow.is_rigid,
+        "unknowns": len(slow.unknowns),
+        "states": slow.states,
+        "unknowns_fast": len(both.fast.unknowns) if both else 0,
+        "has_mass": both is not None,
+    }
+
+
+def _plan(
+    machine: Machine, fields: dict[str, float], slow: Equations, both: Regimes | None = None
+) -> _Plan:
+    """A plan of motions by equations, and by those of another regime."""
+    systems = (slow,) if both is None else (slow, both.fast)
+    scales = np.array([scale for system in systems for scale in system.scales])
+    limits = _NO_MASS if both is None else tuple(both.limits)
+    table, p = machine.table(systems), machine.numbers(slow.p)
+    called = machine.passed(scales), table, limits, p
+    return _Plan(machine, machine.initial(tuple(fields.items())), called, systems)
+
+
+def _events(
+    plan: _Plan,
+    times: tuple[float, ...],
+    begins: tuple[np.ndarray, np.ndarray],
+    meter: Meter,
+    watches: Sequence[Watch],
+    recording: Recording | None,
+) -> Iterator[Event]:
+    """Events of a motion, a table of them by each call of the loop.
+
+    Parameters
+    ----------
+    times : tuple of float
+        How long it lasts, and time, slip and spring stress where it begins.
+    begins : tuple of ndarray
+        The unknowns with which it begins, behind which is room for as many; and the columns of the
+        point at which it begins, if it is that which the plan begins with.
+
+    Raises
+    ------
+    Halt
+        Where it cannot go on.
+    """
+    machine, (y, last) = plan.machine, begins
+    regimes, states = [system.regime for system in plan.systems], len(last) - layout.PSIS
+    asked, meanings = _asked(tuple(watches))
+    stepper = stepper_of(meter.engine, plan.systems, meter.methods)
+    events = np.empty((max(_EVENTS, 2 * len(watches) + 4), _OF_STATES + states))
+    keeper = _Keeper(recording, plan.systems[0], times[1], regimes, states)
+    called_with = *times, meter.budget - meter.spent, keeper.records
+    state = machine.state(plan.initial, called_with)
+    block = np.empty(workspace.size(len(y) // 2, states, len(watches)))
+    arrays = map(machine.passed, (y, last, block))
+    tables = map(machine.passed, (asked.copy(), keeper.samples, events, keeper.rows))
+    arguments = *arrays, plan.called, *tables, stepper
+    run, end, account = machine.advance(), layout.HANDS_OVER, _Account(meter, regimes)
+    while end == layout.HANDS_OVER:
+        end = run(state.memory, *arguments)
+        slow, fast, steps, happened, recorded, jacobians = state.says()
+        before = account.settle(slow, fast, steps, jacobians)
+        keeper.keep(recorded)
+        for line in events[:happened].tolist():
+            psis = tuple(line[_OF_STATES:])
+            point = _named(Point, (*line[_BEFORE], psis, *line[_BEHIND]))
+            kind, watch = meanings[int(line[layout.CODE])]
+            name = regimes[int(line[layout.REGIME])]
+            work = before + int(line[layout.SPENT])
+            time, slip = line[layout.TIME], line[layout.SLIP]
+            yield _named(Event, (kind, watch, time, slip, point, name, work, line[layout.CLOCK]))
+        meter.check()
+    if end != layout.ENDED:
+        raise _halt(end, state, regimes, stepper)
+
+
+class _Account:
+    """What a motion has spent in its regimes, and a meter has been told of."""
+
+    def __init__(self, meter: Meter, regimes: Sequence[str]) -> None:
+        self._meter, self._regimes = meter, regimes
+        self._slow = self._fast = self._steps = self._jacobians = 0
+
+    def settle(self, slow: int, fast: int, steps: int, jacobians: int) -> int:
+        """Add what it has spent since the last time to the meter; returns what else is on that."""
+        meter = self._meter
+        before = meter.spent - self._slow - self._fast
+        if slow > self._slow:
+            meter.add(self._regimes[0], slow - self._slow)
+        if fast > self._fast:
+            meter.add(self._regimes[1], fast - self._fast)
+        meter.steps += steps - self._steps
+        meter.jacobians += jacobians - self._jacobians
+        self._slow, self._fast, self._steps, self._jacobians = slow, fast, steps, jacobians
+        return before
+
+
+class _Keeper:
+    """Hands what one segment records to a recording.
+
+    Attributes
+    ----------
+    records : int
+        Whether the loop records, and when.
+    samples, rows : ndarray
+        Times or clocks at which to, and the table that the loop fills.
+    """
+
+    def __init__(
+        self,
+        recording: Recording | None,
+        system: Equations,
+        begins: float,
+        regimes: Sequence[str],
+        states: int,
+    ) -> None:
+        self._recording, self._regimes = recording, regimes
+        self.samples, count, self.records = np.empty(0), 0, layout.NEVER
+        if recording is not None and recording.at is not None:
+            self.samples = recording.left() - (0.0 if system.is_rigid else begins)
+            count = len(self.samples) + 2 * SAMPLES
+            self.records = layout.AT_CLOCKS if system.is_rigid else layout.AT_TIMES
+        elif recording is not None:
+            count, self.records = _RECORDED, layout.WITHIN_STEPS
+        self.rows = np.empty((count, STATES + states))
+
+    def keep(self, recorded: int) -> None:
+        """Add the rows that one call has filled."""
+        if self._recording is not None and recorded:
+            self._recording.take(self.rows[:recorded].copy(), self._regimes)
+
+
+def happening(
+    before: Point, p_before: Numbers, after: Point, p_after: Numbers, watches: Sequence[Watch]
+) -> Iterator[tuple[Watch, Point]]:
+    """What is watched for and happens where a motion jumps from a point to another, with the
+    numbers of the scene at both; and at which of them.
+    """
+    last, first = _columns_of(before).tolist(), _columns_of(after).tolist()
+    table = _asked(tuple(watches))[0].reshape(-1, len(layout.WATCHED)).tolist()
+    for watch, row in zip(watches, table, strict=True):
+        where = between(row, last, p_before, first, p_after)
+        if where != NOWHERE:
+            yield watch, before if where == BEFORE else after
+
+
+@lru_cache(maxsize=256)
+def _asked(watches: tuple[Watch, ...]) -> tuple[np.ndarray, list[tuple[Kind, Watch | None]]]:
+    """The table of what is watched for, and what codes of events mean."""
+    meanings = [*((watch.kind, watch) for watch in watches), *_BESIDE]
+    asked = np.zeros((len(watches), len(layout.WATCHED)))
+    for row, watch in zip(asked, watches, strict=True):
+        row[layout.KIND], row[layout.OF] = _KINDS[watch.kind], _COLUMNS[watch.of]
+        row[layout.LEVEL], row[layout.ENDS] = watch.level, watch.ends
+        row[layout.WAITS] = watch.waits
+    return asked.ravel(), meanings
+
+
+def _columns_of(point: Point) -> np.ndarray:
+    """A point as the loop has it."""
+    log_rate, growth, spring, friction, psis, *others = point
+    return np.array((log_rate, growth, spring, friction, *others, *psis))
+
+
+def _halt(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> Halt:
+    """Why a motion cannot go on."""
+    if end == layout.HALTED:
+        return halted(int(state.field("termination")), state.field("stress"))
+    why = "step without length, or a state that is not finite"
+    if end == layout.NO_STEP:
+        why = stepper.failure if stepper else _TOO_SHORT
+    return Halt(Status.INTEGRATION_FAILED, f"{regimes[int(state.field('regime'))]}: {why}")

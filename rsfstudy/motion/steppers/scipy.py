@@ -1,0 +1,136 @@
+"""SciPy's integrators, one by regime: what takes the steps where nothing else is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolution, OdeSolver, Radau
+
+from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
+from rsfstudy.motion.workspace import spend
+from rsfstudy.slider.equations import LONGEST_STEP, Equations
+from rsfstudy.slider.parts import Numbers
+
+#: SciPy's integrators, by name.
+METHODS: Mapping[str, type[OdeSolver]] = {
+    method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
+}
+DEFAULT_METHOD = "DOP853"
+
+
+class _Spent(Exception):
+    """The budget is, within a step."""
+
+
+class SciPyStepper(Stepper):
+    """Steps by the integrators of SciPy."""
+
+    name = "scipy"
+
+    def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
+        super().__init__(systems, methods)
+        names = (methods.get(system.regime, DEFAULT_METHOD) for system in systems)
+        self._methods = [METHODS[name] for name in names]
+        self._solver: Any = None
+        self._dense: Any = None
+        self._may_stop = False
+
+    def begin(self, motion: Any, space: Any) -> None:
+        ends = 0.0, motion.direction * np.inf
+        # the longest first step is asked of a trial step, which may leave the domain
+        self._solver = self._solves(motion, space, ends, np.array(space.y[: space.unknowns]))
+        space.rates[: space.unknowns] = self._rates()
+
+    def attempt(self, motion: Any, space: Any, longest: float) -> float:
+        if self._solver.status == "finished":  # a step that was taken anew
+            ends = motion.clock, motion.direction * np.inf
+            begin, length = np.array(space.y[: space.unknowns]), abs(motion.length)
+            self._solver = self._solves(motion, space, ends, begin, first_step=length)
+        solver, known = self._solver, self._solver.njev
+        solver.max_step = longest
+        self._may_stop = True
+        try:
+            failure = self._step(solver)
+        except _Spent:
+            return BUDGET_SPENT
+        finally:
+            self._may_stop = False
+            motion.jacobians += solver.njev - known
+        if solver.status == "failed":
+            self.failure = failure
+            return NO_STEP
+        if motion.spent_slow + motion.spent_fast > motion.budget:
+            return BUDGET_SPENT
+        motion.end, self._dense = float(solver.t), None
+        motion.taken = motion.end - motion.clock
+        motion.length = abs(motion.taken)
+        self._fill(space)
+        return abs(float(motion.taken))
+
+    def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
+        if self._dense is None:
+            self._dense = self._solver.dense_output()
+        space.within[: space.unknowns] = self._dense(clock)
+
+    def retake(self, motion: Any, space: Any, clock: float) -> None:
+        begin = np.array(space.y[: space.unknowns])
+        length, ends = abs(clock - motion.clock), (motion.clock, clock)
+        self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
+        clocks, within = [motion.clock], []
+        while solver.status == "running":
+            self._step(solver)
+            clocks.append(solver.t)
+            within.append(solver.dense_output())
+        motion.end, motion.taken = clock, clock - motion.clock
+        self._dense = OdeSolution(clocks, within)
+        self._fill(space)
+
+    def _solves(
+        self, motion: Any, space: Any, ends: tuple[float, float], begin: np.ndarray, **first: float
+    ) -> OdeSolver:
+        """An integrator of the regime from one clock to another, whose work is charged."""
+        system = self.systems[motion.regime]
+        rate_of, p = system.rate, system.p
+
+        def rate(_clock: float, unknowns: np.ndarray) -> Numbers:
+            spend(motion, 1)
+            if self._may_stop and motion.spent_slow + motion.spent_fast > motion.budget:
+                raise _Spent
+            changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+            return changes
+
+        scales = np.array(space.scales[: space.unknowns])
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return self._methods[motion.regime](
+                rate,
+                ends[0],
+                begin,
+                ends[1],
+                rtol=motion.tolerance,
+                atol=motion.tolerance * scales,
+                max_step=LONGEST_STEP,
+                **first,
+            )
+
+    def _step(self, solver: OdeSolver) -> str:
+        """Take one step; why it failed.
+
+        Trial steps may leave the domain, and the solver then rejects them; what it accepts is
+        checked.
+        """
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return str(solver.step())
+
+    def _rates(self) -> np.ndarray:
+        """Rates where the solver stands; most have just computed them."""
+        known = getattr(self._solver, "f", None)
+        if known is None:
+            known = self._solver.fun(self._solver.t, self._solver.y)
+        return np.asarray(known, dtype=float)
+
+    def _fill(self, space: Any) -> None:
+        """Fill in the end of a step."""
+        space.new[: space.unknowns] = self._solver.y
+        space.rates_at_end[: space.unknowns] = self._rates()

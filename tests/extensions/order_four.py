@@ -1,0 +1,91 @@
+"""A stepper: the classical Runge-Kutta method of order four, two halves of a step for its error."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
+from rsfstudy.motion.workspace import spend
+
+
+class OrderFour(Stepper):
+    name = "order_four"
+
+    def begin(self, motion, space):
+        system = self.systems[motion.regime]
+        self._rate, self._p, self._motion = system.rate, system.p, motion
+        self._allowed = motion.tolerance * np.array(system.scales)
+        self._length = 1e-3
+        space.rates[: space.unknowns] = self.rates(np.array(space.y[: space.unknowns]))
+
+    def attempt(self, motion, space, longest):
+        y, first = (np.array(x[: space.unknowns]) for x in (space.y, space.rates))
+        length = min(self._length, longest)
+        while True:
+            towards = length * motion.direction
+            if motion.clock + 0.1 * towards == motion.clock:
+                self.failure = "a step would be shorter than the spacing of numbers"
+                return NO_STEP
+            if motion.spent_slow + motion.spent_fast > motion.budget:
+                return BUDGET_SPENT
+            new, error = self.halves(y, first, towards)
+            error = np.max(np.abs(error) / (self._allowed + motion.tolerance * np.abs(new)))
+            factor = 0.9 * error**-0.2 if math.isfinite(error) and error > 0.0 else 0.2
+            self._length = length * min(4.0, max(0.2, factor))
+            if error <= 1.0:
+                break
+            length = self._length
+        motion.taken, motion.end = towards, motion.clock + towards
+        space.new[: space.unknowns] = new
+        space.rates_at_end[: space.unknowns] = self.rates(new)
+        return length
+
+    def unknowns_at(self, motion, space, clock):
+        """By the cubic with the values and rates of both ends."""
+        n, part = space.unknowns, (clock - motion.clock) / motion.taken
+        y, new, first, last = (
+            np.array(x[:n]) for x in (space.y, space.new, space.rates, space.rates_at_end)
+        )
+        line = (1.0 - part) * y + part * new
+        bend = (1.0 - part) * (motion.taken * first - new + y)
+        bend += part * (new - y - motion.taken * last)
+        space.within[:n] = line + part * (1.0 - part) * bend
+
+    def retake(self, motion, space, clock):
+        n = space.unknowns
+        motion.taken, motion.end = clock - motion.clock, clock
+        y, first = np.array(space.y[:n]), np.array(space.rates[:n])
+        new = self.halves(y, first, motion.taken)[0]
+        space.new[:n], space.rates_at_end[:n] = new, self.rates(new)
+
+    def halves(self, y, first, length):
+        """The end of two halves of a step, of order five, and the error of order four."""
+        middle = self.step(y, first, 0.5 * length)
+        twice = self.step(middle, self.rates(middle), 0.5 * length)
+        error = (twice - self.step(y, first, length)) / 15.0
+        return twice + error, error
+
+    def step(self, y, first, length):
+        second = self.rates(y + 0.5 * length * first)
+        third = self.rates(y + 0.5 * length * second)
+        fourth = self.rates(y + length * third)
+        return y + length / 6.0 * (first + 2.0 * (second + third) + fourth)
+
+    def rates(self, y):
+        spend(self._motion, 1)
+        return np.array(self._rate(tuple(y.tolist()), self._p))
+
+
+study = Study(
+    name="by_order_four",
+    title="Critical steps by a stepper of order four",
+    base=Scene(law="slip", normal_stress="constant"),
+    axes=[Axis("b_over_a", [1.5, 2.0])],
+    measure=CriticalStep(),
+    accuracy=Accuracy(1e-4, engine=OrderFour),
+)
