@@ -5,6 +5,8 @@ from __future__ import annotations
 import unicodedata
 from dataclasses import dataclass
 
+from rsfstudy.errors import InvalidValue
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -39,6 +41,44 @@ class Quantity:
         if self.units not in ("", "1"):
             text += f" ({self.units})"
         return text
+
+
+@dataclass(frozen=True)
+class Output(Quantity):
+    """A number that a measure gives; the vocabulary, or its name, describes one that states no
+    more.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Inner dimensions that it has within one cell.
+    error : bool
+        Whether a numerical error estimate stands beside it, as ``<name>_error``.
+    optional : bool
+        Whether an ok outcome may leave it out, with its error; the message says why.
+
+    Raises
+    ------
+    InvalidValue
+        For a symbol, units or a scale of what is not said to be anything.
+    """
+
+    symbol: str = ""
+    units: str = "1"
+    long_name: str = ""
+    dims: tuple[str, ...] = ()
+    error: bool = False
+    optional: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.long_name and (self.symbol or self.scale or self.units != "1"):
+            rule = f"must say what {self.name} is, which states a symbol, units or a scale"
+            raise InvalidValue("long_name", self.long_name, rule)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its name, and that of its error estimate if there is one."""
+        return (self.name, f"{self.name}_error") if self.error else (self.name,)
 
 
 def is_name(name: object) -> bool:

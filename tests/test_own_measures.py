@@ -17,7 +17,7 @@ from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status
 
@@ -78,6 +78,79 @@ def test_a_measure_says_what_its_numbers_are(tmp_path):
     assert drawn.get_ylabel().startswith("Heat per area")
     pressure = rsfstudy.to_si(dataset, normal_stress=1e6, slip_distance=1e-5).total
     assert (float(pressure[0]), pressure.attrs["units"]) == (2e6, "Pa")
+
+
+class Outputs(Measure):
+    """Gives b/a, as a stress and along a dimension, and now and then its logarithm."""
+
+    name = "outputs"
+    headline = "total"
+    outputs = (
+        Output("total", "$Q$", "1", "heat per area", "sigma_*", error=True),
+        Output("curve", dims=("x",)),
+        Output("logarithm", error=True, optional=True),
+        Output("slip_per_event"),
+    )
+    dimensions = (Quantity("x", "", "m", "distance along the fault"),)
+    inner_coordinates = {"x": [1.0, 2.0]}  # noqa: RUF012
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        ratio = scene.b_over_a
+        values = {"total": ratio, "total_error": 0.0, "curve": np.ones(2), "slip_per_event": 1.0}
+        if ratio > 2.0:
+            values |= {"logarithm": np.log(ratio), "logarithm_error": 1e-16}
+        return Outcome(Status.OK, values)
+
+
+def test_a_measure_states_its_outputs_once(tmp_path):
+    """Names, errors, dimensions and descriptions of a file follow from them."""
+    measure = Outputs()
+    assert dict(measure.variables) == {
+        "total": (),
+        "total_error": (),
+        "curve": ("x",),
+        "logarithm": (),
+        "logarithm_error": (),
+        "slip_per_event": (),
+    }
+    assert (*measure.estimated, *measure.optional) == ("total", "logarithm", "logarithm")
+    dataset = run(study(measure), output=tmp_path)
+    assert (dataset.status == int(Status.OK)).all()
+    np.testing.assert_array_equal(dataset.logarithm, [np.nan, np.log(3.0)])
+    said = {"long_name": "heat per area", "symbol": "$Q$", "units": "1", "scale": "sigma_*"}
+    assert said.items() <= dataset.total.attrs.items()
+    assert dataset.total.attrs["ancillary_variables"] == "total_error status"
+    error = dataset.total_error.attrs
+    assert error["long_name"] == "numerical error estimate of heat per area"
+    assert (error["units"], error["scale"]) == ("1", "sigma_*")
+    assert dataset.x.attrs["long_name"] == "distance along the fault"
+    assert dataset.curve.attrs["long_name"] == "curve"
+    # the vocabulary describes what says no more than its name
+    assert dataset.slip_per_event.attrs["long_name"] == "slip per stick-slip cycle"
+
+
+@pytest.mark.parametrize(
+    ("outputs", "complaint"),
+    [
+        ((Output("total"), Output("total")), "'total': names something else"),
+        ((Output("total", error=True), Output("total_error")), "'total_error': names something"),
+        ((Output("total", dims=("x",)),), "dimension = 'x': of 'total' has no coordinate values"),
+        (("total",), "declares what no lattice can hold"),
+        ((), "variables = {}: must name a number"),
+    ],
+    ids=named,
+)
+def test_outputs_that_make_no_lattice(outputs, complaint):
+    odd = type("Odd", (Outputs,), {"outputs": outputs, "dimensions": (), "inner_coordinates": {}})
+    with pytest.raises(InvalidValue, match=complaint):
+        study(odd())
+
+
+@pytest.mark.parametrize("said", [{"symbol": "$Q$"}, {"units": "s"}, {"scale": "sigma_*"}])
+def test_what_has_a_symbol_or_units_is_something(said):
+    with pytest.raises(InvalidValue, match="must say what total is"):
+        Output("total", **said)
 
 
 def test_what_is_not_measured_is_not_described():

@@ -27,7 +27,7 @@ from rsfstudy.motion.accuracy import (
     relative_work,
 )
 from rsfstudy.motion.stepping import Halt, Meter, more_work
-from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.quantity import Output, Quantity, is_name
 from rsfstudy.slider.fields import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -69,8 +69,8 @@ class Measure:
 
     #: File and registry name.
     name: ClassVar[str]
-    #: Numbers with an error estimate that an ok outcome may leave out; its message says why.
-    optional: ClassVar[Sequence[str]] = ()
+    #: What its inner dimensions and its fields mean, where the vocabulary does not say.
+    dimensions: ClassVar[Sequence[Quantity]] = ()
     #: Whether its motions carry time along: what is compiled before any cell is.
     clocks: ClassVar[tuple[bool, ...]] = (True,)
 
@@ -80,11 +80,21 @@ class Measure:
         raise TypeError(f"{type(self).__name__} names no headline")
 
     @property
+    def outputs(self) -> Sequence[Output]:
+        """The numbers it gives."""
+        return ()
+
+    @property
     def variables(self) -> Mapping[str, tuple[str, ...]]:
-        """Name of each number, and the inner dimensions it has within one cell (none for a plain
-        number).
+        """Name of each number and of each error estimate, and the inner dimensions it has within
+        one cell (none for a plain number).
         """
-        raise TypeError(f"{type(self).__name__} names no variables")
+        return {name: about.dims for about in self.outputs for name in about.names}
+
+    @property
+    def optional(self) -> Sequence[str]:
+        """Numbers with an error estimate that an ok outcome may leave out; its message says why."""
+        return tuple(about.name for about in self.outputs if about.optional)
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -99,10 +109,10 @@ class Measure:
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """What its numbers and inner dimensions mean, with their units: those that the vocabulary
-        does not hold.
+        """What its numbers, inner dimensions and fields mean, with their units: those that the
+        vocabulary does not hold.
         """
-        return ()
+        return (*(about for about in self.outputs if about.long_name), *self.dimensions)
 
     @property
     def sought(self) -> tuple[str, ...]:
@@ -188,7 +198,8 @@ class Measure:
             if getattr(type(self), name) is not getattr(Measure, name):
                 rule, remedy = f"has a {name} of its own", "Write find: what it gives is checked."
                 raise InvalidValue("measure", self.name, rule, remedy=remedy)
-        names = [*self.variables, *self.inner_coordinates]
+        stated = [name for about in self.outputs for name in about.names]
+        names = [*(stated or self.variables), *self.inner_coordinates]
         if not self.variables:
             raise InvalidValue("variables", {}, f"must name a number, in measure {self.name}")
         if self.headline not in self.variables:
@@ -203,12 +214,11 @@ class Measure:
             for dim in dims:
                 if dim not in self.inner_coordinates:
                     raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+        known = {*names, *self.plain_fields}
         for about in self.quantities:
-            if not isinstance(about, Quantity) or about.name not in names:
-                stated = about.name if isinstance(about, Quantity) else about
-                raise InvalidValue(
-                    "quantities", stated, "describes nothing measured", choices=names
-                )
+            if not isinstance(about, Quantity) or about.name not in known:
+                odd = about.name if isinstance(about, Quantity) else about
+                raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
         for name in self.sought:
             if name not in FIELDS:
                 raise InvalidValue("sought", name, "is not a field of a scene", choices=FIELDS)

@@ -1,14 +1,13 @@
 """A loading history, and a measure that reads it: the load point is held, then moves on."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 from rsfstudy.status import Status
@@ -31,11 +30,10 @@ class HoldAndReload(Loading):
 class PeakAfterRest(Measure):
     name = "peak_after_rest"
     headline = "peak_stress"
-    quantities = (
-        Quantity("peak_stress", "", "1", "rise of stress to its peak on reloading", "sigma_*"),
-        Quantity("relaxation", "", "1", "change of stress during the hold", "sigma_*"),
+    outputs = (
+        Output("peak_stress", "", "1", "rise of stress to its peak", "sigma_*", error=True),
+        Output("relaxation", "", "1", "change of stress during the hold", "sigma_*"),
     )
-    variables: ClassVar = {"peak_stress": (), "peak_stress_error": (), "relaxation": ()}
     typical_work = 4_000
 
     def find(self, scene, accuracy, meter):

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.status import Status
 
 
@@ -13,8 +13,7 @@ from rsfstudy.status import Status
 class LoadingTime(Measure):
     name: ClassVar[str] = "loading_time"
     headline = "loading_time"
-    variables: ClassVar = {"loading_time": ()}
-    quantities = (Quantity("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
+    outputs = (Output("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
     typical_work = 1
 
     def find(self, scene, accuracy, meter):
