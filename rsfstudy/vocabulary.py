@@ -1,4 +1,6 @@
-"""Every quantity once: name, symbol, units and long name, for datasets, axis labels and tables."""
+"""What scenes, motions and results share: name, symbol, units and long name of each quantity, for
+datasets, axis labels and tables. What one measure alone gives is described in its own file.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ _QUANTITIES = (
         "1",
         "logarithm of load point velocity over V_star",
     ),
-    # what is measured
+    # what several measures give, or figures name; files leave out their symbols
     Quantity(
         "critical_velocity_ratio",
         "$V_0/V_*$",
@@ -57,24 +59,6 @@ _QUANTITIES = (
         "V_*",
     ),
     Quantity(
-        "displacement_slope", "", "1", "slope of critical displacement against a/(b-a)", "D_c"
-    ),
-    Quantity("over_eq_11", "", "1", "critical load point velocity over that of eq. 11"),
-    Quantity("over_eq_14", "", "1", "critical displacement step over D_c a/(b-a)"),
-    Quantity(
-        "implied_norm", r"$VT/(2\pi D_c)$", "1", "instability norm that gives the published value"
-    ),
-    Quantity(
-        "lattice_boundary",
-        "$V_0/V_*$",
-        "1",
-        "boundary between stable and unstable cells",
-        "V_*",
-    ),
-    Quantity(
-        "lowering", "", "1", "fraction by which the boundary lies below that of the reference"
-    ),
-    Quantity(
         "critical_stiffness",
         r"$k_{cr}D_c/\sigma_*$",
         "1",
@@ -101,22 +85,7 @@ _QUANTITIES = (
         "1",
         "critical stiffness over that at V_star",
     ),
-    Quantity(
-        "rise_by_dynamics",
-        "",
-        "1",
-        "fraction by which mass raises, or radiation lowers, the critical stiffness",
-    ),
-    Quantity(
-        "stabilising_velocity",
-        "$V_0/V_*$",
-        "1",
-        "load point velocity beyond which a spring of that stiffness slides stably",
-        "V_*",
-    ),
-    Quantity("stiffness_slope", "", "1", "slope of critical stiffness against ln V", "sigma_*/D_c"),
     Quantity("steady_friction", r"$\mu_{ss}$", "1", "steady-state friction coefficient"),
-    Quantity("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),
     Quantity(
         "recurrence_interval", "$t_r V_*/D_c$", "1", "recurrence interval of stick-slip", "D_c/V_*"
     ),
@@ -146,13 +115,64 @@ _QUANTITIES = (
         "1",
         "decimal logarithm of the slip rate over V_star at each peak",
     ),
-    Quantity("peak", "", "1", "number of the peak of slip rate after the step"),
+    Quantity("slip_per_event", r"$\delta/D_c$", "1", "slip per stick-slip cycle", "D_c"),
+    Quantity("residual_friction", r"$\tau/\sigma$", "1", "friction coefficient at peak slip rate"),
+    Quantity("phase", "", "1", "fraction of the path along a cycle"),
     Quantity(
-        "peak_ratio",
-        "",
+        "evolution_distance",
+        r"$\delta_e/D_c$",
         "1",
-        "second over first peak of ln V above the load point velocity: 1 where oscillations repeat",
+        "slip until 1/e of the stress change after a rate step is left",
+        "D_c",
     ),
+    # along a motion
+    Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
+    Quantity("slip", r"$\delta/D_c$", "1", "slip since the step", "D_c"),
+    Quantity(
+        "log10_slip_rate", r"$\log_{10}(V/V_*)$", "1", "decimal logarithm of slip rate over V_star"
+    ),
+    Quantity(
+        "shear_stress", r"$\tau/\sigma_*$", "1", "shear stress carried by the spring", "sigma_*"
+    ),
+    Quantity(
+        "frictional_stress",
+        r"$\tau_f/\sigma_*$",
+        "1",
+        "frictional resistance: what the spring carries, less what accelerates the mass",
+        "sigma_*",
+    ),
+    Quantity("normal_stress_ratio", r"$\sigma/\sigma_*$", "1", "normal stress", "sigma_*"),
+    Quantity(
+        "state_variable", r"$\Theta$", "1", "state variable, as a part of the friction coefficient"
+    ),
+    Quantity("regime", "", "", "equations in use"),
+    # reductions
+    Quantity(
+        "displacement_slope", "", "1", "slope of critical displacement against a/(b-a)", "D_c"
+    ),
+    Quantity("over_eq_11", "", "1", "critical load point velocity over that of eq. 11"),
+    Quantity("over_eq_14", "", "1", "critical displacement step over D_c a/(b-a)"),
+    Quantity(
+        "implied_norm", r"$VT/(2\pi D_c)$", "1", "instability norm that gives the published value"
+    ),
+    Quantity(
+        "lattice_boundary",
+        "$V_0/V_*$",
+        "1",
+        "boundary between stable and unstable cells",
+        "V_*",
+    ),
+    Quantity(
+        "lowering", "", "1", "fraction by which the boundary lies below that of the reference"
+    ),
+    Quantity(
+        "stabilising_velocity",
+        "$V_0/V_*$",
+        "1",
+        "load point velocity beyond which a spring of that stiffness slides stably",
+        "V_*",
+    ),
+    Quantity("stiffness_slope", "", "1", "slope of critical stiffness against ln V", "sigma_*/D_c"),
     Quantity(
         "peak_lowering",
         "",
@@ -178,54 +198,6 @@ _QUANTITIES = (
         "stress after the rupture with mass, less that without",
         "sigma_*",
     ),
-    Quantity("unstable", "", "1", "whether the step triggers instability"),
-    Quantity("slip_per_event", r"$\delta/D_c$", "1", "slip per stick-slip cycle", "D_c"),
-    Quantity("residual_friction", r"$\tau/\sigma$", "1", "friction coefficient at peak slip rate"),
-    Quantity("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
-    Quantity("phase", "", "1", "fraction of the path along a cycle"),
-    Quantity(
-        "evolution_distance",
-        r"$\delta_e/D_c$",
-        "1",
-        "slip until 1/e of the stress change after a rate step is left",
-        "D_c",
-    ),
-    Quantity("direct_stress_change", "", "1", "stress change just after a rate step", "sigma_*"),
-    Quantity(
-        "evolution_asymmetry",
-        "",
-        "1",
-        "stress change from direct effect to steady state over that of the inverse step, less 1",
-    ),
-    Quantity(
-        "direct_asymmetry",
-        "",
-        "1",
-        "direct stress change of the step over that of its inverse, less 1",
-    ),
-    Quantity(
-        "steady_stress_change", "", "1", "change of steady-state stress by a rate step", "sigma_*"
-    ),
-    Quantity(
-        "stress_left_at_unit_slip",
-        "",
-        "1",
-        "stress above its steady state after a slip of D_c",
-        "sigma_*",
-    ),
-    Quantity(
-        "closed_form_misfit",
-        "",
-        "1",
-        "largest departure of stress from the closed form at constant normal stress",
-        "sigma_*",
-    ),
-    Quantity(
-        "exponential_misfit",
-        "",
-        "1",
-        "largest departure from exponential decay over D_c, as a fraction of the stress change",
-    ),
     Quantity(
         "separation",
         "",
@@ -234,28 +206,7 @@ _QUANTITIES = (
         "sigma_*",
     ),
     Quantity("slowing", "", "1", "fraction by which the evolution is shorter than the other"),
-    # along a motion
-    Quantity("time", "$tV_*/D_c$", "1", "time since the step", "D_c/V_*"),
-    Quantity("slip", r"$\delta/D_c$", "1", "slip since the step", "D_c"),
-    Quantity(
-        "log10_slip_rate", r"$\log_{10}(V/V_*)$", "1", "decimal logarithm of slip rate over V_star"
-    ),
-    Quantity(
-        "shear_stress", r"$\tau/\sigma_*$", "1", "shear stress carried by the spring", "sigma_*"
-    ),
-    Quantity(
-        "frictional_stress",
-        r"$\tau_f/\sigma_*$",
-        "1",
-        "frictional resistance: what the spring carries, less what accelerates the mass",
-        "sigma_*",
-    ),
-    Quantity("normal_stress_ratio", r"$\sigma/\sigma_*$", "1", "normal stress", "sigma_*"),
-    Quantity(
-        "state_variable", r"$\Theta$", "1", "state variable, as a part of the friction coefficient"
-    ),
-    Quantity("regime", "", "", "equations in use"),
-    # reductions
+    Quantity("proportionality", "", "1", "slope of achieved against requested digits"),
     Quantity("zeta", r"$\zeta$", "1", "slope of V_0/V_star - 1 against a/(b-a)"),
     Quantity("static_slope", "", "1", "slope of static stress drop against ln V_0", "sigma_*"),
     Quantity("dynamic_slope", "", "1", "slope of dynamic stress drop against ln V_0", "sigma_*"),
@@ -286,14 +237,10 @@ _QUANTITIES = (
         "fraction of the static drop lost, against inclined driving with alpha",
     ),
     Quantity("work_saved", "", "1", "fraction of the right-hand sides per cycle saved"),
-    # what accuracy costs
-    Quantity("integrator", "", "", "integrator: throughout, or between ruptures and in them"),
+    # checks of accuracy
     Quantity("ended_as", "", "1", "status the measure ended with, as its flag value"),
     Quantity("requested_digits", "", "1", "decimal digits asked for: -log10(rtol)"),
-    Quantity("measured_error", "", "1", "error against an independent reference"),
-    Quantity("error_estimate", "", "1", "the run's own estimate of its error"),
     Quantity("digits", "", "1", "correct decimal digits wanted"),
-    Quantity("proportionality", "", "1", "slope of achieved against requested digits"),
     Quantity("cheapest_integrator", "", "", "integrator with the least right-hand sides"),
     Quantity("cheapest_work", "", "1", "its right-hand sides"),
     Quantity("cheapest_default_work", "", "1", "right-hand sides of the default integrator"),
@@ -302,8 +249,6 @@ _QUANTITIES = (
     Quantity("cheapest_relative", "", "1", "work of an integrator over that of the default one"),
     Quantity("cheapest_ratio", "", "1", "work of the default integrator over the least"),
     # whether error estimates cover
-    Quantity("question", "", "", "what is measured in a random scene"),
-    Quantity("sample", "", "1", "number of the random scene"),
     *(
         Quantity(f"{name}_{what}", "", "1", f"{text}{among}")
         for name, among in (("covered", ""), ("covered_by_question", ", by question"))
@@ -379,7 +324,7 @@ def quantity(name: str, own: Mapping[str, Quantity] = MappingProxyType({})) -> Q
     ----------
     name : str
     own : mapping of str to Quantity
-        What a measure says of its own numbers.
+        What a study says of its own numbers.
     """
     if name in own:
         return own[name]

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from test_readings import PLAIN, read, recorded
 
-from rsfstudy import Scene, measures, protocol, simulate
+from rsfstudy import Scene, measures, protocol, simulate, vocabulary
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
 
 
@@ -151,6 +152,19 @@ def every_measure() -> list[Measure]:
 
     ours = (kind for kind in below(Measure) if kind.__module__.startswith("rsfstudy."))
     return [kind() for kind in ours if isinstance(getattr(kind, "name", None), str)]
+
+
+@pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
+def test_each_number_is_described_once(measure):
+    """By its measure or by the vocabulary; an error, and what else stands beside, by what it is
+    of.
+    """
+    own = {about.name: about for about in measure.quantities}
+    assert len(own) == len(measure.quantities)
+    assert not own.keys() & vocabulary.QUANTITIES.keys()
+    for name in (*measure.variables, *measure.inner_coordinates):
+        nothing_said = Quantity(name, "", "1", name.replace("_", " "))
+        assert vocabulary.quantity(name, own) != nothing_said
 
 
 @pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)

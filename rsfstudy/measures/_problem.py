@@ -8,8 +8,15 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+
+#: What is told of a problem that has been solved.
+ERRORS = (
+    Output("measured_error", "", "1", "error against an independent reference", error=True),
+    Output("error_estimate", "", "1", "the run's own estimate of its error"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -28,7 +28,7 @@ from rsfstudy.measures.limit_cycle import (
 )
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -36,49 +36,61 @@ from rsfstudy.status import Status
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.02
 
-_QUANTITIES = (
-    PERIOD,
-    Quantity("event", "", "1", "number of the event, of those that are kept"),
-    Quantity("event_interval", "$t_r V_*/D_c$", "1", "time from an event to the next", "D_c/V_*"),
-    Quantity(
-        "peak_spread", "", "1", "decimal logarithm of the fastest over the slowest of the peaks"
-    ),
-    Quantity(
+_OUTPUTS = (
+    replace(PERIOD, error=True),
+    Output(
         "floquet_multiplier",
         r"$\mathrm{Re}\,\Lambda_1$",
         "1",
         "Floquet multiplier of the cycle of one event that is largest in size, its real part",
+        error=True,
+        optional=True,
     ),
-    Quantity(
+    Output(
         "floquet_multiplier_imaginary",
         r"$\mathrm{Im}\,\Lambda_1$",
         "1",
         "imaginary part of that Floquet multiplier",
     ),
-    Quantity(
+    Output(
         "floquet_multiplier_size",
         r"$|\Lambda_1|$",
         "1",
         "size of that Floquet multiplier: the cycle of one event attracts below 1",
     ),
-    Quantity(
+    Output(
         "one_event_log10_peak",
         r"$\log_{10}(V_{peak}/V_*)$",
         "1",
         "decimal logarithm of the peak slip rate over V_star of the cycle of one event, whether it "
         "attracts or not",
+        error=True,
+        optional=True,
     ),
-    Quantity(
+    Output(
         "lyapunov_exponent",
         r"$\lambda$",
         "1",
         "logarithm of the growth of small departures per event, in the mean: positive in chaos",
     ),
-    Quantity(
+    Output(
         "lyapunov_exponent_stderr",
         "",
         "1",
         "standard error of that mean, from blocks of events; only where no cycle attracts",
+    ),
+    Output(
+        "peak_spread", "", "1", "decimal logarithm of the fastest over the slowest of the peaks"
+    ),
+    Output("critical_stiffness"),
+    Output("peak_log10_slip_rate", dims=("event",)),
+    Output(
+        "event_interval",
+        "$t_r V_*/D_c$",
+        "1",
+        "time from an event to the next",
+        "D_c/V_*",
+        dims=("event",),
     ),
 )
 
@@ -113,7 +125,10 @@ class Bifurcation(Measure):
     transient: int = 64
     events: int = 32
     name: ClassVar[str] = "bifurcation"
-    optional = ("floquet_multiplier", "one_event_log10_peak")
+    headline = "period_events"
+    typical_work = 120_000
+    outputs = _OUTPUTS
+    dimensions = (Quantity("event", "", "1", "number of the event, of those that are kept"),)
 
     def __post_init__(self) -> None:
         if self.transient < 0:
@@ -122,39 +137,8 @@ class Bifurcation(Measure):
             raise InvalidValue("events", self.events, "must be at least 4")
 
     @property
-    def headline(self) -> str:
-        return "period_events"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        scalars = (
-            "period_events",
-            "period_events_error",
-            "floquet_multiplier",
-            "floquet_multiplier_error",
-            "floquet_multiplier_imaginary",
-            "floquet_multiplier_size",
-            "one_event_log10_peak",
-            "one_event_log10_peak_error",
-            "lyapunov_exponent",
-            "lyapunov_exponent_stderr",
-            "peak_spread",
-            "critical_stiffness",
-        )
-        along = dict.fromkeys(("peak_log10_slip_rate", "event_interval"), ("event",))
-        return dict.fromkeys(scalars, ()) | along
-
-    @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"event": np.arange(1, self.events + 1)}
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 120_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the events, and close the cycle of one event at two accuracies."""

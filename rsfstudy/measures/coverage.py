@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -22,7 +22,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -117,11 +117,17 @@ _PATIENCE = 6
 
 
 #: What its numbers are.
-_QUANTITIES = (
-    Quantity("number", "", "", "name of the number"),
-    Quantity("status_kept", "", "1", "whether a tighter run ends with the same status"),
-    Quantity("error_over_estimate", "", "1", "error over its own estimate"),
-    Quantity("error_over_request", "", "1", "relative error over the accuracy asked for"),
+_OUTPUTS = (
+    Output("status_kept", long_name="whether a tighter run ends with the same status", error=True),
+    Output("ended_as"),
+    Output("error_over_estimate", "", "1", "error over its own estimate", dims=("number",)),
+    Output(
+        "error_over_request",
+        "",
+        "1",
+        "relative error over the accuracy asked for",
+        dims=("number",),
+    ),
 )
 
 
@@ -147,6 +153,14 @@ class Coverage(Measure):
     sample: int = 0
     requested_digits: int = 7
     name: ClassVar[str] = "coverage"
+    headline = "status_kept"
+    typical_work = 60_000
+    outputs = _OUTPUTS
+    dimensions = (
+        Quantity("question", "", "", "what is measured in a random scene"),
+        Quantity("sample", "", "1", "number of the random scene"),
+        Quantity("number", "", "", "name of the number"),
+    )
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
@@ -159,27 +173,8 @@ class Coverage(Measure):
             raise InvalidValue("requested_digits", self.requested_digits, rule)
 
     @property
-    def headline(self) -> str:
-        return "status_kept"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        numbers = ("error_over_estimate", "error_over_request")
-        return dict.fromkeys(("status_kept", "status_kept_error", "ended_as"), ()) | dict.fromkeys(
-            numbers, ("number",)
-        )
-
-    @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"number": np.array(_ESTIMATED, dtype=object)}
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 60_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Measure twice, and compare each number that both give."""

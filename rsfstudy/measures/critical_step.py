@@ -11,8 +11,9 @@ see `swing`. Either way the answer counts only once a motion on each side of it 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, ClassVar
 
 from scipy.optimize import toms748
@@ -29,6 +30,7 @@ from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -52,6 +54,14 @@ _AT_ONCE = 0.1
 _LIGHT_NORM = 1e-3
 
 
+@cache
+def _outputs(of: str) -> tuple[Output, ...]:
+    critical = KINDS[of].quantity
+    confirmed = (f"{critical}_stable", f"{critical}_unstable")
+    beside = (*confirmed, *KINDS[of].beside, "critical_stiffness")
+    return Output(critical, error=True), *map(Output, beside)
+
+
 @dataclass(frozen=True)
 class CriticalStep(Measure):
     """Critical step of the load point, or of normal stress.
@@ -70,6 +80,7 @@ class CriticalStep(Measure):
     of: str = "load_velocity_ratio"
     direction: str = "up"
     name: ClassVar[str] = "critical_step"
+    typical_work = 4_000
     clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
@@ -83,18 +94,12 @@ class CriticalStep(Measure):
         return KINDS[self.of].quantity
 
     @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        of = self.headline
-        names = (of, f"{of}_error", f"{of}_stable", f"{of}_unstable")
-        return dict.fromkeys((*names, *KINDS[self.of].beside, "critical_stiffness"), ())
+    def outputs(self) -> Sequence[Output]:
+        return _outputs(self.of)
 
     @property
     def sought(self) -> tuple[str, ...]:
         return (self.of,)
-
-    @property
-    def typical_work(self) -> int:
-        return 4_000
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:

@@ -7,15 +7,14 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.scene import Scene
 
@@ -26,36 +25,34 @@ _EVALUATIONS, _TURNS = 100, 25
 _BETWEEN_RUPTURES, _IN_RUPTURE = (0.01, 0.0), (0.01, 10.0, 0.01)
 
 _CYCLE = LimitCycle(phases=2)
-_KEPT = (
-    "recurrence_interval",
-    "recurrence_interval_error",
-    "static_stress_drop",
-    "dynamic_stress_drop",
-    "min_log10_slip_rate",
-    "max_log10_slip_rate",
-    "work_per_cycle",
+#: Of its numbers, those that are kept.
+_OF_CYCLE = tuple(
+    replace(about, error=about.name == LimitCycle.headline)
+    for about in LimitCycle.outputs
+    if about.error or about.name == "work_per_cycle"
 )
 
 
 #: What its numbers are.
-_QUANTITIES = (
-    Quantity("unknowns", "", "1", "unknowns of the equations between ruptures"),
-    Quantity("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
-    Quantity("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
-    Quantity(
+_OUTPUTS = (
+    *_OF_CYCLE,
+    Output("unknowns", "", "1", "unknowns of the equations between ruptures"),
+    Output("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
+    Output("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
+    Output(
         "evaluation_cost",
         "",
         "1",
         "time of a right-hand side between ruptures over one in the plainest scene",
     ),
-    Quantity(
+    Output(
         "evaluation_cost_in_rupture",
         "",
         "1",
         "time of a right-hand side where mass acts over one in the plainest scene",
     ),
-    Quantity("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
-    Quantity(
+    Output("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
+    Output(
         "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
     ),
 )
@@ -70,26 +67,10 @@ class EffectCost(Measure):
     """
 
     name: ClassVar[str] = "effect_cost"
+    headline = "recurrence_interval"
+    typical_work = 20_000
+    outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
-
-    @property
-    def headline(self) -> str:
-        return "recurrence_interval"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        costs = ("unknowns", "unknowns_in_rupture", "share_in_rupture")
-        times = ("time_per_evaluation", "time_per_evaluation_in_rupture")
-        relative = ("evaluation_cost", "evaluation_cost_in_rupture")
-        return dict.fromkeys((*_KEPT, *costs, *relative, *times), ())
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 20_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The cycle under this meter; the forms of the equations on their own."""
@@ -100,7 +81,8 @@ class EffectCost(Measure):
             return Outcome(halt.status, costs, str(halt))
         spent = meter.by_regime.get("inertial", 0)
         costs["share_in_rupture"] = spent / meter.spent if meter.spent else math.nan
-        kept = {name: cycle.values[name] for name in _KEPT if name in cycle.values}
+        names = [name for about in _OF_CYCLE for name in about.names]
+        kept = {name: cycle.values[name] for name in names if name in cycle.values}
         return Outcome(cycle.status, {**kept, **costs}, cycle.message)
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._problem import Problem, posed_by
+from rsfstudy.measures._problem import ERRORS, Problem, posed_by
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: What its numbers are.
-_QUANTITIES = (Quantity("answer", "", "1", "the known answer"),)
+_OUTPUTS = (
+    *ERRORS,
+    Output("answer", "", "1", "the known answer"),
+    Output("ended_as"),
+)
 
 
 @dataclass(frozen=True)
@@ -34,24 +37,10 @@ class HardCase(Measure):
 
     problems: tuple[Problem, ...] = ()
     name: ClassVar[str] = "hard_case"
+    headline = "measured_error"
+    typical_work = 15_000
+    outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
-
-    @property
-    def headline(self) -> str:
-        return "measured_error"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        names = ("measured_error", "measured_error_error", "error_estimate", "answer", "ended_as")
-        return dict.fromkeys(names, ())
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 15_000
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""

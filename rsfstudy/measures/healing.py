@@ -12,13 +12,14 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
 from rsfstudy.motion.recording import READ, Recording, along_path
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -31,26 +32,30 @@ _TURNS = 3.0
 #: Part of the largest distance from steady sliding at which there is no more peak to come.
 _SETTLED = 1e-6
 
-_READ = (
-    Quantity(
+_OUTPUTS = (
+    Output(
         "healing",
         r"$\Delta\mu$",
         "1",
         "healing: peak friction on reloading less friction before the hold",
+        error=True,
     ),
-    Quantity(
+    Output(
         "relaxation",
         r"$\Delta\mu_c$",
         "1",
         "change of friction during the hold: that at its end less that before",
+        error=True,
     ),
-    Quantity(
+    Output(
         "peak_displacement",
         r"$\delta_0/D_c$",
         "1",
         "load point displacement from reloading to the peak of friction",
         "D_c",
+        error=True,
     ),
+    *recorded("time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
 )
 
 
@@ -87,22 +92,15 @@ class Healing(Reading):
     record: float = 10.0
     phases: int = 300
     name: ClassVar[str] = "healing"
-    read = _READ
-    kept = ("time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
+    headline = "healing"
+    typical_work = 4_000
+    outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
         if not 0.0 < self.record < math.inf:
             raise InvalidValue("record", self.record, "must be positive and finite")
         if self.phases < 2:
             raise InvalidValue("phases", self.phases, "must be at least 2")
-
-    @property
-    def headline(self) -> str:
-        return "healing"
-
-    @property
-    def typical_work(self) -> int:
-        return 4_000
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Differences of friction, and a, which is what ln V is in it; the displacement, and D_c,

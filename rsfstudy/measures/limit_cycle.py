@@ -28,11 +28,12 @@ from rsfstudy.boundaries.periods import Course, course
 from rsfstudy.boundaries.return_map import Orbit, ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, error_between
 from rsfstudy.motion.recording import OBSERVED, along_path
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -56,6 +57,30 @@ _HEADLINES = (
 #: Place of the peak slip rate among them.
 PEAK = 4
 
+#: How many events a motion takes to repeat itself.
+PERIOD = Output("period_events", "", "1", "number of events after which a motion repeats itself")
+_OUTPUTS = (
+    *(Output(name, error=True) for name in _HEADLINES),
+    Output("slip_per_event"),
+    Output(
+        "healing_exponent",
+        "",
+        "1",
+        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
+    ),
+    Output("residual_friction"),
+    Output(
+        "drop_asymmetry",
+        "",
+        "1",
+        "stress drop while slip accelerates over that while it decelerates",
+    ),
+    PERIOD,
+    Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
+    Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
+    *recorded(*OBSERVED),
+)
+
 
 @dataclass(frozen=True)
 class LimitCycle(Measure):
@@ -77,33 +102,17 @@ class LimitCycle(Measure):
     phases: int = 400
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
+    headline = "recurrence_interval"
+    typical_work = 9_000
+    outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
         if self.phases < 2:
             raise InvalidValue("phases", self.phases, "must be at least 2")
 
     @property
-    def headline(self) -> str:
-        return "recurrence_interval"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        scalars = [name for h in _HEADLINES for name in (h, f"{h}_error")]
-        scalars += ["slip_per_event", "healing_exponent", "residual_friction", "drop_asymmetry"]
-        scalars += ["period_events", "events_until_repeat", "work_per_cycle"]
-        return dict.fromkeys(scalars, ()) | dict.fromkeys(OBSERVED, ("phase",))
-
-    @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"phase": np.linspace(0.0, 1.0, self.phases)}
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 9_000
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events until one repeats, then go round once more with smaller tolerances: for the
@@ -170,26 +179,6 @@ class LimitCycle(Measure):
         status, why = judged(accuracy, one, again, range(len(_HEADLINES)))
         return Outcome(status, values | along_path(again.path, self.phases), why)
 
-
-#: How many events a motion takes to repeat itself.
-PERIOD = Quantity("period_events", "", "1", "number of events after which a motion repeats itself")
-#: What only a limit cycle has.
-_QUANTITIES = (
-    PERIOD,
-    Quantity(
-        "healing_exponent",
-        "",
-        "1",
-        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
-    ),
-    Quantity(
-        "drop_asymmetry",
-        "",
-        "1",
-        "stress drop while slip accelerates over that while it decelerates",
-    ),
-    Quantity("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
-)
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
 

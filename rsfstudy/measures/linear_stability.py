@@ -5,7 +5,6 @@ growth of the assembled equations, and in closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,6 +14,7 @@ from scipy.optimize import brentq
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Output
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import (
     Equations,
@@ -36,6 +36,21 @@ _MASS_SHOWS = 1e-3
 #: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
 _LARGEST_RISE = 1e6
 
+_OUTPUTS = (
+    Output("critical_stiffness", error=True),
+    Output("critical_stiffness_from_growth"),
+    Output("critical_stiffness_explicit"),
+    Output("relative_critical_stiffness"),
+    Output(
+        "rise_by_dynamics",
+        "",
+        "1",
+        "fraction by which mass raises, or radiation lowers, the critical stiffness",
+    ),
+    Output("steady_friction"),
+    Output("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),
+)
+
 
 @dataclass(frozen=True)
 class LinearStability(Measure):
@@ -48,33 +63,14 @@ class LinearStability(Measure):
     """
 
     name: ClassVar[str] = "linear_stability"
+    headline = "critical_stiffness"
+    typical_work = 100
+    outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = ()
-
-    @property
-    def headline(self) -> str:
-        return "critical_stiffness"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        names = (
-            "critical_stiffness",
-            "critical_stiffness_error",
-            "critical_stiffness_from_growth",
-            "critical_stiffness_explicit",
-            "relative_critical_stiffness",
-            "rise_by_dynamics",
-            "steady_friction",
-            "steady_normal_stress",
-        )
-        return dict.fromkeys(names, ())
 
     @property
     def sought(self) -> tuple[str, ...]:
         return ("stiffness_ratio",)
-
-    @property
-    def typical_work(self) -> int:
-        return 100
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The critical stiffness, and the root of the growth in stiffness; their difference is the

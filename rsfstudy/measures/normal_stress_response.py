@@ -12,12 +12,13 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.measures._reading import KEPT, Reading, errors_of
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading.oscillation import Oscillation
 from rsfstudy.slider.scene import Scene
@@ -38,52 +39,55 @@ _PATIENCE, _FINEST = 6, 8
 #: Part by which two records may differ where the response has settled.
 _SAME = 1e-3
 
-_READ = (
-    Quantity(
+_OUTPUTS = (
+    Output(
         "gain",
         r"$|\hat\tau/\hat\sigma|$",
         "1",
         "amplitude of spring stress over that of imposed normal stress, at the period of forcing",
+        error=True,
     ),
-    Quantity(
+    Output(
         "phase_lead",
         r"$\arg(\hat\tau/\hat\sigma)$",
         "degree",
         "angle by which spring stress is ahead of imposed normal stress, at the period of forcing",
+        error=True,
     ),
-    Quantity(
+    Output(
         "distortion",
         "",
         "1",
         "spring stress at all other periods than that of forcing, over that at it",
+        error=True,
     ),
-    Quantity(
+    Output(
         "departure_from_linear",
         "",
         "1",
         "distance of the response from that of small oscillations, over that",
+        error=True,
     ),
-)
-_OTHERS = (
-    Quantity(
+    Output(
         "linear_gain",
         r"$|\hat\tau/\hat\sigma|$",
         "1",
         "gain of small oscillations, by linear theory",
     ),
-    Quantity(
+    Output(
         "linear_phase_lead",
         r"$\arg(\hat\tau/\hat\sigma)$",
         "degree",
         "lead of spring stress in small oscillations, by linear theory",
     ),
-    Quantity(
+    Output(
         "response_period",
         "",
         "1",
         "number of periods of forcing after which the response repeats itself",
     ),
-    Quantity("settled", "", "1", "whether one period of the response is as another later on"),
+    Output("settled", "", "1", "whether one period of the response is as another later on"),
+    *recorded(*KEPT),
 )
 
 
@@ -193,8 +197,9 @@ class NormalStressResponse(Reading):
 
     samples: int = 64
     name: ClassVar[str] = "normal_stress_response"
-    read = _READ
-    beside = _OTHERS
+    headline = "gain"
+    typical_work = 20_000
+    outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
         if self.samples < 8 or self.samples % 2:
@@ -202,16 +207,8 @@ class NormalStressResponse(Reading):
             raise InvalidValue("samples", self.samples, rule)
 
     @property
-    def headline(self) -> str:
-        return "gain"
-
-    @property
     def points(self) -> int:
         return self.samples + 1
-
-    @property
-    def typical_work(self) -> int:
-        return 20_000
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Of spring stress itself and a, over the amplitude of normal stress. The overtones are

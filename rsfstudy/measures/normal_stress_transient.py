@@ -11,7 +11,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.measures._reading import KEPT, Reading, errors_of
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy
 from rsfstudy.motion.course import follow
@@ -19,7 +20,7 @@ from rsfstudy.motion.events import Event
 from rsfstudy.motion.readings import friction_of
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -35,36 +36,43 @@ _HOPS, _SLOWEST = 3, -600.0
 #: Direct change over mu_* that is no more than rounding.
 _NONE = 10.0 * ROUNDING
 
-_READ = (
-    Quantity("apparent_alpha", r"$\alpha$", "1", "normal stress effect on the state, as read off"),
-    Quantity(
+_OUTPUTS = (
+    Output(
+        "apparent_alpha",
+        r"$\alpha$",
+        "1",
+        "normal stress effect on the state, as read off",
+        error=True,
+    ),
+    Output(
         "apparent_slip_distance",
         "$D_c$",
         "1",
         "slip over which the transient of friction falls to 1/e, as read off",
         "D_c",
+        error=True,
     ),
-    Quantity(
+    Output(
         "evolution_left",
         r"$\Delta\mu(D_c)/\Delta\mu(0)$",
         "1",
         "part of the direct change that is left of the transient after a slip of D_c",
+        error=True,
     ),
-)
-_OTHERS = (
-    Quantity(
+    Output(
         "direct_change",
         r"$\Delta\mu(0)$",
         "1",
         "change of friction at once, less the direct effect of slip rate",
     ),
-    Quantity("settled", "", "1", "whether friction has settled at the end of the record"),
-    Quantity(
+    Output("settled", "", "1", "whether friction has settled at the end of the record"),
+    Output(
         "closed_form_departure",
         "",
         "1",
         "largest departure of friction, where it is read, from that of a stiff slider",
     ),
+    *recorded(*KEPT),
 )
 
 
@@ -117,8 +125,9 @@ class NormalStressTransient(Reading):
     record: float = 30.0
     phases: int = 300
     name: ClassVar[str] = "normal_stress_transient"
-    read = _READ
-    beside = _OTHERS
+    headline = "apparent_alpha"
+    typical_work = 4_000
+    outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
         if not 0.0 < self.fit_from < self.fit_to:
@@ -129,14 +138,6 @@ class NormalStressTransient(Reading):
             raise InvalidValue("record", self.record, rule)
         if self.phases < 2:
             raise InvalidValue("phases", self.phases, "must be at least 2")
-
-    @property
-    def headline(self) -> str:
-        return "apparent_alpha"
-
-    @property
-    def typical_work(self) -> int:
-        return 4_000
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The numbers themselves, of a transient that errs by what a is beside its size where it is

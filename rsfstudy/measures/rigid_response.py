@@ -19,10 +19,54 @@ from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
 from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.quantity import Output
 from rsfstudy.slider.equations import resting_of, rigid
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_sliding, stress_after_jump
 from rsfstudy.status import Status
+
+_OUTPUTS = (
+    Output("evolution_distance", error=True),
+    Output("direct_stress_change", "", "1", "stress change just after a rate step", "sigma_*"),
+    Output(
+        "direct_asymmetry",
+        "",
+        "1",
+        "direct stress change of the step over that of its inverse, less 1",
+    ),
+    Output(
+        "evolution_asymmetry",
+        "",
+        "1",
+        "stress change from direct effect to steady state over that of the inverse step, less 1",
+    ),
+    Output(
+        "steady_stress_change", "", "1", "change of steady-state stress by a rate step", "sigma_*"
+    ),
+    Output(
+        "stress_left_at_unit_slip",
+        "",
+        "1",
+        "stress above its steady state after a slip of D_c",
+        "sigma_*",
+    ),
+    Output(
+        "closed_form_misfit",
+        "",
+        "1",
+        "largest departure of stress from the closed form at constant normal stress",
+        "sigma_*",
+    ),
+    Output(
+        "exponential_misfit",
+        "",
+        "1",
+        "largest departure from exponential decay over D_c, as a fraction of the stress change",
+    ),
+    Output("shear_stress", dims=("slip",)),
+    Output("normal_stress_ratio", dims=("slip",)),
+    Output("state_variable", dims=("slip",)),
+)
 
 
 @dataclass(frozen=True)
@@ -41,6 +85,9 @@ class RigidResponse(Measure):
     slip: float = 10.0
     points: int = 201
     name: ClassVar[str] = "rigid_response"
+    headline = "evolution_distance"
+    typical_work = 800
+    outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -50,32 +97,8 @@ class RigidResponse(Measure):
             raise InvalidValue("points", self.points, "must be at least 2")
 
     @property
-    def headline(self) -> str:
-        return "evolution_distance"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        scalars = (
-            "evolution_distance",
-            "evolution_distance_error",
-            "direct_stress_change",
-            "direct_asymmetry",
-            "evolution_asymmetry",
-            "steady_stress_change",
-            "stress_left_at_unit_slip",
-            "closed_form_misfit",
-            "exponential_misfit",
-        )
-        profiles = ("shear_stress", "normal_stress_ratio", "state_variable")
-        return dict.fromkeys(scalars, ()) | dict.fromkeys(profiles, ("slip",))
-
-    @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"slip": np.linspace(0.0, self.slip, self.points)}
-
-    @property
-    def typical_work(self) -> int:
-        return 800
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The distance itself, that ends where stress falls by 1/e of its evolution over D_c."""

@@ -11,12 +11,14 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -26,6 +28,18 @@ LN10 = math.log(10.0)
 _OVER = 1e-3
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.01
+
+_OUTPUTS = (
+    Output("max_log10_slip_rate", error=True),
+    Output(
+        "peak_ratio",
+        "",
+        "1",
+        "second over first peak of ln V above the load point velocity: 1 where oscillations repeat",
+    ),
+    Output("peak_log10_slip_rate", dims=("peak",)),
+    *recorded(*OBSERVED),
+)
 
 
 @dataclass(frozen=True)
@@ -44,6 +58,10 @@ class StepResponse(Measure):
     peaks: int = 8
     phases: int = 2000
     name: ClassVar[str] = "step_response"
+    headline = "max_log10_slip_rate"
+    typical_work = 10_000
+    outputs = _OUTPUTS
+    dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
     def __post_init__(self) -> None:
         if self.peaks < 2:
@@ -52,28 +70,11 @@ class StepResponse(Measure):
             raise InvalidValue("phases", self.phases, "must be at least 2")
 
     @property
-    def headline(self) -> str:
-        return "max_log10_slip_rate"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        scalars = ("max_log10_slip_rate", "max_log10_slip_rate_error", "peak_ratio")
-        return (
-            dict.fromkeys(scalars, ())
-            | {"peak_log10_slip_rate": ("peak",)}
-            | dict.fromkeys(OBSERVED, ("phase",))
-        )
-
-    @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {
             "peak": np.arange(1, self.peaks + 1),
             "phase": np.linspace(0.0, 1.0, self.phases),
         }
-
-    @property
-    def typical_work(self) -> int:
-        return 10_000
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The logarithm, and an e-fold of slip rate: that of V_* is zero."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,6 +10,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -24,19 +24,10 @@ class Triggered(Measure):
     """
 
     name: ClassVar[str] = "triggered"
+    headline = "unstable"
+    typical_work = 800
+    outputs = (Output("unstable", "", "1", "whether the step triggers instability", error=True),)
     clocks: ClassVar[tuple[bool, ...]] = (False,)
-
-    @property
-    def headline(self) -> str:
-        return "unstable"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        return dict.fromkeys(("unstable", "unstable_error"), ())
-
-    @property
-    def typical_work(self) -> int:
-        return 800
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion until the answer is certain, at two tolerances."""

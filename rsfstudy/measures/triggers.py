@@ -11,7 +11,7 @@ V_0 exceeds friction at V_* before the state has changed, a ln(V_0/V_*).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,7 +20,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.closed_forms import effective_friction
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -29,63 +29,71 @@ from rsfstudy.status import Status
 _FALL = CriticalStep(of="normal_stress_step", direction="down")
 _PULL, _FASTER = CriticalStep(of="displacement_step"), CriticalStep(of="load_velocity_ratio")
 TRIGGERS = (_FALL, _PULL, _FASTER)
-_ENDS = ("", "_error", "_stable", "_unstable", "_status")
-_STEPS = tuple(f"{trigger.headline}{end}" for trigger in TRIGGERS for end in _ENDS)
-_STRESSES = (
-    "coulomb_stress_of_displacement",
-    "coulomb_stress_of_normal_stress",
-    "direct_stress_of_velocity",
-    "coulomb_ratio",
-    "direct_ratio",
-)
+
+
+def _of_trigger(trigger: CriticalStep) -> tuple[Output, ...]:
+    """What is told of one critical step."""
+    of = trigger.headline
+    ended = f"status with which the search for a critical {trigger.of} ended, as its flag value"
+    return (
+        Output(of, error=True, optional=trigger is _FASTER),
+        Output(f"{of}_stable"),
+        Output(f"{of}_unstable"),
+        Output(f"{of}_status", "", "1", ended),
+    )
+
 
 _SYMBOL = r"$\Delta\mathrm{CFS}/\sigma_*$"
-_QUANTITIES = (
-    Quantity(
+#: Changes of stress, and ratios of them.
+_STRESSES = (
+    Output(
         "coulomb_stress_of_displacement",
         _SYMBOL,
         "1",
         "change of Coulomb stress by the critical displacement step",
         "sigma_*",
+        error=True,
     ),
-    Quantity(
+    Output(
         "coulomb_stress_of_normal_stress",
         _SYMBOL,
         "1",
         "change of Coulomb stress by the critical fall of normal stress",
         "sigma_*",
+        error=True,
     ),
-    Quantity(
-        "coulomb_ratio",
-        r"$\Delta\mathrm{CFS}_\sigma/\Delta\mathrm{CFS}_\delta$",
-        "1",
-        "change of Coulomb stress by the critical fall of normal stress over that by the critical "
-        "displacement step",
-    ),
-    Quantity(
+    Output(
         "direct_stress_of_velocity",
         r"$a\,\ln(V_0/V_*)$",
         "1",
         "direct effect of the critical load point velocity step",
         "sigma_*",
+        error=True,
+        optional=True,
     ),
-    Quantity(
+    Output(
+        "coulomb_ratio",
+        r"$\Delta\mathrm{CFS}_\sigma/\Delta\mathrm{CFS}_\delta$",
+        "1",
+        "change of Coulomb stress by the critical fall of normal stress over that by the critical "
+        "displacement step",
+        error=True,
+    ),
+    Output(
         "direct_ratio",
         r"$a\sigma_*\ln(V_0/V_*)/\Delta\mathrm{CFS}_\delta$",
         "1",
         "direct effect of the critical load point velocity step over the change of Coulomb stress "
         "by the critical displacement step",
+        error=True,
+        optional=True,
     ),
-    *(
-        Quantity(
-            f"{trigger.headline}_status",
-            "",
-            "1",
-            f"status with which the search for a critical {trigger.of} ended, as its flag value",
-        )
-        for trigger in TRIGGERS
-    ),
-    Quantity("effective_friction", r"$\mu'$", "1", "effective friction of Coulomb stress"),
+)
+_OUTPUTS = (
+    *_STRESSES,
+    Output("effective_friction", r"$\mu'$", "1", "effective friction of Coulomb stress"),
+    *(about for trigger in TRIGGERS for about in _of_trigger(trigger)),
+    Output("critical_stiffness"),
 )
 
 
@@ -101,25 +109,10 @@ class Triggers(Measure):
     """
 
     name: ClassVar[str] = "triggers"
-    optional = (_FASTER.headline, "direct_stress_of_velocity", "direct_ratio")
+    headline = "coulomb_ratio"
+    typical_work = 12_000
+    outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = (False,)
-
-    @property
-    def headline(self) -> str:
-        return "coulomb_ratio"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        stresses = [f"{name}{end}" for name in _STRESSES for end in ("", "_error")]
-        return dict.fromkeys((*stresses, "effective_friction", *_STEPS, "critical_stiffness"), ())
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 12_000
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
@@ -190,9 +183,9 @@ def _stresses(
     faster = scene.a * math.log(ratio) if ratio > 0.0 else math.nan, error / ratio
     numbers = (pulled, fallen, faster, _quotient(fallen, pulled), _quotient(faster, pulled))
     told = {"effective_friction": friction}
-    for name, (value, its_error) in zip(_STRESSES, numbers, strict=True):
-        if not math.isnan(value):
-            told |= {name: value, f"{name}_error": its_error}
+    for about, number in zip(_STRESSES, numbers, strict=True):
+        if not math.isnan(number[0]):
+            told |= zip(about.names, number, strict=True)
     return told
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._reading import Reading, errors_of
+from rsfstudy.measures._recorded import recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -19,7 +20,7 @@ from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, r
 from rsfstudy.motion.readings import friction_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess
 from rsfstudy.status import Status
@@ -30,36 +31,49 @@ _LAST, _STAYS = 0.1, 0.01
 #: Part of ln r within which slip is steady before the step.
 _STEADY = 1e-3
 
-_READ = (
-    Quantity("apparent_a", "$a$", "1", "direct effect parameter as read off"),
-    Quantity("apparent_b", "$b$", "1", "evolution effect parameter as read off"),
-    Quantity("apparent_a_minus_b", "$a-b$", "1", "rate dependence of friction as read off"),
-    Quantity(
+_OUTPUTS = (
+    Output("apparent_a", "$a$", "1", "direct effect parameter as read off", error=True),
+    Output("apparent_b", "$b$", "1", "evolution effect parameter as read off", error=True),
+    Output(
+        "apparent_a_minus_b", "$a-b$", "1", "rate dependence of friction as read off", error=True
+    ),
+    Output(
         "apparent_slip_distance",
         "$D_c$",
         "1",
         "load point displacement from the peak until 1/e of the evolution is left",
         "D_c",
+        error=True,
     ),
-    Quantity(
+    Output(
         "corrected_slip_distance",
         "$D_c$",
         "1",
         "slip from the peak until 1/e of the evolution is left",
         "D_c",
+        error=True,
     ),
-    Quantity("peak_friction", r"$\mu$", "1", "friction coefficient at the peak after the step"),
-    Quantity("friction_before", r"$\mu$", "1", "friction coefficient just before the step"),
-    Quantity("friction_after", r"$\mu$", "1", "friction coefficient at the end of the record"),
-)
-_OTHERS = (
-    Quantity("settled", "", "1", "whether friction has settled at the end of the record"),
-    Quantity(
+    Output(
+        "peak_friction",
+        r"$\mu$",
+        "1",
+        "friction coefficient at the peak after the step",
+        error=True,
+    ),
+    Output(
+        "friction_before", r"$\mu$", "1", "friction coefficient just before the step", error=True
+    ),
+    Output(
+        "friction_after", r"$\mu$", "1", "friction coefficient at the end of the record", error=True
+    ),
+    Output("settled", "", "1", "whether friction has settled at the end of the record"),
+    Output(
         "closed_form_departure",
         "",
         "1",
         "largest departure of friction, from the peak on, from that of a stiff slider",
     ),
+    *recorded("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
 )
 
 
@@ -123,9 +137,9 @@ class VelocityStep(Reading):
     record: float = 20.0
     phases: int = 400
     name: ClassVar[str] = "velocity_step"
-    read = _READ
-    beside = _OTHERS
-    kept = ("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate")
+    headline = "apparent_a_minus_b"
+    typical_work = 8_000
+    outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
         if self.step_number < 1:
@@ -135,21 +149,13 @@ class VelocityStep(Reading):
         if self.phases < 2:
             raise InvalidValue("phases", self.phases, "must be at least 2")
 
-    @property
-    def headline(self) -> str:
-        return "apparent_a_minus_b"
-
-    @property
-    def typical_work(self) -> int:
-        return 8_000
-
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Frictions themselves, and a for their differences, here over ln r; slip distances end
         where friction falls by 1/e of the evolution over D_c.
         """
         step = self._step(scene)
         ratio = abs(step.ratio) if isinstance(step, _Step) else math.inf
-        sizes = {about.name: abs(values[about.name]) for about in self.read}
+        sizes = {about.name: abs(values[about.name]) for about in self.outputs if about.error}
         for name in ("apparent_a", "apparent_b", "apparent_a_minus_b"):
             sizes[name] += scene.a / ratio
         evolution = abs(values["apparent_b"]) * ratio

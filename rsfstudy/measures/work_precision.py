@@ -7,18 +7,18 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._problem import Problem, posed_by
+from rsfstudy.measures._problem import ERRORS, Problem, posed_by
 from rsfstudy.motion.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.motion.steppers.scipy import METHODS
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -52,13 +52,14 @@ INTEGRATORS = tuple(name for name in _CHOICES if name != _COMPILED or is_install
 
 
 #: What its numbers are.
-_QUANTITIES = (
-    Quantity("achieved_digits", "", "1", "decimal digits reached: -log10 of the measured error"),
-    Quantity("run_evaluations", "", "1", "right-hand sides, those of numerical Jacobians included"),
-    Quantity("run_steps", "", "1", "steps taken"),
-    Quantity("run_jacobians", "", "1", "Jacobians evaluated"),
-    Quantity("run_time", "", "s", "processor time of the run, median of its repeats"),
-    Quantity("relative_time", "", "1", "time of the run over that of DOP853 for 3 digits"),
+_OUTPUTS = (
+    *ERRORS,
+    Output("achieved_digits", "", "1", "decimal digits reached: -log10 of the measured error"),
+    Output("run_evaluations", "", "1", "right-hand sides, those of numerical Jacobians included"),
+    Output("run_steps", "", "1", "steps taken"),
+    Output("run_jacobians", "", "1", "Jacobians evaluated"),
+    Output("run_time", "", "s", "processor time of the run, median of its repeats"),
+    Output("relative_time", "", "1", "time of the run over that of DOP853 for 3 digits"),
 )
 
 
@@ -90,6 +91,12 @@ class WorkPrecision(Measure):
     repeats: int = 5
     run_budget: int = 30_000
     name: ClassVar[str] = "work_precision"
+    headline = "measured_error"
+    typical_work = 25_000
+    outputs = _OUTPUTS
+    dimensions = (
+        Quantity("integrator", "", "", "integrator: throughout, or between ruptures and in them"),
+    )
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
@@ -112,24 +119,6 @@ class WorkPrecision(Measure):
         engine = COMPILED if self.integrator == _COMPILED else SCIPY
         methods = _CHOICES[self.integrator]
         return Accuracy(10.0**-self.requested_digits, self.run_budget, methods, engine)
-
-    @property
-    def headline(self) -> str:
-        return "measured_error"
-
-    @property
-    def variables(self) -> Mapping[str, tuple[str, ...]]:
-        errors = ("measured_error", "measured_error_error", "error_estimate", "achieved_digits")
-        work = ("run_evaluations", "run_steps", "run_jacobians", "run_time", "relative_time")
-        return dict.fromkeys((*errors, *work), ())
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        return _QUANTITIES
-
-    @property
-    def typical_work(self) -> int:
-        return 25_000
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
