@@ -240,14 +240,6 @@ _QUANTITIES = (
     # checks of accuracy
     Quantity("ended_as", "", "1", "status the measure ended with, as its flag value"),
     Quantity("requested_digits", "", "1", "decimal digits asked for: -log10(rtol)"),
-    Quantity("digits", "", "1", "correct decimal digits wanted"),
-    Quantity("cheapest_integrator", "", "", "integrator with the least right-hand sides"),
-    Quantity("cheapest_work", "", "1", "its right-hand sides"),
-    Quantity("cheapest_default_work", "", "1", "right-hand sides of the default integrator"),
-    Quantity("cheapest_default_time", "", "s", "wall time of the default integrator"),
-    Quantity("cheapest_default_request", "", "1", "digits to ask for with the default integrator"),
-    Quantity("cheapest_relative", "", "1", "work of an integrator over that of the default one"),
-    Quantity("cheapest_ratio", "", "1", "work of the default integrator over the least"),
     # whether error estimates cover
     *(
         Quantity(f"{name}_{what}", "", "1", f"{text}{among}")

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
+from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
+
+#: What is given, by the ends of the names: units, and what it is.
+_GIVEN = {
+    "integrator": ("", "integrator with the least right-hand sides"),
+    "work": ("1", "its right-hand sides"),
+    "default_work": ("1", "right-hand sides of the default integrator"),
+    "default_time": ("s", "wall time of the default integrator"),
+    "default_request": ("1", "digits to ask for with the default integrator"),
+    "relative": ("1", "work of an integrator over that of the default one"),
+    "ratio": ("1", "work of the default integrator over the least"),
+}
 
 
 @dataclass(frozen=True)
@@ -37,6 +50,12 @@ class Cheapest(Reduction):
     default: str = "DOP853"
     digits: tuple[float, ...] = (3.0, 6.0, 9.0)
     kind: ClassVar[str] = "cheapest"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """What is given, and the digits that it is given for."""
+        digits = Quantity("digits", "", "1", "correct decimal digits wanted")
+        return digits, *(Quantity(f"{self.name}_{n}", "", *about) for n, about in _GIVEN.items())
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare the integrators; nothing where `default` is not among them."""
