@@ -189,15 +189,17 @@ def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarr
     step.
     """
     after = np.minimum(np.ceil(at).astype(int), len(values) - 1)
-    # from one regime to the next there is nothing between
-    jumps = places[after] == 0.0
-    begin = np.where(jumps, np.rint(at), after - places[after]).astype(int)
-    part = np.where(jumps, 0.0, at - begin)
+    # from one regime to the next there is a straight line
+    jumps = (places[after] == 0.0) & (at > 0.0)
+    begin = np.where(jumps, after - 1, after - places[after]).astype(int)
+    part = at - begin
     powers = (part[:, None] / _HALF - 1.0) ** np.arange(SAMPLES + 1.0)
     rows = np.minimum(begin[:, None] + np.arange(SAMPLES + 1), len(values) - 1)
     found = np.asarray(np.einsum("ij,ijk->ik", powers @ _COEFFICIENTS, values[rows]))
     at_a_row = part == np.rint(part)
     found[at_a_row] = values[(begin + part.astype(int))[at_a_row]]
+    line, share = begin[jumps], part[jumps, None]
+    found[jumps] = (1.0 - share) * values[line] + share * values[line + 1]
     return found
 
 

@@ -202,7 +202,7 @@ def path(
 
 def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> _Plan:
     """What all motions of a scene at an accuracy have in common; found once."""
-    key = "plan", meter.engine == COMPILED, accuracy.rtol, accuracy.refinement, clock
+    key = "plan", meter.engine == COMPILED, accuracy, clock
     if key not in scene.made:
         both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
         slow = both.slow if both else without_mass(scene, clock=clock)

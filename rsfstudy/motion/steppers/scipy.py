@@ -9,9 +9,11 @@ import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolution, OdeSolver, Radau
 
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
+from rsfstudy.motion.stepping import Halt
 from rsfstudy.motion.workspace import spend
 from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.status import Status
 
 #: SciPy's integrators, by name.
 METHODS: Mapping[str, type[OdeSolver]] = {
@@ -48,18 +50,11 @@ class SciPyStepper(Stepper):
             ends = motion.clock, motion.direction * np.inf
             begin, length = np.array(space.y[: space.unknowns]), abs(motion.length)
             self._solver = self._solves(motion, space, ends, begin, first_step=length)
-        solver, known = self._solver, self._solver.njev
+        solver = self._solver
         solver.max_step = longest
-        self._may_stop = True
-        try:
-            failure = self._step(solver)
-        except _Spent:
+        if not self._step(motion, solver):
             return BUDGET_SPENT
-        finally:
-            self._may_stop = False
-            motion.jacobians += solver.njev - known
         if solver.status == "failed":
-            self.failure = failure
             return NO_STEP
         if motion.spent_slow + motion.spent_fast > motion.budget:
             return BUDGET_SPENT
@@ -80,7 +75,8 @@ class SciPyStepper(Stepper):
         self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
         clocks, within = [motion.clock], []
         while solver.status == "running":
-            self._step(solver)
+            if not self._step(motion, solver) or solver.status == "failed":
+                raise Halt(Status.INTEGRATION_FAILED, f"a step cannot be ended: {self.failure}")
             clocks.append(solver.t)
             within.append(solver.dense_output())
         motion.end, motion.taken = clock, clock - motion.clock
@@ -103,7 +99,7 @@ class SciPyStepper(Stepper):
 
         scales = np.array(space.scales[: space.unknowns])
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return self._methods[motion.regime](
+            solver = self._methods[motion.regime](
                 rate,
                 ends[0],
                 begin,
@@ -113,15 +109,25 @@ class SciPyStepper(Stepper):
                 max_step=LONGEST_STEP,
                 **first,
             )
+        motion.jacobians += int(solver.njev)
+        return solver
 
-    def _step(self, solver: OdeSolver) -> str:
-        """Take one step; why it failed.
+    def _step(self, motion: Any, solver: OdeSolver) -> bool:
+        """Take one step; whether the budget is enough for it.
 
         Trial steps may leave the domain, and the solver then rejects them; what it accepts is
         checked.
         """
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return str(solver.step())
+        known, self._may_stop, self.failure = solver.njev, True, "the budget is spent"
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                self.failure = str(solver.step())
+        except _Spent:
+            return False
+        finally:
+            self._may_stop = False
+            motion.jacobians += int(solver.njev - known)
+        return True
 
     def _rates(self) -> np.ndarray:
         """Rates where the solver stands; most have just computed them."""
