@@ -19,7 +19,7 @@ from rsfstudy import Axis, Scene, simulate
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.events import Kind
 from rsfstudy.motion.stepping import Halt
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 
 #: Numbers of a point that are no states.
 NUMBERS = tuple(name for name in Point._fields if name != "psis")

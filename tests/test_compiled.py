@@ -41,6 +41,7 @@ from rsfstudy.slider.fields import SLOTS
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import Part, is_flag
+from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
@@ -311,12 +312,11 @@ def test_one_scene_calls_take_an_engine():
 
 # ---- what cannot be ------------------------------------------------------------------------------
 
-OWN = 0
 TABLE = {"part": 0.5}
 
 
 def tabulated(log_rate, state, p):
-    return -(state + p[OWN] * log_rate) * TABLE["part"]
+    return -(state + p[LAW] * log_rate) * TABLE["part"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -338,7 +338,7 @@ def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
 def guarded(log_rate, state, p):
     if log_rate > 1.0:
         raise ValueError("too fast for these experiments")
-    return -(state + p[OWN] * log_rate)
+    return -(state + p[LAW] * log_rate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -357,7 +357,7 @@ def test_a_part_that_raises_is_refused():
 
 
 def ending(log_rate, state, p):
-    return math.nan if log_rate > 1.0 else -(state + p[OWN] * log_rate)
+    return math.nan if log_rate > 1.0 else -(state + p[LAW] * log_rate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -577,8 +577,9 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     rate = between_ruptures(scene, clock=False).rate
     before = building.digest_of(None, rate)
     assert building.digest_of(None, rate) == before
-    strength = rate.__globals__["balance"].__globals__["strength"]
-    monkeypatch.setitem(strength.__globals__["state_effect"].__globals__, "OWN", 3)
+    cells = scene.functions.friction.strength.__closure__
+    effect = next(c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich")
+    monkeypatch.setitem(effect.__globals__, "NORMAL_STRESS", 3)
     assert building.digest_of(None, rate) != before
     assert building.digest_of(None, doubled) != building.digest_of(None, tripled)
     before = building.digest_of(None, doubled)

@@ -27,8 +27,9 @@ from rsfstudy.slider.equations import (
     by_inertial_time,
     log_rate_at,
 )
-from rsfstudy.slider.forms import Point, advance
-from rsfstudy.slider.slots import FIRST_OWN
+from rsfstudy.slider.places import LAW
+from rsfstudy.slider.point import Point
+from rsfstudy.slider.system import path_metric
 from rsfstudy.status import Status
 
 
@@ -232,11 +233,11 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
 @given(st.floats(-1e12, 1e12))
 def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
     """d(sigma)**2 = ds**2 + (slant ds)**2."""
-    assert advance(slant) * math.hypot(1.0, slant) == pytest.approx(1.0, rel=1e-15)
+    assert path_metric(slant) * math.hypot(1.0, slant) == pytest.approx(1.0, rel=1e-15)
 
 
 def test_no_slant_is_too_steep():
-    assert advance(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
+    assert path_metric(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -424,7 +425,7 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
     def point(state, _rates, _p):
         return Point(*[float(state[0])] * len(Point._fields))._replace(psis=state)
 
-    system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * FIRST_OWN)
+    system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
     meter = Meter(10**5, engine=engine)
     with np.errstate(invalid="ignore"), pytest.raises(Halt) as halted:
         list(along(system, (0.0,), 1e-8, meter))

@@ -112,30 +112,33 @@ def test_number_of_unknowns(equations, unknowns):
 
 
 def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
-    """The functions of ours that a function may call, by name."""
+    """The functions of ours that a function may call, by what it calls them."""
     seen = {} if seen is None else seen
-    for name in function.__code__.co_names:
-        called = function.__globals__.get(name)
-        if isinstance(called, types.FunctionType) and called not in seen.values():
-            seen[name] = called
-            reached(called, seen)
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    called = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+    for name, value in (called | {name: cell.cell_contents for name, cell in cells}).items():
+        if isinstance(value, types.FunctionType) and value not in seen.values():
+            seen[name] = value
+            reached(value, seen)
     return seen
 
 
 #: What the equations of any scene call.
-ALWAYS = {"balance", "strength", "pace", "evolutions", "evolution", "total"}
+ALWAYS = {"against", "balance", "strength", "velocity_ratios", "evolutions", "evolution"}
 #: What takes them along the path.
-ALWAYS |= {"changes", "scaled", "others_scaled", "advance"}
+ALWAYS |= {"state_sum", "times", "path_metric"}
 #: What mass adds.
-OF_MASS = {"resistance", "resisted", "weight_at", "without_mass", "moved", "felt"}
+OF_MASS = {"resistance", "resisted", "weight_at", "without_mass", "ahead", "contribution"}
+#: What normal stress adds that follows shear stress.
+OF_STRESS = {"stress", "normal_stress", "coefficient"}
 
 
 @pytest.mark.parametrize(
     ("fields", "more"),
     [
         ({"normal_stress": "constant"}, set()),
-        ({"alpha": 0.0}, {"normal_stress", "coefficient"}),
-        ({}, {"normal_stress", "coefficient", "state_effect"}),
+        ({"alpha": 0.0}, OF_STRESS),
+        ({}, OF_STRESS | {"state_effect"}),
         ({"normal_stress": "constant", "radiation_damping": 0.1}, set()),
         ({"normal_stress": "constant", "inertia": True}, OF_MASS),
     ],
@@ -156,7 +159,8 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     assert one.p != other.p
     assert all(isinstance(number, float) for number in one.p)
     for function in (one.rate, *reached(one.rate).values()):
-        assert function.__closure__ is None
+        cells = (cell.cell_contents for cell in function.__closure__ or ())
+        assert all(isinstance(value, types.FunctionType | int) for value in cells)
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():

@@ -27,7 +27,7 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots import lines
 from rsfstudy.plots._phase_plane import scene_of
-from rsfstudy.slider import fields, laws
+from rsfstudy.slider import fields, laws, places
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.loading.step import Step
@@ -440,6 +440,47 @@ def test_classes_that_fill_no_slot(body, complaint):
     Scene(law=Doubled)
     with pytest.raises(InvalidValue, match=f"(?s){complaint}"):
         Scene(law=made(**body))
+
+
+def by_its_own(source: str, **names: object) -> object:
+    """A function whose file says where the numbers of its part begin, in its own way."""
+    known = {"math": math, **names}
+    exec(source, known)
+    return known["function"]
+
+
+#: A law's own number b, read by itself, inside a function of its own, and by another that it calls.
+READS = (
+    "def function(x, state, p):\n    return -(state + p[OWN] * x)",
+    "def function(x, state, p):\n    return sum(-y for y in (state, (lambda: p[OWN] * x)()))",
+    "def b(p):\n    return p[OWN]\ndef function(x, state, p):\n    return -(state + b(p) * x)",
+)
+
+
+@pytest.mark.parametrize("source", READS)
+def test_numbers_that_are_read_in_the_place_of_others_are_refused(source):
+    """p[0] is the direct effect a: a law that read it for its b would give wrong numbers."""
+    read = staticmethod(by_its_own(source, OWN=0))
+    with pytest.raises(
+        InvalidValue, match="law = .*reads its numbers at OWN = 0.*read p.LAW."
+    ) as e:
+        Scene(law=made(name="elsewhere", evolution=read))
+    assert "Import LAW from rsfstudy.slider.places" in str(e.value)
+    inside = made(name="base_elsewhere", resting=read)
+    with pytest.raises(InvalidValue, match="reads its numbers at OWN = 0"):
+        Scene(law=made(inside, name="derived_elsewhere"))
+    there = made(name="there", evolution=staticmethod(by_its_own(source, OWN=places.LAW)))
+    theirs, ours = (LinearStability()(Scene(law=law), Accuracy(1e-6)) for law in ("slip", there))
+    assert ours.values == theirs.values
+
+
+def test_a_part_has_as_many_numbers_as_there_are_places():
+    def numbers(self, scene):
+        return tuple(range(places.FLUID - places.NORMAL_STRESS + 1))
+
+    scene = Scene(normal_stress=made(Unvaried, name="numerous", numbers=numbers), stiffness=0.01)
+    with pytest.raises(InvalidValue, match="'numerous': states 3 numbers, .* places for 2"):
+        _asked = scene.numbers
 
 
 def test_a_field_may_be_stated_anew_with_another_default():

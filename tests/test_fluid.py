@@ -45,6 +45,7 @@ from rsfstudy.slider.equations import (
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.places import DYNAMICS, FLUID
 from rsfstudy.status import Status
 
 LAWS = PLAIN
@@ -183,14 +184,14 @@ def test_small_oscillations_grow_as_linear_theory_says(law, stress, dynamics):
 def test_friction_knows_effective_normal_stress_alone(g, pressure, phi, alpha):
     """tau/(sigma - p) - mu_* + alpha ln(sigma - p), and its derivatives by g and by p."""
     scene = dilatant(phi=phi, alpha=alpha)
-    relation, p = scene.functions["strength"], scene.numbers
+    relation, p = scene.functions.friction.strength, scene.numbers
 
     def exact(at: float, under: float) -> float:
         ratio = 1.0 + cot_phi(scene) * at - under
         return (0.76 + at) / ratio - 0.76 + alpha * math.log(ratio)
 
     value, slope, shift, shift_slope = relation(g, (0.0, 0.0, pressure), p)
-    gained, shifted = scene.functions["strength_of_pressure"](g, (0.0, 0.0, pressure), p)
+    gained, shifted = scene.functions.friction.by_pressure(g, (0.0, 0.0, pressure), p)
     ratio = 1.0 + cot_phi(scene) * g - pressure
     assert value == pytest.approx(exact(g, pressure), abs=1e-14)
     assert shift == pytest.approx(alpha * math.log(ratio), abs=1e-15)
@@ -248,14 +249,14 @@ def test_slip_rate_grows_as_the_unknowns_change(stress, dynamics):
 def test_the_state_of_the_law_evolves_by_the_law_where_mass_acts(stress):
     """It is no unknown there: what friction leaves of strength is its evolution."""
     scene = dilatant(0.02, law="slowness", inertia=True, period=1e7, **stress)
-    equations, scene_functions = by_inertial_time(scene), scene.functions
+    equations, evolutions = by_inertial_time(scene), scene.functions.friction.evolutions
     state = np.array((0.015, 1.0, 0.01, -0.01, 0.03))
     rates, step = np.array(equations.rates(tuple(state))), 1e-6
     ahead, behind = (equations.at(tuple(state + s * rates)) for s in (step, -step))
     here = equations.at(tuple(state))
     shift = here.psi - here.state
     share = scene.inertial_time * math.exp(1.0)
-    by_law = scene_functions["evolutions"](1.0, here.psis, shift, share, scene.numbers)
+    by_law = evolutions(1.0, here.psis, shift, share, scene.numbers)
     differences = (np.array(ahead.psis) - np.array(behind.psis)) / (2.0 * step)
     assert differences == pytest.approx(np.array(by_law), rel=1e-6, abs=1e-12)
 
@@ -308,8 +309,11 @@ def test_number_of_unknowns(fields):
         assert (
             len(more.rates((0.01,) * len(more.unknowns))) == len(more.scales) == len(more.unknowns)
         )
-    assert len(scene.numbers) == len(drained.numbers) + 2
-    assert not {"seepage", "strength_of_pressure"} & set(drained.functions)
+    assert [math.isnan(x) for x in drained.numbers[FLUID:DYNAMICS]] == [True, True, True]
+    assert [math.isnan(x) for x in scene.numbers[FLUID:DYNAMICS]] == [False, False, True]
+    at_rest, wet = drained.functions.friction.evolutions, scene.functions.friction.evolutions
+    assert "only" in at_rest.__qualname__
+    assert "with_auxiliary" in wet.__qualname__
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():
@@ -488,16 +492,13 @@ def test_a_scene_with_a_fluid_is_a_scene():
     assert scene.effects == ("inclined_driving", "linker_dieterich", "dilatancy", "inertia")
 
 
-OWN = 0
-
-
 def tight(log_rate, states, share, p):
-    opening = share * (p[OWN] * log_rate - states[0])
+    opening = share * (p[FLUID] * log_rate - states[0])
     return opening, -opening
 
 
 def filled(log_rate, p):
-    return p[OWN] * log_rate, -p[OWN] * log_rate
+    return p[FLUID] * log_rate, -p[FLUID] * log_rate
 
 
 @dataclass(frozen=True, kw_only=True)

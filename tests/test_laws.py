@@ -18,10 +18,9 @@ from rsfstudy.motion.events import Kind
 from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import laws, steady
-from rsfstudy.slider.assembly import functions
 from rsfstudy.slider.equations import evolution_of, evolutions_of, resting_of, rigid
-from rsfstudy.slider.forms import pace
 from rsfstudy.slider.laws.composite import lambert_w
+from rsfstudy.slider.system import functions, velocity_ratios
 
 CONSTANT = {"normal_stress": "constant"}
 CUT_OFFS = ("composite", "cut_off")
@@ -110,8 +109,10 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_rate, log_theta, 
 
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
-        x, _slower, share = pace(log_rate, scene.numbers)
-        return functions(scene)["evolutions"](x, (b * log_theta,), 0.0, share, scene.numbers)[0]
+        x, _slower, share = velocity_ratios(log_rate, scene.numbers)
+        return functions(scene).friction.evolutions(x, (b * log_theta,), 0.0, share, scene.numbers)[
+            0
+        ]
 
     # exp(-100) of the slip rate is taken too much where slip is slower than that
     assert evolving("slowness") == pytest.approx(exact, abs=100.0 * rounding + 1e-40)

@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.regimes import starting
 from rsfstudy.motion.stepping import Meter
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 
 CASES = {
     "imposed": {"normal_stress": "imposed", "alpha": 0.3},

@@ -18,10 +18,10 @@ from rsfstudy.slider.equations import evolution_of, relation_of
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.normal_stress.variable import Variable
-from rsfstudy.slider.slots import FIRST_OWN
+from rsfstudy.slider.places import DYNAMICS, FLUID, LAW, NORMAL_STRESS, A
 from rsfstudy.status import Status
 
-OWN, C = 0, 0.5
+C = 0.5
 
 
 def weakened(friction, ratio, change, p):
@@ -127,12 +127,15 @@ def test_numbers_stand_where_their_parts_look_for_them():
         load_velocity_ratio=2.0,
         normal_stress_step=0.1,
     )
-    common, own = scene.numbers[:FIRST_OWN], scene.numbers[FIRST_OWN:]
+    p = scene.numbers
     of_law = scene.a, scene.b, scene.mu_star
-    assert common == (*of_law, 0.02, 2.0, math.log(2.0), 0.0, scene.b, 0.1)
+    assert p[A:NORMAL_STRESS] == (*of_law, 0.02, 2.0, math.log(2.0), 0.0, 0.1)
     cot_phi = 1.0 / math.tan(math.radians(70.0))
     of_mass = scene.inertial_time, math.log(scene.inertial_time)
-    assert own == (scene.b, 0.3, cot_phi, *of_mass)
+    assert p[DYNAMICS : DYNAMICS + 2] == of_mass
+    assert p[NORMAL_STRESS : NORMAL_STRESS + 2] == (0.3, cot_phi)
+    assert p[LAW:] == (scene.b,)
+    assert all(math.isnan(p[place]) for place in range(FLUID, DYNAMICS))
 
 
 def test_a_part_owns_its_fields():
@@ -148,7 +151,7 @@ def test_a_part_owns_its_fields():
 
 
 def half_as_strong(friction, ratio, change, p):
-    return 0.5 * p[OWN] * math.log(ratio), 0.5 * p[OWN] * change / ratio
+    return 0.5 * p[NORMAL_STRESS] * math.log(ratio), 0.5 * p[NORMAL_STRESS] * change / ratio
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,19 +19,19 @@ from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
-OWN = 0
 FIRST = 0.3  # share of the first state in b
 CONSTANT = {"normal_stress": "constant"}
 
 
 def resting(log_rate, shift, p):
-    return tuple(part * (shift - p[OWN] * log_rate) for part in (FIRST, 1.0 - FIRST))
+    return tuple(part * (shift - p[LAW] * log_rate) for part in (FIRST, 1.0 - FIRST))
 
 
 def two_slip_states(log_rate, psis, shift, share, p):
-    b = p[OWN]
+    b = p[LAW]
     return (
         -share * (psis[0] - FIRST * shift + FIRST * b * log_rate),
         -share * (psis[1] - (1.0 - FIRST) * shift + (1.0 - FIRST) * b * log_rate),
@@ -39,7 +39,7 @@ def two_slip_states(log_rate, psis, shift, share, p):
 
 
 def two_slowness_states(log_rate, psis, shift, share, p):
-    one, other = FIRST * p[OWN], (1.0 - FIRST) * p[OWN]
+    one, other = FIRST * p[LAW], (1.0 - FIRST) * p[LAW]
     return (
         share * one * math.expm1(min(-((psis[0] - FIRST * shift) / one + log_rate), 700.0)),
         share
@@ -67,7 +67,7 @@ class TwoSlownessStates(SlownessLaw):
 
 
 def of_two_lengths(log_rate, psis, shift, share, p):
-    ratio, second = p[OWN], p[OWN + 1]
+    ratio, second = p[LAW], p[LAW + 1]
     return (
         -share * (psis[0] - shift + (p[1] - second) * log_rate),
         -share * ratio * (psis[1] + second * log_rate),
@@ -75,7 +75,7 @@ def of_two_lengths(log_rate, psis, shift, share, p):
 
 
 def resting_at_two_lengths(log_rate, shift, p):
-    second = p[OWN + 1]
+    second = p[LAW + 1]
     return (shift - (p[1] - second) * log_rate, -second * log_rate)
 
 

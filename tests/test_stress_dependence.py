@@ -16,8 +16,9 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import assembly, laws, stability
+from rsfstudy.slider import laws, stability
 from rsfstudy.slider.equations import relation_of
+from rsfstudy.slider.friction import plain
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.status import Status
@@ -62,10 +63,8 @@ def test_without_it_nothing_is_added():
     for law in laws.PARTS:
         for effects in ({}, CONSTANT):
             usual, idle = Scene(law=law, **effects), Scene(law=law, stress_dependence=0, **effects)
-            ours, theirs = map(assembly.functions, (idle, usual))
-            assert ours["strength"] is theirs["strength"]
-    plain = assembly.functions(Scene(**CONSTANT))["strength"]
-    assert plain.__code__.co_name == "plain"
+            assert idle.functions is usual.functions
+    assert Scene(**CONSTANT).functions.friction.strength is plain
 
 
 def worn(friction, ratio, change, p):

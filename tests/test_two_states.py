@@ -26,6 +26,7 @@ from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import laws, stability
 from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
 LAWS = {"slip": "two_slip_states", "slowness": "two_slowness_states"}
@@ -260,22 +261,21 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
 
 # ---- three states --------------------------------------------------------------------------------
 
-OWN = 0
 SHARES = (0.5, 0.2, 0.3)
 
 
 def evolutions(log_rate, psis, shift, share, p):
     """Three states, each with its share of b; the second and third over lengths of their own."""
-    b = p[OWN]
+    b = p[LAW]
     return (
         -share * (psis[0] - 0.5 * shift + 0.5 * b * log_rate),
-        -share * p[OWN + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_rate),
-        -share * p[OWN + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_rate),
+        -share * p[LAW + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_rate),
+        -share * p[LAW + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_rate),
     )
 
 
 def resting(log_rate, shift, p):
-    at = shift - p[OWN] * log_rate
+    at = shift - p[LAW] * log_rate
     return 0.5 * at, 0.2 * at, 0.3 * at
 
 

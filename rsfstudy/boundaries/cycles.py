@@ -21,7 +21,7 @@ from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, r
 from rsfstudy.motion.recording import Recording, row, up_to
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import IN_RUPTURE
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 LN10 = math.log(10.0)

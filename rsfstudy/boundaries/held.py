@@ -16,8 +16,9 @@ from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
 from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import IN_RUPTURE, evolutions_of, relation_of, resting_of
-from rsfstudy.slider.forms import SLOWEST, Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.system import SLOWEST
 from rsfstudy.status import Status
 
 #: Distance in ln V between levels at which it is asked whether a peak was the last, and the part of

@@ -15,7 +15,7 @@ import numpy as np
 
 from rsfstudy.motion.events import Watch, rise
 from rsfstudy.slider.equations import evolution_of, relation_of, resting_of
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess, stress_at
 

@@ -27,7 +27,7 @@ from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import without_mass
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 

@@ -16,8 +16,8 @@ from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 

@@ -21,7 +21,7 @@ from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 #: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is

@@ -19,8 +19,8 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Output
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading.oscillation import Oscillation
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import growth_rates, response_to_normal_stress
 from rsfstudy.slider.steady import steady_sliding

@@ -12,8 +12,8 @@ from rsfstudy.motion.regimes import jumped, starting
 from rsfstudy.motion.running import happening, path, segment
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import Equations
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 

@@ -39,7 +39,7 @@ from rsfstudy.motion.layout import (
 )
 from rsfstudy.motion.steppers import unknowns_at
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
-from rsfstudy.slider.slots import LOAD_VELOCITY, LOG_LOAD_RATE, SIZE, STIFFNESS
+from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, B
 
 #: What is read off a step beside the watches: how far the regime is from being left, time less that
 #: which is looked for, and how far the motion is from its end.
@@ -220,7 +220,7 @@ def detect(motion, space, limits):
         watch = watch_of(space, w)
         space.when[w] = math.nan
         if watch[KIND] == SETTLED:
-            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[UNREST] / p[SIZE])
+            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[UNREST] / p[B])
             watch[FARTHEST] = max(watch[FARTHEST], away)
             if away < watch[LEVEL] * watch[FARTHEST]:
                 space.when[w] = motion.end

@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import NamedTuple
 
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 
 
 class Kind(StrEnum):

@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.forms import SLOWEST
+from rsfstudy.slider.places import LARGEST_EXPONENT
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.slots import LARGEST_EXPONENT
+from rsfstudy.slider.system import SLOWEST
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
 LOST, LOCKED = 1e-9, 1e6

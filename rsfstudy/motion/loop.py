@@ -63,7 +63,7 @@ from rsfstudy.motion.steps import (
     take_step,
 )
 from rsfstudy.motion.workspace import copy, workspace
-from rsfstudy.slider.slots import LOAD_VELOCITY
+from rsfstudy.slider.places import LOAD_VELOCITY
 
 #: How often the clock at which a step is to end is looked for.
 CORRECTIONS = 2

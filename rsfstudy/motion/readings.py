@@ -8,7 +8,7 @@ import numpy as np
 
 from rsfstudy.motion.recording import OBSERVED, READ
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 FRICTION = Quantity(

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.motion.events import Event
-from rsfstudy.slider.forms import Point
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 #: What is recorded, in this order.

@@ -20,9 +20,9 @@ from rsfstudy.slider.equations import (
     normal_stress_at,
     resting_of,
 )
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 

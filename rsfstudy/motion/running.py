@@ -23,8 +23,8 @@ from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.motion.stepping import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.slider.equations import Equations, without_mass
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 

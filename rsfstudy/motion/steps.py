@@ -18,7 +18,7 @@ from rsfstudy.motion.layout import (
 from rsfstudy.motion.steppers import attempt, retake, unknowns_at
 from rsfstudy.motion.workspace import copy, spend
 from rsfstudy.slider.equations import LONGEST_STEP, stride
-from rsfstudy.slider.slots import LOG_LOAD_RATE
+from rsfstudy.slider.places import LOG_LOAD_RATE
 
 #: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
 #: a step is halved for that, and by how much the next may be longer; and how far apart, over the

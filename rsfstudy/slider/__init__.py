@@ -1,11 +1,12 @@
 """The physics of a spring-slider: floats in, floats out. It can be read alone.
 
 A slider is five choices, each one file of `laws`, `normal_stress`, `fluid`, `dynamics` and
-`loading`; a `scene` says which. `friction` puts law and normal stress into one relation between
-stress, slip rate and state (`saturated` does where a fluid, or the loading, has unknowns); `forms`
-makes equations of motion of it; `assembly` fills both with the functions of a scene's parts, and
-`equations` gives what an integrator takes. `steady` asks the same relation for steady sliding and
-its stability. `closed_forms` are what others have published.
+`loading`; a `scene` says which. Read in this order: `friction` puts law, normal stress and pore
+pressure into one relation between stress, slip rate and state, with `states` beside it; a file of
+`dynamics` says how slip rate follows; `system` makes equations of motion of both, for whatever
+parts a scene has; `equations` gives what an integrator takes. Their numbers stand where `places`
+says. `steady` asks the same relation for steady sliding and its stability. `closed_forms` are what
+others have published.
 
 Where the equations of the paper are:
 
@@ -15,9 +16,9 @@ Where the equations of the paper are:
     1b to 3   effect of normal stress on the state       normal_stress.variable
     5         normal stress follows shear stress         normal_stress.variable
     6         motion with mass                           dynamics.inertia
-    15        quasi-static motion                        dynamics.quasi_static, forms
+    15        quasi-static motion                        dynamics.quasi_static, system
     7, 9      critical stiffness, no steady sliding      steady
     8, 10, 11, 14   closed forms of boundaries           closed_forms
     12, 13    stress and slip rate after a jump          friction, steady
-    16, 17    a rigid slider                             forms, laws.slip, laws.slowness
+    16, 17    a rigid slider                             system, laws.slip, laws.slowness
 """

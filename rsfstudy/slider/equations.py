@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.slider.assembly import functions
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.forms import Point
 from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.point import Point
+from rsfstudy.slider.system import InRupture, functions
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -126,10 +126,10 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
     forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
     unknowns: tuple[str, ...] = ("spring", *_states(scene))
-    scales, rate = (scene.a,) * len(unknowns), forms["rate"]
+    scales, rate = (scene.a,) * len(unknowns), forms.rate
     if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms["rate_with_time"]
-    point, balance = forms["point"], forms["balance"]
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms.rate_with_time
+    point, balance = forms.point, forms.balance
     p, count = scene.numbers, scene.states
     return Equations(dynamics.regime, unknowns, scales, rate, point, p, stride, count, balance)
 
@@ -146,13 +146,20 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
-    forms, a, others = scene.functions, scene.a, _states(scene)[1:]
+    full, a, others = _full(scene), scene.a, _states(scene)[1:]
     unknowns: tuple[str, ...] = ("spring", "log_rate", "friction", *others)
-    scales, rate = (a, 1.0, a, *[a] * len(others)), forms["full_rate"]
+    scales, rate = (a, 1.0, a, *[a] * len(others)), full.rate
     if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms["full_rate_with_time"]
-    point, p = forms["point_in_rupture"], scene.numbers
-    return Equations(IN_RUPTURE, unknowns, scales, rate, point, p, stride, scene.states)
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), full.rate_with_time
+    p, states = scene.numbers, scene.states
+    return Equations(IN_RUPTURE, unknowns, scales, rate, full.point, p, stride, states)
+
+
+def _full(scene: Scene) -> InRupture:
+    full = scene.functions.in_rupture
+    if full is None:
+        raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
+    return full
 
 
 def by_displacement(scene: Scene) -> Equations:
@@ -160,13 +167,13 @@ def by_displacement(scene: Scene) -> Equations:
     are linear in departures farther from steady sliding than those along the path.
     """
     along = between_ruptures(scene, clock=False)
-    return replace(along, rate=scene.functions["by_displacement"])
+    return replace(along, rate=scene.functions.by_displacement)
 
 
 def by_inertial_time(scene: Scene) -> Equations:
     """The same of the full equations, in inertial time T/(2 pi)."""
     along = in_rupture(scene)
-    return replace(along, rate=scene.functions["rupture_rate"])
+    return replace(along, rate=_full(scene).against_time)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:
@@ -176,7 +183,7 @@ def rigid(scene: Scene, log_rate: float) -> Equations:
         (*scene.numbers, log_rate),
         ("friction", *_states(scene)[1:]),
     )
-    scales, rate, point = (scene.a,) * len(unknowns), forms["rigid_rate"], forms["rigid_point"]
+    scales, rate, point = (scene.a,) * len(unknowns), forms.rigid_rate, forms.rigid_point
     return Equations(RIGID, unknowns, scales, rate, point, p, states=scene.states)
 
 
@@ -186,7 +193,7 @@ def relation_of(
     """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
     pore pressure of steady sliding, unless states are given.
     """
-    relation, p = scene.functions["strength"], scene.numbers_of_friction
+    relation, p = scene.functions.friction.strength, scene.numbers_of_friction
     known = psis or (0.0,) * scene.states
 
     def at(friction: float) -> tuple[float, float, float, float]:
@@ -201,7 +208,7 @@ def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float
     sliding unless states are given.
     """
     at = psis or (0.0,) * scene.states
-    stress = scene.functions["effective_stress"](friction, at, scene.numbers_of_friction)
+    stress = scene.functions.friction.effective_stress(friction, at, scene.numbers_of_friction)
     return 1.0 + float(stress[0])
 
 
@@ -211,12 +218,12 @@ def log_rate_at(scene: Scene, spring: float, psi: float) -> float:
     """
     massless = scene.dynamics if scene.dynamics.rupture_rate is None else QuasiStatic()
     psis = (psi, *(0.0,) * (scene.states - 1))
-    return float(functions(scene, massless)["balance"](spring, psis, scene.numbers)[0])
+    return float(functions(scene, massless).balance(spring, psis, scene.numbers)[0])
 
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolutions, p = scene.functions["evolutions"], scene.numbers_of_friction
+    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
 
     def at(log_rate: float, state: float) -> float:
         return float(evolutions(log_rate, (state,), 0.0, 1.0, p)[0])
@@ -226,7 +233,7 @@ def evolution_of(scene: Scene) -> Callable[[float, float], float]:
 
 def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
-    evolutions, p = scene.functions["evolutions"], scene.numbers_of_friction
+    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
 
     def at(log_rate: float, psis: Numbers, shift: float) -> Numbers:
         changes: Numbers = evolutions(log_rate, psis, shift, 1.0, p)
@@ -237,5 +244,7 @@ def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
 
 def resting_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
-    psis: Numbers = scene.functions["resting"](log_rate, shift, scene.numbers_of_friction)
+    psis: Numbers = scene.functions.friction.steady_states(
+        log_rate, shift, scene.numbers_of_friction
+    )
     return psis

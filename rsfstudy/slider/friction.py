@@ -1,4 +1,5 @@
-"""The one relation between frictional stress, slip rate and state, on which everything rests.
+"""Friction: what ties stress, slip rate and states together. Read this first, then
+`states` and `system`.
 
 With g = (tau - tau_*)/sigma_*, the deviation of frictional stress, s = sigma/sigma_*, and the state
 freed of stress, Psi = Theta + shift(g),
@@ -7,94 +8,187 @@ freed of stress, Psi = Theta + shift(g),
 
 which is tau = sigma (mu_* + a ln(V/V_*) + Theta), and nothing else. The shift is what stress takes
 from the state variable, such as alpha ln s. Psi is continuous across any sudden change of stress,
-and dPsi/dt is the evolution law alone.
+and dPsi/dt is the evolution law alone. Of a law with several states, Psi is the sum of all.
 
-Each form gives (strength, its slope, shift, its slope) at g; a scene is given the plainest form
-that holds all its effects. Those here do not depend on the states they are told: `saturated` has
-those that do, by pore pressure.
+Pore pressure P, over sigma_*, takes from normal stress: s = sigma/sigma_* - P is what friction and
+the effects of stress on the state know of it. P stands last among the states, behind those of the
+law, which alone are part of Theta. What a loading goes on imposing is the same with a P of its own.
+
+Functions here take the functions of the parts of a scene, and return one that is made of them: the
+plainest that holds all effects there are. What they return takes floats, and the numbers of a scene
+as ``p`` (see `places`); it holds none of them, and serves every scene of the same parts.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache, reduce
+from typing import NamedTuple
 
-from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import (
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import (
+    LARGEST_RATIO,
     MU_STAR,
+    SMALLEST_RATIO,
     STRESS_DEPENDENCE,
     A,
-    normal_stress,
-    one_way,
-    other_state_effect,
-    state_effect,
 )
-
-Relation = tuple[float, float, float, float]
+from rsfstudy.slider.states import (
+    contribution_of,
+    only,
+    states_at_of,
+    sum_of,
+    usual_steady_state,
+    with_auxiliary,
+    with_auxiliary_at_rest,
+)
 
 #: Friction coefficient below which none is told from zero, where slip reverses.
 _LEAST = 1e-280
 
 
-def plain(friction: float, psis: Numbers, p: Numbers) -> Relation:
-    """Constant normal stress, and a state that stress does not change: strength is g itself."""
-    return friction, 1.0, 0.0, 0.0
+class Friction(NamedTuple):
+    """The functions of friction.
 
-
-def coupled(friction: float, psis: Numbers, p: Numbers) -> Relation:
-    """Normal stress that varies with shear stress."""
-    excess, change = normal_stress(friction, p)
-    value, slope = coefficient(friction, excess, change, p)
-    return value, slope, 0.0, 0.0
-
-
-def coupled_with_state_effect(friction: float, psis: Numbers, p: Numbers) -> Relation:
-    """The same, and a state that stress changes."""
-    excess, change = normal_stress(friction, p)
-    value, slope = coefficient(friction, excess, change, p)
-    shift, shift_slope = state_effect(friction, 1.0 + excess, change, p)
-    return value + shift, slope + shift_slope, shift, shift_slope
-
-
-def plain_with_state_effect(friction: float, psis: Numbers, p: Numbers) -> Relation:
-    """Constant normal stress, and a state that shear stress changes."""
-    shift, shift_slope = state_effect(friction, 1.0, 0.0, p)
-    return friction + shift, 1.0 + shift_slope, shift, shift_slope
-
-
-def reversible(friction: float, psis: Numbers, p: Numbers) -> Relation:
-    """The relation of slip that may reverse: ln(V/V_*) is that of the magnitude of V.
-
-    ``V = 2 V_* exp[-(mu_* + Theta)/a] sinh[tau/(a sigma)]`` has the sign of tau and reads
-
-        a ln(|V|/V_*) = |tau|/sigma + a ln[1 - exp(-2 |tau|/(a sigma))] - mu_* - Theta,
-
-    which differs from slip forward by exp(-2 mu/a), 10^-46 of it.
-
-    References
+    Attributes
     ----------
-    Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811-3818.
+    strength : callable
+        ``(g, psis, p) -> (strength, its slope, shift, its slope)``, slopes being derivatives with
+        respect to g. The first of the states may be missing.
+    effective_stress, outer_stress : callable
+        ``(g, psis, p) -> (s - 1, its slope)`` of effective normal stress, and of normal stress less
+        the pore pressure outside the fault, which is what a rig knows of.
+    outer_pressure : callable
+        ``(psis) -> P`` outside the fault.
+    evolutions : callable
+        ``(log_rate, psis, shift, fraction, p)``: changes of all states per unit slip in D_c, times
+        a fraction.
+    steady_states : callable
+        ``(log_rate, shift, p)``: all states in steady sliding.
+    state_sum : callable
+        ``(psis) -> Psi``, the sum of the states of the law.
+    contribution : callable
+        ``(changes, g, psis, p)``: what changes of the states take from a ln(V/V_*), so that
+        ``a d ln V = strength'(g) dg - contribution``.
+    by_pressure : callable
+        ``(g, psis, p)``: derivatives of strength and of shift with respect to P.
+    states_at : callable
+        ``(strength, log_rate, others, p)``: all states; the first is what the others leave of it.
+    states : int
+        How many states there are.
     """
-    forward, slope, shift, shift_slope = one_way(friction, psis, p)
-    a, mu_star = p[A], p[MU_STAR]
-    coefficient_now = mu_star + forward - shift
-    size = max(abs(coefficient_now), _LEAST)
-    value = size + a * math.log(-math.expm1(-2.0 * size / a)) - mu_star + shift
-    steeper = math.copysign(1.0 / math.tanh(size / a), coefficient_now)
-    return value, (slope - shift_slope) * steeper + shift_slope, shift, shift_slope
+
+    strength: Function
+    effective_stress: Function
+    outer_stress: Function
+    outer_pressure: Function
+    evolutions: Function
+    steady_states: Function
+    state_sum: Function
+    contribution: Function
+    by_pressure: Function
+    states_at: Function
+    states: int
 
 
-def both_state_effects(
-    friction: float, ratio: float, change: float, p: Numbers
-) -> tuple[float, float]:
-    """Two effects of stress on the state at once."""
-    shift, slope = state_effect(friction, ratio, change, p)
-    other, other_slope = other_state_effect(friction, ratio, change, p)
-    return shift + other, slope + other_slope
+# ---- the friction relation -----------------------------------------------------------------------
 
 
-def stress_dependence(
-    friction: float, ratio: float, change: float, p: Numbers
-) -> tuple[float, float]:
+def coefficient(g: float, excess: float, change: float, p: Numbers) -> tuple[float, float]:
+    """``tau/sigma - mu_*`` and its derivative with respect to g, at s = 1 + `excess`.
+
+    Written so that digits are kept where s is proportional to g, however large it is: with the bend
+    s - 1 - s' g, ``[g (1 - mu_* s') - mu_* bend]/s`` and ``(1 - mu_* s' + bend)/s**2``.
+    """
+    ratio, mu_star = 1.0 + excess, p[MU_STAR]
+    bend = excess - change * g
+    support = 1.0 - mu_star * change
+    return (g * support - mu_star * bend) / ratio, (support + bend) / ratio**2
+
+
+def constant(g: float, p: Numbers) -> tuple[float, float]:
+    """No excess of normal stress over its reference value, and no slope."""
+    return 0.0, 0.0
+
+
+def constant_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    """The same, whatever the states."""
+    return 0.0, 0.0
+
+
+def stress_of(normal_stress: Function | None) -> Function:
+    """``s - 1`` and its slope, of ``(g, p) -> (sigma/sigma_* - 1, its slope)`` without pressure."""
+    if normal_stress is None:
+        return constant_stress
+
+    def total_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+        stress: tuple[float, float] = normal_stress(g, p)
+        return stress
+
+    return total_stress
+
+
+def less_pressure(normal_stress: Function) -> Function:
+    """``s - 1`` and its slope, of the same and the pore pressure that stands last."""
+
+    def effective_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+        excess, change = normal_stress(g, p)
+        return min(max(excess - psis[-1], SMALLEST_RATIO - 1.0), LARGEST_RATIO), change
+
+    return effective_stress
+
+
+def no_pressure(psis: Numbers) -> float:
+    """P where there is none."""
+    return 0.0
+
+
+def last_of(psis: Numbers) -> float:
+    """P, the last of the states."""
+    return psis[-1]
+
+
+Relation = tuple[float, float, float, float]
+
+
+def plain(g: float, psis: Numbers, p: Numbers) -> Relation:
+    """The friction relation at constant normal stress, of a state that stress does not change."""
+    return g, 1.0, 0.0, 0.0
+
+
+def strength_of(stress: Function | None, state_effect: Function | None) -> Function:
+    """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
+    stress (None where it is constant), and of the effect of stress on the state, if there is one.
+    """
+    if stress is None:
+        if state_effect is None:
+            return plain
+
+        def plain_with_state_effect(g: float, psis: Numbers, p: Numbers) -> Relation:
+            shift, shift_slope = state_effect(g, 1.0, 0.0, p)
+            return g + shift, 1.0 + shift_slope, shift, shift_slope
+
+        return plain_with_state_effect
+
+    if state_effect is None:
+
+        def coupled(g: float, psis: Numbers, p: Numbers) -> Relation:
+            excess, change = stress(g, psis, p)
+            value, slope = coefficient(g, excess, change, p)
+            return value, slope, 0.0, 0.0
+
+        return coupled
+
+    def coupled_with_state_effect(g: float, psis: Numbers, p: Numbers) -> Relation:
+        excess, change = stress(g, psis, p)
+        value, slope = coefficient(g, excess, change, p)
+        shift, shift_slope = state_effect(g, 1.0 + excess, change, p)
+        return value + shift, slope + shift_slope, shift, shift_slope
+
+    return coupled_with_state_effect
+
+
+def stress_dependence(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
     """State variable lost to the present shear stress, and its derivative.
 
     ``dTheta = -c dtau/sigma`` integrates to a shift of ``c g ln(s)/(s - 1)`` where the normal
@@ -106,16 +200,139 @@ def stress_dependence(
     """
     excess, c = ratio - 1.0, p[STRESS_DEPENDENCE]
     mean = math.log1p(excess) / excess if excess != 0.0 else 1.0
-    return c * friction * mean, c / ratio
+    return c * g * mean, c / ratio
 
 
-def coefficient(friction: float, excess: float, change: float, p: Numbers) -> tuple[float, float]:
-    """``tau/sigma - mu_*`` and its derivative with respect to g, at s = 1 + `excess`.
+def both(effect: Function, other: Function) -> Function:
+    """Two effects of stress on the state at once: ``(g, ratio, change, p) -> (shift, slope)``."""
 
-    Written so that digits are kept where s is proportional to g, however large it is: with the bend
-    s - 1 - s' g, ``[g (1 - mu_* s') - mu_* bend]/s`` and ``(1 - mu_* s' + bend)/s**2``.
+    def effects(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+        shift, slope = effect(g, ratio, change, p)
+        other_shift, other_slope = other(g, ratio, change, p)
+        return shift + other_shift, slope + other_slope
+
+    return effects
+
+
+def reversible(one_way: Function) -> Function:
+    """The relation of slip that may reverse, of that of slip forward: ln(V/V_*) is that of the
+    magnitude of V.
+
+    ``V = 2 V_* exp[-(mu_* + Theta)/a] sinh[tau/(a sigma)]`` has the sign of tau and reads
+
+        a ln(|V|/V_*) = |tau|/sigma + a ln[1 - exp(-2 |tau|/(a sigma))] - mu_* - Theta,
+
+    which differs from slip forward by exp(-2 mu/a), 10^-46 of it.
+
+    References
+    ----------
+    Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811-3818.
     """
-    ratio, mu_star = 1.0 + excess, p[MU_STAR]
-    bend = excess - change * friction
-    support = 1.0 - mu_star * change
-    return (friction * support - mu_star * bend) / ratio, (support + bend) / ratio**2
+
+    def either_way(g: float, psis: Numbers, p: Numbers) -> Relation:
+        forward, slope, shift, shift_slope = one_way(g, psis, p)
+        a, mu_star = p[A], p[MU_STAR]
+        coefficient_now = mu_star + forward - shift
+        size = max(abs(coefficient_now), _LEAST)
+        value = size + a * math.log(-math.expm1(-2.0 * size / a)) - mu_star + shift
+        steeper = math.copysign(1.0 / math.tanh(size / a), coefficient_now)
+        return value, (slope - shift_slope) * steeper + shift_slope, shift, shift_slope
+
+    return either_way
+
+
+def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
+    """Derivatives of strength, ``(mu_* + g)/s**2`` and that of the shift, and of the shift with
+    respect to P, at constant frictional stress.
+
+    By the chain rule, the shift has its slope along a change of normal stress of -1 less that along
+    none.
+    """
+
+    if state_effect is None:
+
+        def alone(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+            ratio = 1.0 + stress(g, psis, p)[0]
+            return (p[MU_STAR] + g) / ratio**2, 0.0
+
+        return alone
+
+    def with_state_effect(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+        ratio = 1.0 + stress(g, psis, p)[0]
+        along = state_effect(g, ratio, -1.0, p)[1]
+        shift = along - state_effect(g, ratio, 0.0, p)[1]
+        return (p[MU_STAR] + g) / ratio**2 + shift, shift
+
+    return with_state_effect
+
+
+# ---- all of it -----------------------------------------------------------------------------------
+
+
+class Parts(NamedTuple):
+    """What the parts of a scene say of friction (see their bases): functions, and how many states a
+    law has and what may change normal stress beside shear stress.
+
+    Attributes
+    ----------
+    states : int
+        How many states the law has.
+    evolution, evolutions, resting : callable or None
+        Of the law; either the first or the second.
+    state_effects : tuple of callable
+        By how much stress lowers the state: of normal stress, of the law, of shear stress.
+    regularised : bool
+        Whether slip may reverse.
+    normal_stress : callable or None
+        Of the case of normal stress.
+    unknowns : int
+        How many states end in P.
+    seepage, seeped : callable or None
+        Theirs: auxiliary rates, and what they are in steady sliding.
+    inside : bool
+        Whether P is pore pressure inside the fault, which a rig does not know of.
+    """
+
+    states: int
+    evolution: Function | None
+    evolutions: Function | None
+    resting: Function | None
+    state_effects: tuple[Function, ...]
+    regularised: bool
+    normal_stress: Function | None
+    unknowns: int
+    seepage: Function | None
+    seeped: Function | None
+    inside: bool
+
+
+@cache
+def friction_of(parts: Parts) -> Friction:
+    """Friction, made of what the parts of a scene say of it."""
+    effect = reduce(both, parts.state_effects) if parts.state_effects else None
+    pressure, dry = parts.unknowns > 0, stress_of(parts.normal_stress)
+    wet = less_pressure(parts.normal_stress or constant) if pressure else dry
+    strength = strength_of(None if wet is constant_stress else wet, effect)
+    if parts.regularised:
+        strength = reversible(strength)
+    evolutions, steady_states = parts.evolutions, parts.resting or usual_steady_state
+    if evolutions is None:
+        assert parts.evolution is not None
+        evolutions = only(parts.evolution)
+    if parts.seepage is not None and parts.seeped is not None:
+        evolutions = with_auxiliary(evolutions, parts.seepage, parts.states)
+        steady_states = with_auxiliary_at_rest(steady_states, parts.seeped)
+    by_pressure = by_pressure_of(wet, effect)
+    return Friction(
+        strength=strength,
+        effective_stress=wet,
+        outer_stress=dry if parts.inside else wet,
+        outer_pressure=last_of if pressure and not parts.inside else no_pressure,
+        evolutions=evolutions,
+        steady_states=steady_states,
+        state_sum=sum_of(parts.states),
+        contribution=contribution_of(parts.states, by_pressure if pressure else None),
+        by_pressure=by_pressure,
+        states_at=states_at_of(parts.states),
+        states=parts.states + parts.unknowns,
+    )

@@ -3,8 +3,8 @@
 A scene fills five slots: state evolution law, normal stress, fluid, dynamics and loading. Each
 choice is one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule,
 symbol, units and description. Its functions are plain functions of floats: they take the numbers of
-a scene as one flat tuple ``p``, in which those of the part begin at ``p[OWN]``. `assembly` puts
-them together.
+a scene as one flat tuple ``p``, in which those of the part begin at the place of its slot, such as
+``p[LAW]`` (see `places`). `friction` and `system` put them together.
 """
 
 from __future__ import annotations
@@ -72,7 +72,10 @@ class Part:
         return cls
 
     def numbers(self, scene: Scene) -> Numbers:
-        """What the functions of the part read at ``p[OWN]``, ``p[OWN + 1]``, ..."""
+        """What the functions of the part read from the place of its slot on, such as ``p[LAW]``.
+
+        A law may have any number of them, others as many as there are places (see `places`).
+        """
         return ()
 
     @reads()

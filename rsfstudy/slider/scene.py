@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import Any, Never, NoReturn
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import assembly, loading, stability
+from rsfstudy.slider import loading, places, stability, system
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fields import (
     SLOT_NAMES,
@@ -226,18 +226,18 @@ class Scene(Following):
 
     @cached_property
     def numbers(self) -> Numbers:
-        """All numbers, as the functions of the equations read them (see `assembly`)."""
-        return assembly.numbers(self)
+        """All numbers, as the functions of the equations read them (see `places`)."""
+        return places.numbers(self)
 
     @cached_property
     def numbers_of_friction(self) -> Numbers:
         """The same for functions that friction alone decides."""
-        return assembly.numbers_of_friction(self)
+        return places.numbers_of_friction(self)
 
     @cached_property
-    def functions(self) -> assembly.Functions:
-        """The functions of the equations, by name (see `assembly`)."""
-        return assembly.functions(self)
+    def functions(self) -> system.System:
+        """The functions of the equations, by name (see `system`)."""
+        return system.functions(self)
 
     @property
     def unforced(self) -> Scene:

@@ -178,7 +178,7 @@ def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
     law, fluid = scene.parts.law.states, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
-    by_pressure = scene.functions["strength_of_pressure"]
+    by_pressure = scene.functions.friction.by_pressure
     gained, shifted = by_pressure(steady.friction, steady.psis, scene.numbers_of_friction)
     return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
 
@@ -275,7 +275,7 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
     still = scene.unforced
     steady = _sliding(still, log_rate)
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressing.unknowns))
-    by_pressure, p = scene.functions["strength_of_pressure"], scene.numbers_of_friction
+    by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
     _by_rate, by_shift, by_state = slopes_of_law(still, steady)
     denominator, adjugate = resolvent(by_state)

@@ -1,54 +1,150 @@
-"""The states of a law, which act on friction together."""
+"""The states of a scene: how they evolve, where they rest, and what they add up to.
+
+Those of the law come first, which act on friction together; behind them stand those of a fluid, or
+of a loading that goes on changing normal stress, pore pressure P last.
+"""
 
 from __future__ import annotations
 
-from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import A, others_moved, others_scaled
+from functools import cache
+
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import A, B
 
 
-def total(numbers: Numbers) -> float:
-    """Sum of what several states contribute."""
-    together = 0.0
-    for number in numbers:
-        together += number
-    return together
+def only(evolution: Function) -> Function:
+    """``dPsi/d(delta)`` times a fraction, of a law of one state."""
+
+    def evolutions(
+        log_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    ) -> Numbers:
+        return (fraction * evolution(log_rate, psis[0] - shift, p),)
+
+    return evolutions
 
 
-def only(numbers: Numbers) -> float:
-    """The same, of one state."""
-    return numbers[0]
+def usual_steady_state(log_rate: float, shift: float, p: Numbers) -> Numbers:
+    """Psi in steady sliding by most laws, where Theta = -b ln(V/V_*)."""
+    return (shift - p[B] * log_rate,)
 
 
-def felt(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
-    """What changes of the states take from a ln(V/V_*): ``a d ln V = strength'(g) dg - felt``."""
-    return total(changes)
+def with_auxiliary(evolutions: Function, auxiliary: Function, of_law: int) -> Function:
+    """Changes of the states of the law, and of those that end in P behind them."""
+
+    def all_evolutions(
+        log_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    ) -> Numbers:
+        return (
+            *evolutions(log_rate, psis[:of_law], shift, fraction, p),
+            *auxiliary(log_rate, psis[of_law:], fraction, p),
+        )
+
+    return all_evolutions
 
 
-def felt_of_one(changes: Numbers, friction: float, psis: Numbers, p: Numbers) -> float:
-    """The same, of one state."""
+def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Function:
+    """All states in steady sliding: those of the law, and those that end in P."""
+
+    def all_steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
+        return (*steady_states(log_rate, shift, p), *auxiliary(log_rate, p))
+
+    return all_steady_states
+
+
+@cache
+def sum_of(count: int) -> Function:
+    """Sum of the first so many numbers."""
+    if count == 1:
+
+        def first(numbers: Numbers) -> float:
+            return numbers[0]
+
+        return first
+
+    others, last = sum_of(count - 1), count - 1
+
+    def total(numbers: Numbers) -> float:
+        together: float = others(numbers) + numbers[last]
+        return together
+
+    return total
+
+
+@cache
+def scaled(count: int) -> Function:
+    """``(numbers, by) -> tuple``: so many times each of the first so many numbers."""
+    if count == 1:
+
+        def one(numbers: Numbers, by: float) -> Numbers:
+            return (by * numbers[0],)
+
+        return one
+
+    others, last = scaled(count - 1), count - 1
+
+    def several(numbers: Numbers, by: float) -> Numbers:
+        return (*others(numbers, by), by * numbers[last])
+
+    return several
+
+
+@cache
+def moved(count: int) -> Function:
+    """``(psis, changes, by) -> tuple``: so many states after so many times their changes."""
+    if count == 1:
+
+        def one(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+            return (psis[0] + by * changes[0],)
+
+        return one
+
+    others, last = moved(count - 1), count - 1
+
+    def several(psis: Numbers, changes: Numbers, by: float) -> Numbers:
+        return (*others(psis, changes, by), psis[last] + by * changes[last])
+
+    return several
+
+
+def of_one(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+    """What a change of the only state takes from a ln(V/V_*)."""
     return changes[0]
 
 
-def states_at(value: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
-    """All states, where friction has this strength: the first is what the others leave."""
-    return (value - p[A] * log_rate - total((0.0, *others)), *others)
+def contribution_of(count: int, by_pressure: Function | None) -> Function:
+    """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
+    less what the change of P gives, if there is any.
+    """
+    state_sum = sum_of(count)
+    if by_pressure is not None:
+
+        def with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+            taken: float = state_sum(changes) - by_pressure(g, psis, p)[0] * changes[-1]
+            return taken
+
+        return with_pressure
+
+    def of_several(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+        taken: float = state_sum(changes)
+        return taken
+
+    return of_one if count == 1 else of_several
 
 
-def moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
-    """States after so many times their changes."""
-    return (psis[0] + by * changes[0], *others_moved(psis[1:], changes[1:], by))
+def states_at_of(count: int) -> Function:
+    """``(strength, log_rate, others, p)``: all states, of which so many are of the law, where
+    friction has a strength: the first is what the others leave of it.
+    """
+    if count == 1:
 
+        def left(strength: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
+            return (strength - p[A] * log_rate, *others)
 
-def only_moved(psis: Numbers, changes: Numbers, by: float) -> Numbers:
-    """The same, of one state."""
-    return (psis[0] + by * changes[0],)
+        return left
 
+    sum_of_others = sum_of(count - 1)
 
-def scaled(numbers: Numbers, by: float) -> Numbers:
-    """So many times each of some numbers."""
-    return (by * numbers[0], *others_scaled(numbers[1:], by))
+    def left_by_others(strength: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
+        return (strength - p[A] * log_rate - sum_of_others(others), *others)
 
-
-def only_scaled(numbers: Numbers, by: float) -> Numbers:
-    """The same, of one number."""
-    return (by * numbers[0],)
+    return left_by_others

@@ -60,7 +60,8 @@ def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
 
 def steady_excess(scene: Scene, log_rate: float) -> float:
     """Steady friction coefficient at ln(V/V_*), less mu_*: (a - b) ln(V/V_*) by most laws."""
-    return float(scene.a * log_rate + scene.functions["total"](resting_of(scene, log_rate, 0.0)))
+    psi = scene.functions.friction.state_sum(resting_of(scene, log_rate, 0.0))
+    return float(scene.a * log_rate + psi)
 
 
 def stress_at(scene: Scene, excess: float) -> float | None:

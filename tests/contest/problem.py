@@ -26,7 +26,8 @@ from rsfstudy.motion.events import Kind, rise, settling
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
 from rsfstudy.slider.equations import IN_RUPTURE, between_ruptures
-from rsfstudy.slider.forms import UNITS, Point
+from rsfstudy.slider.point import Point
+from rsfstudy.slider.system import UNITS
 
 BUDGET = 10**9
 #: Places of the numbers of a scene.

@@ -10,12 +10,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parts import number
-
-OWN = 0
+from rsfstudy.slider.places import LAW
 
 
 def evolution(log_rate, state, p):
-    b, sharpness = p[OWN], p[OWN + 1]
+    b, sharpness = p[LAW], p[LAW + 1]
     ahead = state / b + log_rate
     if sharpness == 0.0:
         return -b * ahead

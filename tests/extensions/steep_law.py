@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider.laws import Law
+from rsfstudy.slider.places import LAW
 
-OWN = 0
 #: Only trial steps, which the integrator rejects, go further from steady sliding.
 FARTHEST = 300.0
 
 
 def evolution(log_rate, state, p):
-    b = p[OWN]
+    b = p[LAW]
     return -0.5 * b * math.sinh(2.0 * max(-FARTHEST, min(state / b + log_rate, FARTHEST)))
 
 

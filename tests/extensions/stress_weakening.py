@@ -10,13 +10,11 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.slots import MU_STAR
-
-OWN = 0
+from rsfstudy.slider.places import LAW, MU_STAR
 
 
 def worn(friction, ratio, change, p):
-    stress, c = p[MU_STAR] + friction, p[OWN + 1]
+    stress, c = p[MU_STAR] + friction, p[LAW + 1]
     return c * (stress / ratio - p[MU_STAR]), c * (1.0 - stress * change / ratio) / ratio
 
 

@@ -32,8 +32,8 @@ def check_raises_nothing(function: Function, seen: set[Function] | None = None) 
             rule = f"cannot compile {what} ({where}): it raises an error"
             remedy = "Return math.nan instead, which ends the motion; or use the engine scipy."
             raise InvalidValue("engine", "compiled", rule, remedy=remedy)
-    for name in function.__code__.co_names:
-        reached = function.__globals__.get(name)
+    named = (function.__globals__.get(name) for name in function.__code__.co_names)
+    for reached in (*named, *(cell.cell_contents for cell in function.__closure__ or ())):
         if isinstance(reached, FunctionType):
             check_raises_nothing(reached, seen)
 

@@ -1,14 +1,14 @@
 """What balances the spring besides friction, one file a case.
 
-A case states how slip rate follows from spring stress and state, as plain functions of floats that
-`assembly` binds to the friction relation:
+A case states how slip rate follows from spring stress and state, by functions that take the
+friction of a scene (see `friction.Friction`) and return functions of floats:
 
-- ``balance(spring, psis, p) -> (log_rate, friction, shift)``: ln(V/V_*), the frictional stress, and
-  the state lost to stress;
-- ``growth(state, rates, x, friction, p)``: derivative of x = ln(V/V_*) along the motion, where the
-  state (spring, *psis) changes by `rates`;
-- ``rupture_rate(state, p)`` and ``rupture_point(state, rates, p)``: the full equations where the
-  others do not serve.
+- ``slip_rate(friction) -> (balance, growth)``, where ``balance(spring, psis, p)`` gives ln(V/V_*),
+  frictional stress g and the state lost to stress, and ``growth(state, rates, x, g, p)`` the
+  derivative of x = ln(V/V_*) along the motion, where the state (spring, *psis) changes by `rates`;
+- ``rupture_rate(friction) -> rate``, where ``rate(state, p)`` gives the derivatives of the unknowns
+  f, x, g and the states but the first by the full equations, in inertial time, where the others do
+  not serve.
 """
 
 from __future__ import annotations
@@ -28,16 +28,14 @@ class Dynamics(Part):
 
     #: Name of the form between ruptures, as it appears in results.
     regime: ClassVar[str]
-    balance: ClassVar[Function]
-    growth: ClassVar[Function]
+    slip_rate: ClassVar[Function]
     rupture_rate: ClassVar[Function | None] = None
     #: Whether slip may reverse, in the regularised form of friction.
     reverses: ClassVar[bool] = False
-    rupture_point: ClassVar[Function | None] = None
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:
-        return ("balance", "growth")
+        return ("slip_rate",)
 
     def radiated(self, log_rate: float) -> float:
         """Part of the spring stress that waves carry away at ln(V/V_*), over sigma_*."""

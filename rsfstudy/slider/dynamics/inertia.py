@@ -12,26 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
-from rsfstudy.slider.parts import Numbers, flag
-from rsfstudy.slider.slots import (
-    LARGEST_EXPONENT,
-    LOAD_VELOCITY,
-    STIFFNESS,
-    A,
-    evolutions,
-    felt,
-    moved,
-    pace,
-    point_at,
-    reading_growth,
-    strength,
-)
-from rsfstudy.slider.states import states_at, total
+from rsfstudy.slider.friction import Friction
+from rsfstudy.slider.parts import Function, Numbers, flag
+from rsfstudy.slider.places import DYNAMICS, LARGEST_EXPONENT, LOAD_VELOCITY, STIFFNESS, A
+from rsfstudy.slider.states import moved
+from rsfstudy.slider.system import velocity_ratios
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-OWN = 0
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.
 LARGEST_RATE = 1e30
@@ -43,51 +32,82 @@ LIGHT, LIGHTER, AHEAD = 1e-7, 1e-9, 1e-6
 LEAST, MOST = 1e-60, 1e40
 
 
-def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-    """Slip rate on the slow manifold, frictional stress, and the state lost to normal stress.
+def slip_rate(friction: Friction) -> tuple[Function, Function]:
+    """Slip rate on the slow manifold, and its derivative.
 
     Friction has the stress of the spring less what accelerates the mass, ``K w (w + w_0) dx`` with
     dx the growth of ln V per unit of combined displacement (slip and load point), w = V T/(2 pi
     D_c) and w_0 the same of the load point velocity. The slip rate that trails by that of
     quasi-static growth is right to first order in w**2, and with its growth friction is to second:
     the error is of order w**6.
-
-    Parameters
-    ----------
-    spring : float
-        Deviation f of spring stress from tau_*, over sigma_*.
-    psis : tuple of float
-        States freed of stress.
-    p : tuple of float
-        T V_*/(2 pi D_c) at OWN, and its logarithm.
     """
-    friction = spring - resistance(spring, psis, p)
-    value, _slope, shift, _shift_slope = strength(friction, psis, p)
-    return (value - total(psis)) / p[A], friction, shift
+    strength, state_sum, evolutions = friction.strength, friction.state_sum, friction.evolutions
+    contribution, ahead = friction.contribution, moved(friction.states)
 
+    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+        g = spring - resistance(spring, psis, p)
+        value, _slope, shift, _shift_slope = strength(g, psis, p)
+        return (value - state_sum(psis)) / p[A], g, shift
 
-def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
-    """The stress that accelerates the mass, over sigma_*."""
-    x, growing, slope, weight = without_mass(spring, psis, p)
-    first = resisted(weight, growing, p)
-    if weight <= LIGHT:
-        return first
-    trails = slope * first / p[A]
-    slowed, slower, share = pace(x - trails, p)
-    shift = strength(spring - first, psis, p)[2]
-    loading = p[STIFFNESS] * (slower - 1.0) * share
-    changes = evolutions(slowed, psis, shift, share, p)
-    growing = (slope * loading - felt(changes, spring, psis, p)) / p[A]
-    _x, growing_ahead, slope_ahead, weight_ahead = without_mass(
-        spring + AHEAD * loading, moved(psis, changes, AHEAD), p
-    )
-    trails_ahead = slope_ahead * resisted(weight_ahead, growing_ahead, p) / p[A]
-    return resisted(weight_at(slowed, slower, p), growing - (trails_ahead - trails) / AHEAD, p)
+    def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
+        """The stress that accelerates the mass, over sigma_*."""
+        x, growing, slope, weight = without_mass(spring, psis, p)
+        first = resisted(weight, growing, p)
+        if weight <= LIGHT:
+            return first
+        trails = slope * first / p[A]
+        slowed, slower, fraction = velocity_ratios(x - trails, p)
+        shift = strength(spring - first, psis, p)[2]
+        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        changes = evolutions(slowed, psis, shift, fraction, p)
+        growing = (slope * loading - contribution(changes, spring, psis, p)) / p[A]
+        _x, growing_ahead, slope_ahead, weight_ahead = without_mass(
+            spring + AHEAD * loading, ahead(psis, changes, AHEAD), p
+        )
+        trails_ahead = slope_ahead * resisted(weight_ahead, growing_ahead, p) / p[A]
+        return resisted(weight_at(slowed, slower, p), growing - (trails_ahead - trails) / AHEAD, p)
+
+    def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+        """ln(V/V_*) and its growth, both quasi-static, the slope of strength, and the weight of
+        mass there.
+        """
+        a = p[A]
+        value, slope, shift, _shift_slope = strength(spring, psis, p)
+        x = (value - state_sum(psis)) / a
+        clamped, slower, fraction = velocity_ratios(x, p)
+        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        changes = evolutions(clamped, psis, shift, fraction, p)
+        growing = (slope * loading - contribution(changes, spring, psis, p)) / a
+        return x, growing, slope, weight_at(x, slower, p)
+
+    def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
+        """ln V on the slow manifold less its quasi-static value; a difference of both would leave
+        rounding errors that show in its growth.
+        """
+        taken = resistance(spring, psis, p)
+        slope: float = strength(spring - 0.5 * taken, psis, p)[1]
+        return -slope * taken / p[A]
+
+    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+        """The quasi-static one along the motion, and the change of what ln V differs by from its
+        quasi-static value: without that, slip would be fastest ``(K/a) w**2`` D_c too early.
+        """
+        spring, psis = state[0], state[1:]
+        slope = strength(spring, psis, p)[1]
+        change: float = slope * rates[0] - contribution(rates[1:], spring, psis, p)
+        quasi_static = change / p[A]
+        if weight_at(x, velocity_ratios(x, p)[1], p) <= LIGHTER:
+            return quasi_static
+        then = trailing(spring + AHEAD * rates[0], ahead(psis, rates[1:], AHEAD), p)
+        return quasi_static + (then - trailing(spring, psis, p)) / AHEAD
+
+    return balance, growth
 
 
 def resisted(weight: float, growing: float, p: Numbers) -> float:
-    """The same where ln V grows so: no more than a, which is far more than the motion meets before
-    it leaves the slow manifold, so that trial steps beyond keep their sense of direction.
+    """The stress that accelerates the mass where ln V grows so: no more than a, which is far more
+    than the motion meets before it leaves the slow manifold, so that trial steps beyond keep their
+    sense of direction.
     """
     return max(-p[A], min(p[A] * weight * growing, p[A]))
 
@@ -96,50 +116,15 @@ def weight_at(x: float, slower: float, p: Numbers) -> float:
     """(K/a) w (w + w_0): how much ln V trails its quasi-static value per unit growth. Of the
     exponentials, that of V_0/V serves where there is one.
     """
-    load = p[LOAD_VELOCITY] * p[OWN]
+    load = p[LOAD_VELOCITY] * p[DYNAMICS]
     if LEAST < slower < MOST:
         norm = load / slower
     else:
-        norm = math.exp(min(x + p[OWN + 1], LARGEST_EXPONENT / 4.0))
+        norm = math.exp(min(x + p[DYNAMICS + 1], LARGEST_EXPONENT / 4.0))
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
-def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
-    """ln(V/V_*) and its growth, both quasi-static, the slope of strength, and the weight of mass
-    there.
-    """
-    a = p[A]
-    value, slope, shift, _shift_slope = strength(spring, psis, p)
-    x = (value - total(psis)) / a
-    clamped, slower, share = pace(x, p)
-    loading = p[STIFFNESS] * (slower - 1.0) * share
-    changes = evolutions(clamped, psis, shift, share, p)
-    growing = (slope * loading - felt(changes, spring, psis, p)) / a
-    return x, growing, slope, weight_at(x, slower, p)
-
-
-def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
-    """ln V on the slow manifold less its quasi-static value; a difference of both would leave
-    rounding errors that show in its growth.
-    """
-    taken = resistance(spring, psis, p)
-    return -strength(spring - 0.5 * taken, psis, p)[1] * taken / p[A]
-
-
-def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
-    """The quasi-static one along the motion, and the change of what ln V differs by from its
-    quasi-static value: without that, slip would be fastest ``(K/a) w**2`` D_c too early.
-    """
-    spring, psis = state[0], state[1:]
-    slope = strength(spring, psis, p)[1]
-    quasi_static = (slope * rates[0] - felt(rates[1:], spring, psis, p)) / p[A]
-    if weight_at(x, pace(x, p)[1], p) <= LIGHTER:
-        return quasi_static
-    ahead = trailing(spring + AHEAD * rates[0], moved(psis, rates[1:], AHEAD), p)
-    return quasi_static + (ahead - trailing(spring, psis, p)) / AHEAD
-
-
-def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
+def rupture_rate(friction: Friction) -> Function:
     """The full equations: unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi), and the
     states but the first.
 
@@ -148,31 +133,29 @@ def rupture_rate(state: Numbers, p: Numbers) -> Numbers:
     with w = V T/(2 pi D_c), from m d2(delta)/dt2 = k (delta_0 - delta) - tau and m/k = (T/2 pi)**2.
     Keeping g as an unknown needs no inverse of `strength`.
     """
-    spring, x, friction, others = state[0], state[1], state[2], state[3:]
-    a, stiffness = p[A], p[STIFFNESS]
-    norm = math.exp(max(min(x + p[OWN + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
-    value, slope, shift, _shift_slope = strength(friction, others, p)
-    faster = bounded((spring - friction) / (stiffness * norm))
-    changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
-    return (
-        bounded(stiffness * (p[LOAD_VELOCITY] * p[OWN] - norm)),
-        faster,
-        bounded((a * faster + felt(changes, friction, others, p)) / slope),
-        *changes[1:],
-    )
+    strength, states_at = friction.strength, friction.states_at
+    evolutions, contribution = friction.evolutions, friction.contribution
+
+    def rates(state: Numbers, p: Numbers) -> Numbers:
+        spring, x, g, others = state[0], state[1], state[2], state[3:]
+        a, stiffness = p[A], p[STIFFNESS]
+        norm = math.exp(max(min(x + p[DYNAMICS + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
+        value, slope, shift, _shift_slope = strength(g, others, p)
+        faster = bounded((spring - g) / (stiffness * norm))
+        changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
+        return (
+            bounded(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
+            faster,
+            bounded((a * faster + contribution(changes, g, others, p)) / slope),
+            *changes[1:],
+        )
+
+    return rates
 
 
 def bounded(rate: float) -> float:
     """A rate that a motion meets, or the largest."""
     return max(min(rate, LARGEST_RATE), -LARGEST_RATE)
-
-
-def rupture_point(state: Numbers, rates: Numbers, p: Numbers) -> tuple[Any, ...]:
-    """What the slider does where mass acts."""
-    spring, x, friction = state[0], state[1], state[2]
-    psis = states_at(strength(friction, state[3:], p)[0], x, state[3:], p)
-    reads = reading_growth(spring, rates[0], friction, rates[2], psis, rates, p)
-    return point_at(x, rates[1], spring, friction, psis, reads, p)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,10 +167,8 @@ class Inertia(Dynamics):
     name = "inertia"
     called_by = "inertia"
     regime = "slow_manifold"
-    balance = staticmethod(balance)
-    growth = staticmethod(growth)
+    slip_rate = staticmethod(slip_rate)
     rupture_rate = staticmethod(rupture_rate)
-    rupture_point = staticmethod(rupture_point)
 
     @property
     def effects(self) -> tuple[str, ...]:

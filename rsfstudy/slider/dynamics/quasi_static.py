@@ -5,22 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
-from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import A, felt, strength
-from rsfstudy.slider.states import total
+from rsfstudy.slider.friction import Friction
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import A
 
 
-def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-    """``a ln(V/V_*) = strength(f) - Psi`` with f the deviation of spring stress."""
-    value, _slope, shift, _shift_slope = strength(spring, psis, p)
-    return (value - total(psis)) / p[A], spring, shift
+def slip_rate(friction: Friction) -> tuple[Function, Function]:
+    """``a ln(V/V_*) = strength(f) - Psi`` with f the deviation of spring stress, and its
+    derivative, ``a d ln V = strength'(f) df - dPsi``.
+    """
+    strength, state_sum = friction.strength, friction.state_sum
+    contribution = friction.contribution
 
+    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+        value, _slope, shift, _shift_slope = strength(spring, psis, p)
+        return (value - state_sum(psis)) / p[A], spring, shift
 
-def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
-    """``a d ln V = strength'(f) df - dPsi``."""
-    psis = state[1:]
-    slope = strength(friction, psis, p)[1]
-    return (slope * rates[0] - felt(rates[1:], friction, psis, p)) / p[A]
+    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+        psis = state[1:]
+        slope = strength(g, psis, p)[1]
+        change: float = slope * rates[0] - contribution(rates[1:], g, psis, p)
+        return change / p[A]
+
+    return balance, growth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,5 +37,4 @@ class QuasiStatic(Dynamics):
     name = "quasi_static"
     regime = "quasi_static"
     reverses = True
-    balance = staticmethod(balance)
-    growth = staticmethod(growth)
+    slip_rate = staticmethod(slip_rate)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rsfstudy.slider.dynamics import Dynamics
-from rsfstudy.slider.parts import Numbers, number
-from rsfstudy.slider.slots import LARGEST_EXPONENT, A, felt, strength
-from rsfstudy.slider.states import total
+from rsfstudy.slider.friction import Friction
+from rsfstudy.slider.parts import Function, Numbers, number
+from rsfstudy.slider.places import DYNAMICS, LARGEST_EXPONENT, A
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-OWN = 0
 _MOST_ITERATIONS = 200
 _SETTLED = 1e-15
 #: How far strength may be off where Newton's steps have become small, over its size: on the floor
@@ -41,59 +40,56 @@ def radiated(log_rate: float, damping: float) -> float:
     return damping * math.expm1(log_rate)
 
 
-def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+def slip_rate(friction: Friction) -> tuple[Function, Function]:
     """ln(V/V_*) at which friction and radiation together balance the spring, the frictional stress
-    there, and the state lost to normal stress.
+    there, and the state lost to stress; and its derivative, ``[a + strength'(g) eta V] d ln V =
+    strength'(g) df - dPsi``.
 
     Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
     V and the right side grows, so there is one root, which bisection keeps in its bracket where
     Newton's steps would leave it or shrink too slowly.
-
-    Parameters
-    ----------
-    spring : float
-        Deviation f of spring stress from tau_*, over sigma_*.
-    psis : tuple of float
-        States freed of stress.
-    p : tuple of float
-        eta V_*/sigma_*, at OWN.
     """
-    a, damping, psi = p[A], p[OWN], total(psis)
-    # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
-    low, high = -math.inf, min((strength(spring + damping, psis, p)[0] - psi) / a, _FASTEST)
-    # a good guess where radiation takes most of the stress
-    x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
-    before = math.inf
-    for _ in range(_MOST_ITERATIONS):
-        friction = spring - damping * math.expm1(x)
-        value, slope, shift, _shift_slope = strength(friction, psis, p)
-        missing = value - psi - a * x
-        if missing > 0.0:
-            low = x
-        else:
-            high = x
-        change = missing / (a + slope * damping * math.exp(x))
-        balanced = abs(missing) <= _BALANCED * (1.0 + abs(psi) + a * abs(x))
-        if balanced and abs(change) <= _SETTLED * (1.0 + abs(x)):
-            return x, friction, shift
-        # where normal stress is nearly lost, slopes are so steep that Newton's steps lead nowhere
-        slow = abs(change) > 0.5 * abs(before) or abs(change) <= _SETTLED * (1.0 + abs(x))
-        before = change
-        if slow or not low < x + change <= high:
-            before = math.inf
-            x = 0.5 * (max(low, high - 1e3) + high)
-        else:
-            x += change
-    friction = spring - damping * math.expm1(x)
-    return x, friction, strength(friction, psis, p)[2]
+    strength, state_sum = friction.strength, friction.state_sum
+    contribution = friction.contribution
 
+    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+        a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
+        # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
+        low, high = -math.inf, min((strength(spring + damping, psis, p)[0] - psi) / a, _FASTEST)
+        # a good guess where radiation takes most of the stress
+        x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
+        before = math.inf
+        for _ in range(_MOST_ITERATIONS):
+            g = spring - damping * math.expm1(x)
+            value, slope, shift, _shift_slope = strength(g, psis, p)
+            missing = value - psi - a * x
+            if missing > 0.0:
+                low = x
+            else:
+                high = x
+            change = missing / (a + slope * damping * math.exp(x))
+            balanced = abs(missing) <= _BALANCED * (1.0 + abs(psi) + a * abs(x))
+            if balanced and abs(change) <= _SETTLED * (1.0 + abs(x)):
+                return x, g, shift
+            # where normal stress is nearly lost, slopes are so steep that such steps lead nowhere
+            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _SETTLED * (1.0 + abs(x))
+            before = change
+            if slow or not low < x + change <= high:
+                before = math.inf
+                x = 0.5 * (max(low, high - 1e3) + high)
+            else:
+                x += change
+        g = spring - damping * math.expm1(x)
+        return x, g, strength(g, psis, p)[2]
 
-def growth(state: Numbers, rates: Numbers, x: float, friction: float, p: Numbers) -> float:
-    """``[a + strength'(g) eta V] d ln V = strength'(g) df - dPsi``."""
-    psis = state[1:]
-    slope = strength(friction, psis, p)[1]
-    resists = p[A] + slope * p[OWN] * math.exp(min(x, LARGEST_EXPONENT))
-    return (slope * rates[0] - felt(rates[1:], friction, psis, p)) / resists
+    def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
+        psis = state[1:]
+        slope = strength(g, psis, p)[1]
+        resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LARGEST_EXPONENT))
+        growing: float = (slope * rates[0] - contribution(rates[1:], g, psis, p)) / resists
+        return growing
+
+    return balance, growth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,8 +108,7 @@ class RadiationDamping(Dynamics):
     name = "radiation_damping"
     called_by = "radiation_damping"
     regime = "quasi_dynamic"
-    balance = staticmethod(balance)
-    growth = staticmethod(growth)
+    slip_rate = staticmethod(slip_rate)
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -13,12 +13,10 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_threshold
 from rsfstudy.slider.parts import Numbers, number
-from rsfstudy.slider.slots import LARGEST_SLOWNESS
+from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -36,21 +34,21 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     share : float
         What the changes are multiplied by: zero times infinity, where slip stops, has a limit.
     p : tuple of float
-        Dilatancy eps/(beta sigma_*) at OWN, and drainage c* D_c/V_* behind it.
+        Dilatancy eps/(beta sigma_*) at FLUID, and drainage c* D_c/V_* behind it.
 
     References
     ----------
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     porosity, pressure = states
-    opening = share * (p[OWN] * log_rate - porosity)
+    opening = share * (p[FLUID] * log_rate - porosity)
     time = share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
-    return opening, -p[OWN + 1] * time * pressure - opening
+    return opening, -p[FLUID + 1] * time * pressure - opening
 
 
 def seeped(log_rate: float, p: Numbers) -> Numbers:
     """Porosity of steady sliding, and no pore pressure: phi = phi_0 + eps ln(V/V_*)."""
-    return p[OWN] * log_rate, 0.0
+    return p[FLUID] * log_rate, 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

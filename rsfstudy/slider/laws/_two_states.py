@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.laws import GIVE_STIFFNESS, LawOfStates, lacks_threshold
 from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.places import LAW
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-OWN = 0
 #: Places of the numbers of the law: b of each state, the part each has in what stress takes from
 #: the state variable, and L_1/L_2.
-FIRST, SECOND, OF_FIRST, OF_SECOND, OVER = range(5)
+FIRST, SECOND, OF_FIRST, OF_SECOND, OVER = range(LAW, LAW + 5)
 
 
 def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """The states of steady sliding, ``Psi_i = c_i shift - b_i ln(V/V_*)``, c_i being the shares."""
     return (
-        p[OWN + OF_FIRST] * shift - p[OWN + FIRST] * log_rate,
-        p[OWN + OF_SECOND] * shift - p[OWN + SECOND] * log_rate,
+        p[OF_FIRST] * shift - p[FIRST] * log_rate,
+        p[OF_SECOND] * shift - p[SECOND] * log_rate,
     )
 
 

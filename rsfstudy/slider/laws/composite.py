@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.places import LAW
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-OWN = 0
 #: Steps of third order that take Lambert's W to rounding from the guess below.
 STEPS = 4
 
@@ -33,7 +33,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta.
     p : tuple of float
-        Evolution effect parameter b at OWN, then ln(V_c/V_*) and u_*.
+        Evolution effect parameter b at LAW, then ln(V_c/V_*) and u_*.
 
     Returns
     -------
@@ -44,15 +44,15 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     ----------
     Kato and Tullis (2001), Geophys. Res. Lett. 28, 1103-1106.
     """
-    b = p[OWN]
-    ahead = state / b + log_rate + p[OWN + 2]
-    return b * (share_of_healing(log_rate, p[OWN + 1]) * math.exp(bounded(-ahead)) - ahead)
+    b = p[LAW]
+    ahead = state / b + log_rate + p[LAW + 2]
+    return b * (share_of_healing(log_rate, p[LAW + 1]) * math.exp(bounded(-ahead)) - ahead)
 
 
 def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, where ``u exp(u) = exp(-V/V_c)``."""
-    ahead = lambert_w(share_of_healing(log_rate, p[OWN + 1]))
-    return (shift + p[OWN] * (ahead - p[OWN + 2] - log_rate),)
+    ahead = lambert_w(share_of_healing(log_rate, p[LAW + 1]))
+    return (shift + p[LAW] * (ahead - p[LAW + 2] - log_rate),)
 
 
 def share_of_healing(log_rate: float, log_cutoff: float) -> float:

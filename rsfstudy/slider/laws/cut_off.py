@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity, exp_less_one
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.places import LAW
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -30,7 +29,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta.
     p : tuple of float
-        Evolution effect parameter b at OWN, then the parts V_c/(V_c + V_*) and V_*/(V_c + V_*).
+        Evolution effect parameter b at LAW, then the parts V_c/(V_c + V_*) and V_*/(V_c + V_*).
 
     Returns
     -------
@@ -41,14 +40,14 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     ----------
     Okubo (1989), J. Geophys. Res. 94, 12321-12335.
     """
-    b = p[OWN]
-    behind = steady_over_b(log_rate, p[OWN + 1], p[OWN + 2]) - state / b
+    b = p[LAW]
+    behind = steady_over_b(log_rate, p[LAW + 1], p[LAW + 2]) - state / b
     return b * exp_less_one(min(behind, LARGEST_EXPONENT))
 
 
 def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
-    return (shift + p[OWN] * steady_over_b(log_rate, p[OWN + 1], p[OWN + 2]),)
+    return (shift + p[LAW] * steady_over_b(log_rate, p[LAW + 1], p[LAW + 2]),)
 
 
 def steady_over_b(log_rate: float, healing: float, cut: float) -> float:

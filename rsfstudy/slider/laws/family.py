@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
 from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.places import LAW
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -28,7 +27,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta.
     p : tuple of float
-        Evolution effect parameter b at OWN, and eps.
+        Evolution effect parameter b at LAW, and eps.
 
     Returns
     -------
@@ -39,7 +38,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     ----------
     Ciardo and Viesca (2024), arXiv 2407.16846.
     """
-    b, exponent = p[OWN], p[OWN + 1]
+    b, exponent = p[LAW], p[LAW + 1]
     if exponent == 0.0:
         return -(state + b * log_rate)
     return b * exp_less_one(min(-exponent * (state / b + log_rate), LARGEST_EXPONENT)) / exponent

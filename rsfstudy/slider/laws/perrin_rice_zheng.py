@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.places import LAW
 
-OWN = 0
 #: Distance above steady sliding that only trial steps exceed: a motion ends at ln(V/V_*) = 276, and
 #: the square of what is larger overflows in an estimate of the first step.
 FARTHEST_ABOVE = 300.0
@@ -28,7 +28,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta.
     p : tuple of float
-        Evolution effect parameter b, at OWN.
+        Evolution effect parameter b, at LAW.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     ----------
     Perrin, Rice and Zheng (1995), J. Mech. Phys. Solids 43, 1461-1495.
     """
-    b = p[OWN]
+    b = p[LAW]
     return -b * math.sinh(max(-LARGEST_EXPONENT, min(state / b + log_rate, FARTHEST_ABOVE)))
 
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parts import Numbers
-
-OWN = 0
+from rsfstudy.slider.places import LAW
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -23,7 +22,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta.
     p : tuple of float
-        Evolution effect parameter b, at OWN.
+        Evolution effect parameter b, at LAW.
 
     Returns
     -------
@@ -35,7 +34,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Ruina (1983), J. Geophys. Res. 88; Linker and Dieterich (1992), J. Geophys. Res. 97 (first term
     of their evolution law).
     """
-    return -(state + p[OWN] * log_rate)
+    return -(state + p[LAW] * log_rate)
 
 
 def stress_left(rate: float, slip: float) -> float:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
 from rsfstudy.slider.parts import Numbers
-
-OWN = 0
+from rsfstudy.slider.places import LAW
 
 
 def evolution(log_rate: float, state: float, p: Numbers) -> float:
@@ -25,7 +24,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     state : float
         State variable Theta = b ln(theta/theta_*).
     p : tuple of float
-        Evolution effect parameter b, at OWN.
+        Evolution effect parameter b, at LAW.
 
     Returns
     -------
@@ -36,7 +35,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     ----------
     Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
     """
-    b = p[OWN]
+    b = p[LAW]
     return b * exp_less_one(min(-(state / b + log_rate), LARGEST_EXPONENT))
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
 from rsfstudy.slider.parts import Numbers
 
-OWN = 0
-
 
 def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
     """Evolution of the two states per unit slip at constant normal stress, times a share.
@@ -26,16 +24,16 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
     share : float
         Slip over what the clock counts.
     p : tuple of float
-        Numbers of the law, from OWN on.
+        Numbers of the law, from `LAW` on.
 
     Returns
     -------
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
     """
-    first = psis[0] - p[OWN + OF_FIRST] * shift + p[OWN + FIRST] * log_rate
-    second = psis[1] - p[OWN + OF_SECOND] * shift + p[OWN + SECOND] * log_rate
-    return -share * first, -share * p[OWN + OVER] * second
+    first = psis[0] - p[OF_FIRST] * shift + p[FIRST] * log_rate
+    second = psis[1] - p[OF_SECOND] * shift + p[SECOND] * log_rate
+    return -share * first, -share * p[OVER] * second
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,6 @@ from rsfstudy.slider.parts import Numbers
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
-OWN = 0
-
 
 def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
     """Evolution of the two states per unit slip at constant normal stress, times a share.
@@ -33,18 +31,18 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
     share : float
         Slip over what the clock counts.
     p : tuple of float
-        Numbers of the law, from OWN on.
+        Numbers of the law, from `LAW` on.
 
     Returns
     -------
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
     """
-    first = (psis[0] - p[OWN + OF_FIRST] * shift) / p[OWN + FIRST] + log_rate
-    second = (psis[1] - p[OWN + OF_SECOND] * shift) / p[OWN + SECOND] + log_rate
+    first = (psis[0] - p[OF_FIRST] * shift) / p[FIRST] + log_rate
+    second = (psis[1] - p[OF_SECOND] * shift) / p[SECOND] + log_rate
     return (
-        share * p[OWN + FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
-        share * p[OWN + OVER] * p[OWN + SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
+        share * p[FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
+        share * p[OVER] * p[SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
     )
 
 

@@ -10,12 +10,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number, reads
-from rsfstudy.slider.slots import LARGEST_SLOWNESS
+from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -34,11 +32,11 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     share : float
         What the changes are multiplied by (see `fluid.dilatant.seepage`).
     p : tuple of float
-        omega D_c/V_* at OWN, and A behind it.
+        omega D_c/V_* at LOADING, and A behind it.
     """
     ahead, relief = states
-    turn = p[OWN] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
-    over, relative = ahead / p[OWN + 1], relief / p[OWN + 1]
+    turn = p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
 

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number, reads
-from rsfstudy.slider.slots import LARGEST_SLOWNESS
+from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -30,9 +28,9 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     share : float
         What the change is multiplied by (see `fluid.dilatant.seepage`).
     p : tuple of float
-        Rate of imposed normal stress in sigma_* V_*/D_c, at OWN.
+        Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
     """
-    return (-p[OWN] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS)),)
+    return (-p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS)),)
 
 
 def seeped(log_rate: float, p: Numbers) -> Numbers:

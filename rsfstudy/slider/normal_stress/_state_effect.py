@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parts import Function, Numbers, number
-
-OWN = 0
+from rsfstudy.slider.places import NORMAL_STRESS
 
 
 def linker_dieterich(
@@ -28,13 +27,13 @@ def linker_dieterich(
     ratio, change : float
         Normal stress ratio s, and its derivative with respect to shear stress.
     p : tuple of float
-        Strength of the effect alpha, at OWN.
+        Strength of the effect alpha, at NORMAL_STRESS.
 
     References
     ----------
     Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940.
     """
-    alpha = p[OWN]
+    alpha = p[NORMAL_STRESS]
     return alpha * math.log(ratio), alpha * change / ratio
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.slots import IMPOSED
+from rsfstudy.slider.places import IMPOSED
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
 from rsfstudy.slider.parts import Numbers, number, reads
-from rsfstudy.slider.slots import IMPOSED, LARGEST_RATIO, SMALLEST_RATIO
+from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-OWN = 0
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -31,9 +29,10 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     friction : float
         Deviation of shear stress, (tau - tau_*)/sigma_*.
     p : tuple of float
-        Cotangent of the angle between the driving stress and the fault normal, at OWN + 1.
+        Cotangent of the angle between the driving stress and the fault normal, at NORMAL_STRESS
+        + 1.
     """
-    cot_phi = p[OWN + 1]
+    cot_phi = p[NORMAL_STRESS + 1]
     excess = cot_phi * friction + p[IMPOSED]
     return min(max(excess, SMALLEST_RATIO - 1.0), LARGEST_RATIO), cot_phi
 

@@ -1,0 +1,70 @@
+"""Where the numbers of a scene stand in the flat tuple ``p`` that the functions of its equations
+read, and how far what they compute may go.
+
+Those that every scene has come first. Each slot has places of its own behind them: a law reads
+``p[LAW]``, ``p[LAW + 1]``, ... The law stands last, and may have any number of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import Numbers, Part
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+#: Direct effect parameter a; how far ln V moves the states, which is b for one; mu_*, K = k
+#: D_c/sigma_*, V_0/V_*, its logarithm, the effect c of shear stress on the state, and by how much
+#: the loading has raised normal stress, over sigma_*.
+A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, IMPOSED = range(8)
+
+#: Where the numbers of each slot begin, by its name. A loading that has unknowns has the places of
+#: the fluid, which then has none. There are few: compiled functions hand on all of `p`.
+NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
+LOADING = FLUID
+
+#: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
+#: ln(V/V_*) = 276 (`slip_rate_unbounded`).
+LARGEST_EXPONENT = 300.0
+#: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
+LARGEST_SLOWNESS = 680.0
+#: Normal stress ratios outside of these only occur in trial steps; clamps keep them finite.
+SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
+
+
+def numbers(scene: Scene) -> Numbers:
+    """The numbers of a scene, each in its place."""
+    return _numbers(scene, scene.stiffness, scene.load_velocity, scene.log_load_rate)
+
+
+def numbers_of_friction(scene: Scene) -> Numbers:
+    """The same for functions that friction alone decides: no spring, and no load point."""
+    return _numbers(scene, math.nan, math.nan, math.nan)
+
+
+def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate: float) -> Numbers:
+    parts, law = scene.parts, scene.parts.law
+    size = scene.b if law.states == 1 else scene.a * law.size_over_a
+    of_load = load_velocity, log_load_rate
+    of_stress = law.stress_dependence, scene.imposed_normal_stress
+    common = scene.a, size, scene.mu_star, stiffness, *of_load, *of_stress
+    own = (
+        *_filled_up(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
+        *_filled_up(scene.pressing, scene, DYNAMICS - FLUID),
+        *_filled_up(parts.dynamics, scene, LAW - DYNAMICS),
+    )
+    return (*common, *own, *law.numbers(scene))
+
+
+def _filled_up(part: Part, scene: Scene, most: int) -> Numbers:
+    """The numbers of a part, and NaN in the places that it leaves, so that who reads there reads
+    nothing.
+    """
+    own = part.numbers(scene)
+    if len(own) > most:
+        rule = f"states {len(own)} numbers, and there are places for {most}"
+        raise InvalidValue("numbers", part.name, rule, remedy="Make fewer of them, as quotients.")
+    return (*own, *(math.nan,) * (most - len(own)))

@@ -1,0 +1,52 @@
+"""What a slider does at one instant."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Point(NamedTuple):
+    """What the slider does at one instant, whatever the unknowns it was computed with.
+
+    Attributes
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    growth : float
+        Its derivative with respect to the clock of the equations, length along the path.
+    spring, friction : float
+        Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
+    psis : tuple of float
+        States freed of stress, and those of a fluid.
+    psi : float
+        The sum of those of the law.
+    state : float
+        State variable Theta (the sum, where a law has several).
+    imbalance : float
+        Its distance from steady sliding at this slip rate, Theta + b ln(V/V_*) for most laws.
+    unrest : float
+        The largest such distance of a state, without sign.
+    coefficient : float
+        Friction coefficient.
+    normal_stress : float
+        Effective normal stress over sigma_*.
+    reading : float
+        Friction coefficient as a rig reads it: spring stress over normal stress less the pore
+        pressure outside the fault.
+    reading_growth : float
+        Its derivative with respect to the clock of the equations.
+    """
+
+    log_rate: float
+    growth: float
+    spring: float
+    friction: float
+    psis: tuple[float, ...]
+    psi: float
+    state: float
+    imbalance: float
+    unrest: float
+    coefficient: float
+    normal_stress: float
+    reading: float
+    reading_growth: float

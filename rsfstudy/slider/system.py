@@ -1,0 +1,397 @@
+"""The equations of motion of a scene, made of its friction (read that first) and its dynamics.
+
+Between ruptures spring stress f and the state Psi (or the states of a law that has several) are all
+that changes, against slip plus load point displacement, ds = (V + V_0) dt:
+
+    df/ds = K (V_0 - V)/(V + V_0),   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
+
+with x = ln(V/V_*) and x_0 = ln(V_0/V_*). How x follows from f and Psi is for the dynamics to say
+(see `dynamics`). In ruptures, the full equations tell all changes against inertial time.
+
+Both are integrated along the path in displacement, or inertial time, and ln V together,
+d(sigma)**2 = ds**2 + (dx/6)**2, with K (V_0 - V)/(V + V_0) - dPsi/ds over a for dx/ds. While
+contact heals, or slip comes to its end after a rupture, ln V falls as the logarithm of s or of what
+is left of the time: a step in either would have to be a part of all that has passed, or is to come;
+along the path it is a few units of ln V. Where slip is fastest, a path that bends within one unit
+of ln V would cost more steps than one that bends within six (four to twelve do as well).
+
+A rigid slider has its slip rate prescribed, and slip for a clock.
+
+Functions here take functions and return one of floats, as in `friction`; `functions` puts all of
+them together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from rsfstudy.slider import friction
+from rsfstudy.slider.friction import Friction, friction_of
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, STIFFNESS, A
+from rsfstudy.slider.point import Point
+from rsfstudy.slider.states import scaled
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.dynamics import Dynamics
+    from rsfstudy.slider.scene import Scene
+
+#: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
+SLOWEST = -290.0 * math.log(10.0)
+
+#: Where slip is slower than V_0 by this in ln V, contact is stationary: the state then changes by
+#: less than exp(-100) of itself over all the slip there is.
+STATIONARY = 100.0
+
+#: Units of ln V that are as long a way as slip of D_c, or inertial time.
+UNITS = 6.0
+#: From where on the square of a slant, and 1 more than that, are the same number.
+STEEP = 1e9
+
+
+# ---- clocks --------------------------------------------------------------------------------------
+
+Ratios = tuple[float, float, float]
+
+
+def velocity_ratios(log_rate: float, p: Numbers) -> Ratios:
+    """ln(V/V_*), V_0/V, and the fraction V/(V + V_0) that slip has in slip and load point
+    displacement together.
+
+    Where slip is much slower than the load point, ln V is that of stationary contact: evolution per
+    unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
+    factors would underflow and overflow.
+    """
+    x = max(log_rate, p[LOG_LOAD_RATE] - STATIONARY)
+    slower = math.exp(p[LOG_LOAD_RATE] - x)
+    return x, slower, 1.0 / (1.0 + slower)
+
+
+def duration(ratios: Ratios, p: Numbers) -> float:
+    """Time over slip and load point displacement together, ``1/(V + V_0)``."""
+    x, slower, fraction = ratios
+    if p[LOAD_VELOCITY] > 0.0:
+        return slower * fraction / p[LOAD_VELOCITY]
+    return math.exp(-max(x, SLOWEST))
+
+
+def path_metric(slant: float) -> float:
+    """Displacement along a path that is so steep: its square may overflow where slip stops."""
+    if abs(slant) > STEEP:
+        return 1.0 / abs(slant)
+    return 1.0 / math.sqrt(1.0 + slant * slant)
+
+
+# ---- rates between ruptures ----------------------------------------------------------------------
+
+
+def against_displacement(made: Friction, balance: Function, *, reverses: bool) -> Function:
+    """``(state, p) -> (df/ds, dPsi/ds, velocity ratios)``.
+
+    Where slip may reverse, it then loads the spring, and displacement is its magnitude plus that of
+    the load point: ``df/ds = K (V_0 + V)/(V + V_0)``.
+    """
+    evolutions, end = made.evolutions, 1 + made.states
+
+    def forward(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
+        psis = state[1:end]
+        log_rate, _g, shift = balance(state[0], psis, p)
+        ratios = velocity_ratios(log_rate, p)
+        x, slower, fraction = ratios
+        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        return loading, evolutions(x, psis, shift, fraction, p), ratios
+
+    def either_way(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
+        loading, changes, ratios = forward(state, p)
+        if p[MU_STAR] + state[0] < 0.0:
+            loading += 2.0 * p[STIFFNESS] * ratios[2]
+        return loading, changes, ratios
+
+    return either_way if reverses else forward
+
+
+def rates_between_ruptures(
+    made: Friction, against: Function
+) -> tuple[Function, Function, Function]:
+    """``(state, p) -> tuple``: derivatives of f and the states against displacement, along the
+    path, and along the path with time as a passenger.
+    """
+    state_sum, times = made.state_sum, scaled(made.states)
+
+    def by_displacement(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = against(state, p)
+        return (loading, *changes)
+
+    def along_path(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = against(state, p)
+        along = path_metric((loading - state_sum(changes)) / (UNITS * p[A]))
+        return (along * loading, *times(changes, along))
+
+    def along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, ratios = against(state, p)
+        along = path_metric((loading - state_sum(changes)) / (UNITS * p[A]))
+        return (along * loading, *times(changes, along), along * duration(ratios, p))
+
+    return by_displacement, along_path, along_path_with_time
+
+
+# ---- rates in ruptures, and of a rigid slider ----------------------------------------------------
+
+
+def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, Function]:
+    """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first,
+    along the path in inertial time and ln V, and the same with inertial time as a passenger.
+    """
+    end = 2 + made.states
+    times = scaled(end)
+
+    def along_path(state: Numbers, p: Numbers) -> Numbers:
+        by = rupture_rate(state, p)
+        scaled_by: Numbers = times(by, path_metric(by[1] / UNITS))
+        return scaled_by
+
+    def along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+        by = rupture_rate(state[:end], p)
+        along = path_metric(by[1] / UNITS)
+        return (*times(by, along), along)
+
+    return along_path, along_path_with_time
+
+
+def rate_of_rigid(made: Friction) -> Function:
+    """``(state, p) -> tuple``: derivatives of g and the states but the first, against slip at the
+    ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi``.
+    """
+    strength, states_at = made.strength, made.states_at
+    evolutions, contribution = made.evolutions, made.contribution
+
+    def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
+        others = state[1:]
+        value, slope, shift, _shift_slope = strength(state[0], others, p)
+        changes = evolutions(p[-1], states_at(value, p[-1], others, p), shift, 1.0, p)
+        return (contribution(changes, state[0], others, p) / slope, *changes[1:])
+
+    return rigid_rate
+
+
+# ---- points --------------------------------------------------------------------------------------
+
+
+def reading_of(made: Friction) -> Function:
+    """The friction coefficient ``(mu_* + f)/s`` that a rig reads, s outside the fault, and its
+    derivative, where f, g and the states change so.
+    """
+    stress, pressure = made.outer_stress, made.outer_pressure
+
+    def reading(
+        spring: float,
+        spring_change: float,
+        g: float,
+        g_change: float,
+        psis: Numbers,
+        changes: Numbers,
+        p: Numbers,
+    ) -> tuple[float, float]:
+        excess, slope = stress(g, psis, p)
+        ratio, ratio_change = 1.0 + excess, slope * g_change - pressure(changes)
+        read = (p[MU_STAR] + spring) / ratio
+        return read, (spring_change - read * ratio_change) / ratio
+
+    return reading
+
+
+def point_of(made: Friction) -> Function:
+    """The point at x = ln(V/V_*), with its growth, f, g, the states, and what a rig reads."""
+    strength, effective_stress = made.strength, made.effective_stress
+    steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
+
+    def point_at(
+        x: float,
+        growth: float,
+        spring: float,
+        g: float,
+        psis: Numbers,
+        reading: tuple[float, float],
+        p: Numbers,
+    ) -> Point:
+        _value, _slope, shift, _shift_slope = strength(g, psis, p)
+        ratio = 1.0 + effective_stress(g, psis, p)[0]
+        steady = steady_states(x, shift, p)
+        psi, distance = state_sum(psis), 0.0
+        for i in range(count):
+            distance = max(distance, abs(psis[i] - steady[i]))
+        return Point(
+            x,
+            growth,
+            spring,
+            g,
+            psis,
+            psi,
+            psi - shift,
+            psi - state_sum(steady),
+            distance,
+            (p[MU_STAR] + g) / ratio,
+            ratio,
+            reading[0],
+            reading[1],
+        )
+
+    return point_at
+
+
+def point_between_ruptures(
+    made: Friction, balance: Function, growth: Function, reading: Function, point_at: Function
+) -> Function:
+    """``(state, rates, p) -> Point`` between ruptures, where ``a dx = strength'(g) dg -
+    contribution`` says how g changes.
+    """
+    strength, contribution, end = made.strength, made.contribution, 1 + made.states
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+        unknowns, changes = state[:end], rates[1:end]
+        spring, psis = unknowns[0], unknowns[1:]
+        x, g, _shift = balance(spring, psis, p)
+        x_change = growth(unknowns, rates[:end], x, g, p)
+        slope = strength(g, psis, p)[1]
+        g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
+        read = reading(spring, rates[0], g, g_change, psis, changes, p)
+        now: Point = point_at(x, x_change, spring, g, psis, read, p)
+        return now
+
+    return point
+
+
+def point_in_rupture(made: Friction, reading: Function, point_at: Function) -> Function:
+    """``(state, rates, p) -> Point`` of the full equations."""
+    strength, states_at, end = made.strength, made.states_at, 2 + made.states
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+        spring, x, g, others = state[0], state[1], state[2], state[3:end]
+        psis = states_at(strength(g, others, p)[0], x, others, p)
+        read = reading(spring, rates[0], g, rates[2], psis, rates[:end], p)
+        now: Point = point_at(x, rates[1], spring, g, psis, read, p)
+        return now
+
+    return point
+
+
+def point_of_rigid(made: Friction, reading: Function, point_at: Function) -> Function:
+    """``(state, rates, p) -> Point`` of a rigid slider, whose f is g."""
+    strength, states_at = made.strength, made.states_at
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+        g, others, x = state[0], state[1:], p[-1]
+        psis = states_at(strength(g, others, p)[0], x, others, p)
+        read = reading(g, rates[0], g, rates[0], psis, rates, p)
+        now: Point = point_at(x, 0.0, g, g, psis, read, p)
+        return now
+
+    return point
+
+
+# ---- all of it -----------------------------------------------------------------------------------
+
+
+class InRupture(NamedTuple):
+    """The full equations of a scene with mass.
+
+    Attributes
+    ----------
+    against_time, rate, rate_with_time : callable
+        ``(state, p)``: derivatives of the unknowns against inertial time, along the path, and so
+        with time as a passenger.
+    point : callable
+        ``(state, derivatives, p) -> Point``.
+    """
+
+    against_time: Function
+    rate: Function
+    rate_with_time: Function
+    point: Function
+
+
+class System(NamedTuple):
+    """The functions of a scene.
+
+    Attributes
+    ----------
+    friction : Friction
+        What they are made of.
+    balance : callable
+        ``(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress, between
+        ruptures.
+    by_displacement, rate, rate_with_time : callable
+        ``(state, p)``: derivatives of the unknowns between ruptures, against displacement, along
+        the path, and so with time as a passenger.
+    point : callable
+        ``(state, derivatives, p) -> Point``, between ruptures.
+    rigid_rate, rigid_point : callable
+        The same of a rigid slider, against slip.
+    in_rupture : InRupture or None
+        The same where mass acts.
+    """
+
+    friction: Friction
+    balance: Function
+    by_displacement: Function
+    rate: Function
+    rate_with_time: Function
+    point: Function
+    rigid_rate: Function
+    rigid_point: Function
+    in_rupture: InRupture | None
+
+
+@cache
+def system_of(
+    parts: friction.Parts,
+    slip_rate: Callable[[Friction], tuple[Function, Function]],
+    rupture_rate: Callable[[Friction], Function] | None,
+) -> System:
+    """The functions of a combination of parts; the same ones whenever it is asked for."""
+    made = friction_of(parts)
+    balance, growth = slip_rate(made)
+    against = against_displacement(made, balance, reverses=parts.regularised)
+    by_displacement, rate, rate_with_time = rates_between_ruptures(made, against)
+    reading, point_at = reading_of(made), point_of(made)
+    full = None
+    if rupture_rate is not None:
+        by_time = rupture_rate(made)
+        along = rates_in_rupture(made, by_time)
+        full = InRupture(by_time, *along, point_in_rupture(made, reading, point_at))
+    return System(
+        made,
+        balance,
+        by_displacement,
+        rate,
+        rate_with_time,
+        point_between_ruptures(made, balance, growth, reading, point_at),
+        rate_of_rigid(made),
+        point_of_rigid(made, reading, point_at),
+        full,
+    )
+
+
+def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
+    """The functions of a scene, with other dynamics than its own where some are given."""
+    law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressing
+    of_shear_stress = friction.stress_dependence if law.stress_dependence else None
+    effects = stress.state_effect, law.state_effect, of_shear_stress
+    acting = scene.dynamics if dynamics is None else dynamics
+    parts = friction.Parts(
+        states=law.states,
+        evolution=law.evolution,
+        evolutions=law.evolutions,
+        resting=law.resting,
+        state_effects=tuple(effect for effect in effects if effect is not None),
+        regularised=law.regularised,
+        normal_stress=stress.normal_stress,
+        unknowns=len(source.unknowns),
+        seepage=source.seepage,
+        seeped=source.seeped,
+        inside=source is scene.parts.fluid,
+    )
+    return system_of(parts, acting.slip_rate, acting.rupture_rate)
