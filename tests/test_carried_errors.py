@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, named_results
+from running import command, ended, named_results
 
 from rsfstudy.files import store
 from rsfstudy.files.side_by_side import side_by_side
@@ -206,10 +206,11 @@ def test_slopes_that_differ_within_their_errors_agree(boundary):
     assert side_by_side(dataset, far).beyond_errors == ["zeta"]
 
 
-def test_the_table_of_slopes_shows_them(boundary, tmp_path, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
+def test_the_table_of_slopes_shows_them(boundary, tmp_path):
+    """In a process of its own, whose terminal is wide enough."""
     dataset, _path = boundary
     store.write(dataset, tmp_path / "it.nc")
-    said = call("show", tmp_path / "it.nc").stdout
+    code, said, _errors = ended(command("show", str(tmp_path / "it.nc")))
+    assert code == 0
     assert "numerical error" in said
     assert f" {float(dataset.zeta_error[0, 0]):.2g} " in said

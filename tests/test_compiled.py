@@ -72,6 +72,9 @@ def forget_examples() -> None:
         for name, part in list(slot.own.items()):
             if part.__module__.startswith("example_"):
                 del slot.own[name]
+    for name, stepper in list(engines._OWN.items()):
+        if stepper.__module__.startswith("example_"):
+            del engines._OWN[name]
 
 
 @pytest.fixture(autouse=True, scope="module")

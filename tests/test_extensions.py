@@ -469,7 +469,7 @@ def test_numbers_that_are_read_in_the_place_of_others_are_refused(source):
     inside = made(name="base_elsewhere", resting=read)
     with pytest.raises(InvalidValue, match="reads its numbers at OWN = 0"):
         Scene(law=made(inside, name="derived_elsewhere"))
-    there = made(name="there", evolution=staticmethod(by_its_own(source, OWN=places.LAW)))
+    there = made(name="placed", evolution=staticmethod(by_its_own(source, OWN=places.LAW)))
     theirs, ours = (LinearStability()(Scene(law=law), Accuracy(1e-6)) for law in ("slip", there))
     assert ours.values == theirs.values
 

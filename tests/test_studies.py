@@ -59,6 +59,7 @@ WIDE = {
     "laws_cycles L10": "the paper says a whole multiple",
     "linear_stability C1": "truncation of differences, which is not the same at every place",
     "normal_stress_steps R5": "a fifth of the first order; the second nearly vanishes in some",
+    "normal_stress_steps R6": "one bound of second order for all steps and both laws",
     "rigid_response C5": "the paper prints one decimal",
     "slide_hold_slide P1": "the accuracy asked for, of a",
     "slide_hold_slide P2": "one bound for every stiffness; what is left out falls with it",

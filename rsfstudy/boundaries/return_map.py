@@ -40,6 +40,9 @@ _WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 _TURNING = 16
 #: How far off a cycle is looked for, over how far ln V swings, and most steps to it.
 _NEAR, _TRIES = 0.1, 12
+#: How nearly its events must close a cycle, in the accuracy asked for: what they do not is
+#: corrected to first order.
+_CLOSED = 0.3
 #: How many guesses there are at a cycle of one event, and how far off the first may be.
 _GUESSES, _AWAY = 3, 0.3
 
@@ -308,7 +311,7 @@ class ReturnMap:
         """The cycle of as many events as derivatives are known of, within reach of a section; None
         where there is none. By Newton's method with Broyden's corrections.
         """
-        at, enough, last = start, self.accuracy.rtol * scale, math.inf
+        at, enough, last = start, _CLOSED * self.accuracy.rtol * scale, math.inf
         jacobian = product(slopes) - np.eye(len(start))
         move = np.zeros(len(start))
         for _ in range(_TRIES):
