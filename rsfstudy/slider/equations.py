@@ -28,11 +28,6 @@ LONGEST_STEP = 1e9
 LONGEST_STRIDE, FEW = 3.0, 10.0
 
 
-def any_step(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
-    """Steps of a rigid slider, whose motion has no turns."""
-    return LONGEST_STEP
-
-
 def stride(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
     """Longest step of a form whose clock is length along the path."""
     stationary = max(1.0, (log_load_rate - log_rate) / FEW)
@@ -57,9 +52,6 @@ class Equations:
         ``point(state, derivatives, p) -> Point``.
     p : tuple of float
         The numbers of the scene.
-    longest : callable
-        ``longest(log_rate, normal_stress, log_load_rate)``: longest step of the clock, beyond which
-        an integrator's estimate of its local error cannot be trusted.
     states : int
         How many states the scene has.
     balance : callable or None
@@ -73,7 +65,6 @@ class Equations:
     rate: Function
     point: Function
     p: Numbers
-    longest: Callable[[float, float, float], float] = any_step
     states: int = 1
     balance: Function | None = None
 
@@ -131,7 +122,7 @@ def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
         unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms.rate_with_time
     point, balance = forms.point, forms.balance
     p, count = scene.numbers, scene.states
-    return Equations(dynamics.regime, unknowns, scales, rate, point, p, stride, count, balance)
+    return Equations(dynamics.regime, unknowns, scales, rate, point, p, count, balance)
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -152,7 +143,7 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     if clock:
         unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), full.rate_with_time
     p, states = scene.numbers, scene.states
-    return Equations(IN_RUPTURE, unknowns, scales, rate, full.point, p, stride, states)
+    return Equations(IN_RUPTURE, unknowns, scales, rate, full.point, p, states)
 
 
 def _full(scene: Scene) -> InRupture:
