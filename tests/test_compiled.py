@@ -6,6 +6,7 @@ import importlib.util
 import itertools
 import math
 import os
+import subprocess
 import sys
 import types
 from dataclasses import dataclass, replace
@@ -474,6 +475,24 @@ def compiled_programs(function=doubled) -> int:
     (address,) = building.called_by_address([function])
     assert address
     return compiling.programs - before
+
+
+def test_other_processes_find_equations_again(tmp_path):
+    """Closures too, by which Numba's own cache would find none."""
+    asks = (
+        "from rsfstudy import Scene\n"
+        "from rsfstudy.motion.compiled.machine import addresses\n"
+        "from rsfstudy.motion.engines import compiling\n"
+        "from rsfstudy.slider.equations import between_ruptures\n"
+        "addresses(between_ruptures(Scene(normal_stress='constant'), clock=False))\n"
+        "print(compiling.programs)\n"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    told = [
+        subprocess.check_output([sys.executable, "-c", asks], env=environment, text=True)
+        for _ in range(2)
+    ]
+    assert [int(text) for text in told] == [1, 0]
 
 
 def test_what_is_compiled_is_found_again(empty_cache):

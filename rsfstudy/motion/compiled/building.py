@@ -31,6 +31,9 @@ import llvmlite.binding
 import numba
 import numpy as np
 from numba.core import config
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
 from rsfstudy.motion.compiled.calls import IN_PLACE
 from rsfstudy.motion.engines import compiling
@@ -47,7 +50,7 @@ _OPTIONS: Mapping[str, Any] = {
 }
 _POINTERS = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
 #: Changes where what is kept is laid out or named in another way.
-_LAYOUT = 3
+_LAYOUT = 4
 #: Compiled functions whose addresses are in use.
 _ALIVE: list[Any] = []
 _log = logging.getLogger(__name__)
@@ -139,12 +142,29 @@ def called_by_address(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...
     """Addresses of compiled functions of pointers to numbers."""
 
     def compile_for(entry: str) -> list[Any]:
-        roots = (_reaching(function, entry) for function in functions)
-        return [numba.cfunc(_POINTERS, cache=bool(entry), **_OPTIONS)(root) for root in roots]
+        return [_addressed(_reaching(function, entry), kept=bool(entry)) for function in functions]
 
     pointers = _kept(digest_of(_POINTERS, *functions), compile_for)
     _ALIVE.append(pointers)
     return tuple(pointer.address for pointer in pointers)
+
+
+class _ByContent(FunctionCache):  # type: ignore[misc]
+    """Numba's cache of a function that is named by its content: by what a closure holds Numba would
+    find none again, because compiled functions are others in each process.
+    """
+
+    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        return signature, codegen.magic_tuple()
+
+
+def _addressed(function: Any, *, kept: bool) -> Any:
+    """A compiled function of pointers to numbers, kept in the cache or not."""
+    compiled = CFunc(function, normalize_signature(_POINTERS), locals={}, options=dict(_OPTIONS))
+    if kept:
+        compiled._cache = _ByContent(function)  # type: ignore[attr-defined]
+    compiled.compile()
+    return compiled
 
 
 def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
