@@ -184,7 +184,7 @@ def through_regime(motion, space, last, samples, events, rows, limits):
             return HALTED
         leaves, over = cut_short(motion, space, limits)
         if motion.begins:
-            record_begin(motion, space, rows, limits)
+            record_begin(motion, space, rows)
             if report_beginning(motion, space, last, events, limits):
                 return ENDED
         complete = motion.records and record(motion, space, rows, samples, over, limits)

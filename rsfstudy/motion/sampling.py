@@ -18,7 +18,7 @@ from rsfstudy.motion.recording import PLACE, REGIME, SAMPLES, STATES
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
 
 
-def record_begin(motion, space, rows, limits):
+def record_begin(motion, space, rows):
     """Record where a regime begins."""
     if motion.records == WITHIN_STEPS:
         record_point(motion, rows, motion.clock, motion.started, space.before, space.p)

@@ -250,8 +250,3 @@ def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndar
     places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (on > 0.0))
     places = places[np.argsort(on[places])]
     return np.log(on[places]), np.log(values[places]), places
-
-
-def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    order = np.argsort(x)
-    return x[order], y[order]
