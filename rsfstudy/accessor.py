@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from rsfstudy import plots
     from rsfstudy.declare.study import Study
-    from rsfstudy.slider.parts import Part
     from rsfstudy.slider.scene import Scene
 
 _FOREIGN = (
@@ -212,16 +211,16 @@ def _cell_of(dataset: xr.Dataset, study: Study) -> int:
 def _scene_of(dataset: xr.Dataset) -> Scene:
     """The scene that the attributes of a dataset describe."""
     from rsfstudy.files import contents
-    from rsfstudy.slider.fields import SLOTS, named
     from rsfstudy.slider.protocol import Protocol, protocol
+    from rsfstudy.slider.registry import SLOTS, Own, name_of
 
     plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
-    own: dict[str, type[Part]] = {name: part for slot in SLOTS for name, part in slot.own.items()}
+    own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
     # protocols of one name differ: the segments tell which it was
-    if segments and issubclass(own.get(loading, Protocol), Protocol):
+    if segments and (loading not in own or isinstance(own[loading], Protocol)):
         rebuilt = protocol(segments, loading)
-        own[named("loading", rebuilt)] = rebuilt
+        own[name_of("loading", rebuilt)] = rebuilt
     for slot in SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.choices, *own}:

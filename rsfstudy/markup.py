@@ -11,6 +11,8 @@ from typing import Any
 
 from rsfstudy.quantity import Quantity
 
+#: Of a table of quantities.
+HEADINGS = ("field", "symbol", "value", "unit", "meaning")
 _FUNCTIONS = ("ln", "log", "exp")
 _RAISED = {"_": "sub", "^": "sup"}
 _CELL = 'style="text-align: left; vertical-align: top"'
@@ -38,6 +40,27 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[object]], caption: st
     lines = ("".join(f"<td {_CELL}>{_cell(value)}</td>" for value in row) for row in rows)
     body = "".join(f"<tr>{line}</tr>" for line in lines)
     return Markup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+
+
+def quantities_table(rows: Iterable[tuple[Quantity, object]], caption: str = "") -> Markup:
+    """A table of quantities with their values."""
+    return table(HEADINGS, (described(about, value) for about, value in rows), caption)
+
+
+def described(about: Quantity, value: object) -> tuple[object, ...]:
+    """The row of a quantity, under `HEADINGS`."""
+    return about.name, symbol(about.symbol), value, unit(about), about.long_name
+
+
+class ShownAsTable:
+    """What a notebook shows as a table of quantities."""
+
+    def shown(self) -> Iterable[tuple[Quantity, object]]:
+        """The quantities, with their values."""
+        raise TypeError(f"{type(self).__name__} shows no quantities")
+
+    def _repr_html_(self) -> str:
+        return quantities_table(self.shown(), type(self).__name__)
 
 
 def folded(caption: str, content: Markup) -> Markup:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.fields import QUANTITIES as SCENE
+from rsfstudy.slider.registry import QUANTITIES as SCENE
 
 _QUANTITIES = (
     # the scene

@@ -24,7 +24,7 @@ from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.registry import FIELDS
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(

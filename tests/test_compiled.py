@@ -38,11 +38,11 @@ from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.equations import between_ruptures, rigid
-from rsfstudy.slider.fields import SLOTS
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import Part, is_flag
 from rsfstudy.slider.places import LAW
+from rsfstudy.slider.registry import SLOTS
 from rsfstudy.status import Status
 
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}

@@ -27,7 +27,7 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots import lines
 from rsfstudy.plots._phase_plane import scene_of
-from rsfstudy.slider import fields, laws, places
+from rsfstudy.slider import laws, places, registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.loading.step import Step
@@ -281,7 +281,7 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
 
 
 def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, monkeypatch):
-    for slot in fields.SLOTS:
+    for slot in registry.SLOTS:
         monkeypatch.setitem(vars(slot), "own", {})
     dataset = rsfstudy.open(outside["saturating_law"].file)
     assert dataset.attrs["id"] == "saturating_laws"
@@ -370,9 +370,9 @@ class Unvaried(NormalStress):
 def test_a_scene_of_ones_own_parts():
     scene = Scene(law=Doubled, factor=3, normal_stress=Unvaried, dynamics=Sticky, loading=Steplike)
     values = scene.as_dict()
-    assert tuple(values)[: len(fields.FIELDS)] == fields.FIELDS
+    assert tuple(values)[: len(registry.FIELDS)] == registry.FIELDS
     own = {"factor": 3.0, "is_odd": False, "dynamics": "sticky", "grip": 1.0, "loading": "steplike"}
-    assert {name: values[name] for name in tuple(values)[len(fields.FIELDS) :]} == own
+    assert {name: values[name] for name in tuple(values)[len(registry.FIELDS) :]} == own
     assert (scene.law, scene.normal_stress, scene.alpha) == ("doubled", "unvaried", None)
     assert Scene(**values) == scene  # by the names, which are known now
     for again in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene),
@@ -382,7 +382,7 @@ def test_a_scene_of_ones_own_parts():
     assert scene.with_(grip=2.0).grip == 2.0
     plain = scene.with_(law="slip", normal_stress="variable", dynamics=None, loading=None)
     assert plain == Scene()
-    assert tuple(plain.as_dict()) == fields.FIELDS
+    assert tuple(plain.as_dict()) == registry.FIELDS
     assert Scene(law=SlipLaw) == Scene()
 
 
@@ -573,10 +573,10 @@ def test_built_in_scenes_are_what_they_were():
     """Whatever is known in this process."""
     Scene(law=Doubled, dynamics=Sticky)
     scene = Scene(alpha=0.3)
-    assert tuple(scene.as_dict()) == fields.FIELDS
+    assert tuple(scene.as_dict()) == registry.FIELDS
     assert pickle.loads(pickle.dumps(scene)) == scene
     study = Study(name="n", title="t", base=scene, axes=[Axis("phi", [60])], measure=Held())
-    assert set(study.describe()["base"]) == set(fields.FIELDS)
+    assert set(study.describe()["base"]) == set(registry.FIELDS)
 
 
 # ---- figures ------------------------------------------------------------------------------------

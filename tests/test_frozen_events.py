@@ -13,7 +13,7 @@ from telling import Told, apart, told
 from rsfstudy import Scene
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind
-from rsfstudy.slider.fields import SLOTS
+from rsfstudy.slider.registry import SLOTS
 
 #: What numbers may differ by, relative to what `telling.apart` says. Last bits are another CPU's
 #: own (its exponentials, the order of its sums, whether it fuses multiplication and addition): by

@@ -17,8 +17,8 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots._motion import picture
-from rsfstudy.slider.fields import QUANTITIES
 from rsfstudy.slider.loading import Segment
+from rsfstudy.slider.registry import QUANTITIES
 
 SIGMA, D_C, V = 5e6, 1e-5, 1e-6
 RIG = Laboratory(
@@ -260,7 +260,7 @@ def test_a_protocol_from_a_file(tmp_path):
     read = read_protocol(path, RIG, "steps_and_hold")
     assert read.name == "steps_and_hold"
     steps = [(10.0, 0.0, 3.0), (1.0, 0.0, 30.0), (0.0, 0.0, 60.0), (1.0, 0.0, math.inf)]
-    assert np.array(read.history) == pytest.approx(
+    assert np.array(read.segments) == pytest.approx(
         np.array([(*step, 0.0) for step in steps]), rel=1e-12
     )
     assert read.lasts == pytest.approx(113.0)

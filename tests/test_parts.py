@@ -13,7 +13,7 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import fields, laws, stability, steady
+from rsfstudy.slider import laws, registry, stability, steady
 from rsfstudy.slider.equations import evolution_of, relation_of
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.laws.slowness import SlownessLaw
@@ -140,8 +140,8 @@ def test_numbers_stand_where_their_parts_look_for_them():
 
 def test_a_part_owns_its_fields():
     """Each is described once, by the part; and refused, in its words, where it has no meaning."""
-    described = {quantity.name for quantity in fields.QUANTITIES}
-    assert described == set(fields.FIELDS)
+    described = {quantity.name for quantity in registry.QUANTITIES}
+    assert described == set(registry.FIELDS)
     with pytest.raises(InvalidValue, match="has no meaning while normal stress is constant"):
         Scene(normal_stress="constant", phi=60.0)
     with pytest.raises(InvalidValue, match="stands in for mass, and this scene has mass"):

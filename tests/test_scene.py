@@ -14,8 +14,8 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import laws, synonyms
-from rsfstudy.slider.fields import FIELDS
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.registry import FIELDS
 
 WRONG = [
     ({"law": "slipp"}, r"law = 'slipp'.*Did you mean 'slip'.*slowness"),
@@ -166,7 +166,7 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
 def test_copies_share_a_critical_stiffness_only_where_friction_is_the_same(changes):
     scene = Scene(normal_stress="variable", stiffness_ratio=0.8)
     assert scene.critical_stiffness > 0.0
-    (copy,) = scene.varied(tuple(changes), [tuple(changes.values())])
+    copy = scene.with_numbers(changes)
     anew = Scene(**{"normal_stress": "variable", "stiffness_ratio": 0.8, **changes})
     assert copy.critical_stiffness == anew.critical_stiffness
     assert copy.stiffness == anew.stiffness

@@ -29,8 +29,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import compiling
-from rsfstudy.slider import fields
-from rsfstudy.slider.parts import Part
+from rsfstudy.slider import registry
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -77,7 +76,7 @@ class Task:
     accuracy: Accuracy
     time_limit: float = TIME_LIMIT
     code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
-    parts: tuple[type[Part], ...] = ()
+    parts: tuple[registry.Own, ...] = ()
     steppers: tuple[type, ...] = ()
     own_code: str = "none"
     home: str = _HERE
@@ -165,9 +164,9 @@ def _received(sent: bytes) -> Task:
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
                 "mix. Give the workers the same versions"
             )
-    classes = type(task.measure), *task.parts, *task.steppers
-    if own_code.digest(*classes) != task.own_code:
-        names = " or ".join(kind.__name__ for kind in classes)
+    used = type(task.measure), *task.parts, *task.steppers
+    if own_code.digest(*used) != task.own_code:
+        names = " or ".join(one.__name__ if isinstance(one, type) else one.name for one in used)
         raise RunError(
             f"a worker has another {names}, or other code it draws on, than "
             "this run: their numbers would mix. Give the workers the same files, and start them "
@@ -210,7 +209,7 @@ def on_worker(sent: bytes, batch: bytes) -> bytes:
     if not ours:
         compiling.aside = _limits.lifted
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
-        fields.know(task.parts)
+        registry.register(task.parts)
         engines.know(task.steppers)
         for key, cell in _unpacked(batch):
             finished.append(task.layout.finished(key, *computed(task, cell)))

@@ -43,14 +43,16 @@ _MADE = {
 _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 
 
-def digest(*classes: type) -> str:
-    """Digest of classes and of all they use; "none" where all of them are part of rsfstudy."""
-    own = [kind for kind in classes if _is_own(kind.__module__)]
+def digest(*used: object) -> str:
+    """Digest of classes and of all they use, and of data such as protocols; "none" where all of
+    them are classes of rsfstudy.
+    """
+    own = [kind for kind in used if not isinstance(kind, type) or _is_own(kind.__module__)]
     if not own:
         return "none"
     sha256, walk = hashlib.sha256(), _Walk()
     for kind in own:
-        for part in walk.parts(kind, ()):
+        for part in walk.parts(kind, ()) if isinstance(kind, type) else [repr(kind)]:
             sha256.update(part.encode(errors="surrogatepass") + b"\0")
     return sha256.hexdigest()[:16]
 

@@ -92,9 +92,9 @@ class Plan:
 
     def __init__(self, study: Study) -> None:
         self.study, self.table = study, Table(study)
-        examples = dict[int, Scene]()
+        examples = dict[tuple[type, ...], Scene]()
         for block in self.table.blocks:
-            examples.setdefault(block.head.combination, block.head)
+            examples.setdefault(block.head.layout.kinds, block.head)
         self.examples = list(examples.values())
         self.keys = np.empty(study.size, dtype=_KEY)
         for start in range(0, study.size, _NAMED_AT_A_TIME):

@@ -13,7 +13,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
-from rsfstudy.slider.fields import named
+from rsfstudy.slider.registry import name_of
 
 Row = Mapping[str, Any]
 
@@ -179,7 +179,7 @@ def plain(field: str, value: Any) -> Any:
     """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
     the user's own by its name.
     """
-    value = named(field, value)
+    value = name_of(field, value)
     if isinstance(value, np.ndarray) and value.ndim:
         raise InvalidValue(field, value.tolist(), "must be one number, flag or text")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value

@@ -41,4 +41,5 @@ class Rows(NamedTuple):
         """Each cell with its scene."""
         rows = self.columns.T.tolist()
         changes = self.changes or [{}] * len(rows)
-        return map(Cell, self.head.varied(self.names, rows), changes)
+        for row, changed in zip(rows, changes, strict=True):
+            yield Cell(self.head.with_numbers(dict(zip(self.names, row, strict=True))), changed)

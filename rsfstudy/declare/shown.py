@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from rsfstudy.declare.wording import listed
-from rsfstudy.markup import Markup, folded, symbol, table, unit
-from rsfstudy.slider.shown import HEADINGS, described, fields_table
+from rsfstudy.markup import (
+    HEADINGS,
+    Markup,
+    described,
+    folded,
+    quantities_table,
+    symbol,
+    table,
+    unit,
+)
+from rsfstudy.slider import registry
 from rsfstudy.vocabulary import quantity
 
 if TYPE_CHECKING:
@@ -28,13 +37,14 @@ def study_html(study: Study) -> str:
     varied = {name for axis in study.axes for name in axis.fields}
     fixed = {name: v for name, v in study.base.as_dict().items() if name not in varied}
     known = study.quantities
+    shared = registry.shown(fixed, study.base.own_parts)
     axes = [described(quantity(a.dimension, known), _along(a)) for a in study.axes]
     measured = [quantity(name, known) for name in study.measure.variables]
     numbers = [(q.name, symbol(q.symbol), unit(q), q.long_name) for q in measured]
     cells = f"{study.name}: {study.title} ({study.size:,} cells)"
     return (
         table(HEADINGS, axes, cells)
-        + folded("what all cells share", fields_table(study.base, fixed))
+        + folded("what all cells share", quantities_table(shared))
         + folded(
             f"what {study.measure.name} gives in each",
             table([heading for heading in HEADINGS if heading != "value"], numbers),

@@ -26,18 +26,18 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
-from rsfstudy.slider.fields import (
+from rsfstudy.slider.registry import (
     CALLERS,
     FIELDS,
     SLOT_NAMES,
+    Own,
     by_class,
     fields_with,
-    named,
+    name_of,
     own_named,
     quantities_with,
     without_meaning,
 )
-from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import QUANTITIES
 
@@ -201,18 +201,18 @@ class Study:
     # ---- parts of the user's own ------------------------------------------------------------
 
     @cached_property
-    def own_parts(self) -> Mapping[str, type[Part]]:
+    def own_parts(self) -> Mapping[str, Own]:
         """Parts of the slider that are the user's own, by name, as they were when the study was
         declared.
         """
-        parts: dict[str, type[Part]] = {}
+        parts: dict[str, Own] = {}
         for axis in self.axes:
             parts |= own_named(axis.fields, axis.rows)
         parts |= {part.name: part for part in self.base.own_parts}
         return dict(sorted(parts.items()))
 
     @cached_property
-    def own_classes(self) -> tuple[type, ...]:
+    def own_classes(self) -> tuple[type | Own, ...]:
         """The measure, and parts and stepper that are the user's own: what own code starts at."""
         return type(self.measure), *self.own_parts.values(), *own_stepper(self.accuracy.engine)
 
@@ -396,7 +396,7 @@ def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:
 def _by_name(overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Overrides with parts of the user's own by their names."""
     return {
-        name: [named(name, v) for v in value] if is_list(value) else named(name, value)
+        name: [name_of(name, v) for v in value] if is_list(value) else name_of(name, value)
         for name, value in overrides.items()
     }
 

@@ -1,8 +1,8 @@
 """The cells of a study as columns of numbers: blocks of cells whose scenes differ in numbers only.
 
 What an axis sets decides with which parts a scene is made; most of its rows differ in nothing but a
-number. So the values along each axis are checked once, and no scene is made of a cell before it is
-computed.
+number. A block has one scene, of which those of its cells are made: once to be checked, and again
+where the cell is computed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from rsfstudy.declare.axis import Row, kinds
 from rsfstudy.declare.cell import Rows
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import checked
 from rsfstudy.slider.scene import Scene
 
 
@@ -96,49 +95,35 @@ class Table:
 
     # ---- checking -------------------------------------------------------------------------------
 
-    def _add(self, rows: tuple[np.ndarray, ...]) -> list[int]:
-        """Add the block of the cells with these rows; the numbers of the first that are no
-        meaningful scenes.
+    def _add(self, rows: tuple[np.ndarray, ...]) -> Iterator[int]:
+        """Add the block of the cells with these rows; the number of the first that is no meaningful
+        scene, if there is one.
         """
-        first = [int(along[0]) for along in rows]
-        number = self._number(first)
+        first = self._number([int(along[0]) for along in rows])
         try:
-            head = self.study.scene(number)
+            head = self.study.scene(first)
         except InvalidValue:
-            return [number]
+            yield first
+            return
         block = Block(rows, head, self._varying(head, rows))
         self.blocks.append(block)
-        wrong = [
-            self._number([*first[:place], row, *first[place + 1 :]])
-            for name in block.names
-            for place in [self._places[name]]
-            for row in rows[place].tolist()
-            if not _is_right(head, name, float(self._columns[name][row]))
-        ]
-        return wrong or self._at_odds(block, first)
+        places = sorted({self._places[name] for name in block.names})
+        for along in itertools.product(*(rows[place].tolist() for place in places)):
+            at = dict(zip(places, along, strict=True))
+            row = (float(self._columns[name][at[self._places[name]]]) for name in block.names)
+            try:
+                head.with_numbers(dict(zip(block.names, row, strict=True)))
+            except InvalidValue:
+                yield self._number([at.get(p, int(along[0])) for p, along in enumerate(rows)])
+                return
 
     def _varying(self, head: Scene, rows: tuple[np.ndarray, ...]) -> tuple[str, ...]:
         """The fields of the block's scenes that hold numbers of their own."""
         return tuple(
             name
             for name, place in self._places.items()
-            if head.owner(name) and not np.isnan(self._columns[name][rows[place][0]])
+            if name in head.layout.places and not np.isnan(self._columns[name][rows[place][0]])
         )
-
-    def _at_odds(self, block: Block, first: Sequence[int]) -> list[int]:
-        """The cells that a part refuses: of each part, the first."""
-        found = []
-        for part in {type(part): part for part in block.head.every_part}.values():
-            read = part.checked_by()
-            names = tuple(n for n in block.names if read is None or n in read)
-            axes = sorted({self._places[name] for name in names})
-            for rows in itertools.product(*(block.rows[place].tolist() for place in axes)):
-                at = dict(zip(axes, rows, strict=True))
-                values = [float(self._columns[n][at[self._places[n]]]) for n in names]
-                if not _goes_together(block.head, names, values, type(part)):
-                    found.append(self._number([at.get(p, f) for p, f in enumerate(first)]))
-                    break
-        return found
 
     def _number(self, rows: Sequence[int]) -> int:
         return int(np.ravel_multi_index(tuple(rows), self.study.shape))
@@ -188,26 +173,3 @@ class Table:
     def ordered(self, numbers: np.ndarray) -> np.ndarray:
         """The same cells, block after block."""
         return np.concatenate([numbers[at] for at, _block, _rows in self.split(numbers)])
-
-
-def _is_right(head: Scene, name: str, value: float) -> bool:
-    owner = head.owner(name)
-    assert owner is not None
-    try:
-        checked(owner, name, value)
-    except InvalidValue:
-        return False
-    return True
-
-
-def _goes_together(
-    head: Scene, names: tuple[str, ...], values: Sequence[float], kind: type
-) -> bool:
-    try:
-        (scene,) = head.varied(names, [values])
-        for part in scene.every_part:
-            if type(part) is kind:
-                part.check(scene)
-    except InvalidValue:
-        return False
-    return True

@@ -20,8 +20,9 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fluid
-from rsfstudy.slider.fields import SLOTS, by_class, kinds_with
-from rsfstudy.slider.parts import Part, names_of
+from rsfstudy.slider.parts import names_of
+from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.registry import SLOTS, Own, by_class, kinds_with
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -168,7 +169,7 @@ def declaration(dataset: xr.Dataset) -> Declaration:
 
 def scene(
     plain: PlainScene,
-    own: Mapping[str, type[Part]] = MappingProxyType({}),
+    own: Mapping[str, Own] = MappingProxyType({}),
     path: str = "declaration.base",
 ) -> Scene:
     """A scene; by default the one that all cells share.
@@ -187,7 +188,7 @@ def scene(
     DataError
         Where the fields make no scene, naming the first that does not.
     """
-    parts = [part for part in by_class(plain, own).values() if isinstance(part, type)]
+    parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Protocol)]
     kinds = kinds_with(parts)
     values = _fitted({**_OLDER, **plain}, kinds, path)
     for name in plain:

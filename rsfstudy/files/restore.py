@@ -33,8 +33,7 @@ from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
-from rsfstudy.slider.fields import SLOTS, by_class
-from rsfstudy.slider.parts import Part
+from rsfstudy.slider.registry import SLOTS, Own, by_class
 from rsfstudy.status import Status
 
 
@@ -132,7 +131,7 @@ def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> 
         raise refused("declaration", f"makes no study ({error})") from error
 
 
-def _own_parts(study: Study | None) -> Mapping[str, type[Part]]:
+def _own_parts(study: Study | None) -> Mapping[str, Own]:
     """Parts that a user wrote, by name: those of the study, and all others defined in the files
     that were loaded with it.
     """
@@ -140,7 +139,7 @@ def _own_parts(study: Study | None) -> Mapping[str, type[Part]]:
     return {} if study is None else {**others, **study.own_parts}
 
 
-def _axis(described: PlainAxis, own: Mapping[str, type[Part]]) -> Axis:
+def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
     dimension, values = described["dimension"], described["values"]
     if isinstance(values, Mapping):
         return Axis(dimension, {label: by_class(row, own) for label, row in values.items()})

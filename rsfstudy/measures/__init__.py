@@ -28,7 +28,7 @@ from rsfstudy.motion.accuracy import (
 )
 from rsfstudy.motion.stepping import Halt, Meter, more_work
 from rsfstudy.quantity import Output, Quantity, is_name
-from rsfstudy.slider.fields import FIELDS
+from rsfstudy.slider.registry import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED

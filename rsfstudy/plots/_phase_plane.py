@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.slider.fields import kinds_with, own_named, without_meaning
+from rsfstudy.slider.registry import kinds_with, own_named, without_meaning
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess, stress_at
 from rsfstudy.vocabulary import quantity

@@ -12,7 +12,7 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
-from rsfstudy.slider.fields import FIELDS, KINDS, SLOT_NAMES, without_meaning
+from rsfstudy.slider.registry import FIELDS, KINDS, SLOT_NAMES, without_meaning
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status

@@ -15,9 +15,9 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.scales import Scale, rate_of, scaled, scales
 from rsfstudy.rig.units import factor, in_si
-from rsfstudy.slider.fields import QUANTITIES
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
+from rsfstudy.slider.registry import QUANTITIES
 from rsfstudy.slider.scene import Scene
 
 #: What a laboratory may state: SI units, and the range that is usual; beyond it, it warns.
@@ -129,7 +129,7 @@ class Laboratory:
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
-    ) -> type[Protocol]:
+    ) -> Protocol:
         """A loading history whose segments state quantities: see `rsfstudy.protocol`."""
         if isinstance(segments, list | tuple):
             segments = [self._segment(n, s) for n, s in enumerate(segments, start=1)]

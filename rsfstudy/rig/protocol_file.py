@@ -23,7 +23,7 @@ _EXAMPLE = "velocity (um/s), distance (um)"
 
 def read_protocol(
     path: str | Path, laboratory: Laboratory | None = None, name: str = "protocol"
-) -> type[Protocol]:
+) -> Protocol:
     """A loading history from a CSV file.
 
     Its first line names the columns and their units, as in ``velocity (um/s), duration (s)``: a

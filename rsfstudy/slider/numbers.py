@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Part, number, reads
+from rsfstudy.slider.parts import Part, number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -57,7 +57,6 @@ class Slider(Part):
 
     name = "slider"
 
-    @reads("initial_stress", "initial_state", "mu_star")
     def check(self, scene: Scene) -> None:
         """Stress and a state to begin with."""
         if self.initial_stress <= -self.mu_star:

@@ -18,7 +18,7 @@ from rsfstudy.slider import places
 from rsfstudy.slider.parts import Part, has_meaning
 
 if TYPE_CHECKING:
-    from rsfstudy.slider.fields import Slot
+    from rsfstudy.slider.registry import Slot
 
 
 def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, type[Part]]) -> None:
@@ -36,7 +36,7 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
         The parts of rsfstudy, by the fields of a scene that they own.
     """
     _check_kind(slot, part)
-    _check_name(slot, part, slots)
+    check_name(slot, part, slots)
     taken = {*_of_every_scene(), *(slot.name for slot in slots)}
     for stated in fields(part):
         _check_field(slot, part, stated.name, owners)
@@ -97,7 +97,7 @@ def _is_filled(cell: CellType) -> bool:
 def _check_kind(slot: Slot, part: Any) -> None:
     base = f"{slot.base.__module__}.{slot.base.__name__}"
     if not isinstance(part, type) or not issubclass(part, slot.base):
-        is_part = isinstance(part, type) and issubclass(part, Part)
+        is_part = isinstance(part, Part) or (isinstance(part, type) and issubclass(part, Part))
         rule = "fills another slot" if is_part else "is no part of a slider"
         raise InvalidValue(slot.name, part, rule, remedy=f"Derive a class from {base}.")
     params = vars(part).get("__dataclass_params__")
@@ -106,9 +106,10 @@ def _check_kind(slot: Slot, part: Any) -> None:
         raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
 
 
-def _check_name(slot: Slot, part: type[Part], slots: Iterable[Slot]) -> None:
+def check_name(slot: Slot, part: type[Part] | Part, slots: Iterable[Slot]) -> None:
+    """Raise InvalidValue for a name that no part may have, or that something else has."""
     name: object = getattr(part, "name", None)
-    remedy = f'Write name = "..." in {part.__qualname__}.'
+    remedy = f'Write name = "..." in {origin(part)[1]}.'
     if not isinstance(name, str) or not is_name(name):
         rule = f"must be named by a Python identifier, not {name!r}"
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
@@ -121,9 +122,10 @@ def _check_name(slot: Slot, part: type[Part], slots: Iterable[Slot]) -> None:
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def origin(part: type[Part]) -> tuple[str, str]:
+def origin(part: type[Part] | Part) -> tuple[str, str]:
     """Where a part is defined: what it has in common with an earlier definition of it."""
-    return part.__module__, part.__qualname__
+    kind = part if isinstance(part, type) else type(part)
+    return kind.__module__, kind.__qualname__
 
 
 def _of_every_scene() -> set[str]:

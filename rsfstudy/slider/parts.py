@@ -13,7 +13,7 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -26,21 +26,6 @@ if TYPE_CHECKING:
 #: A function of floats, the last argument being the numbers of a scene.
 Function = Callable[..., Any]
 Numbers = tuple[float, ...]
-
-
-Check = Callable[[Any, "Scene"], None]
-
-
-def reads(*names: str) -> Callable[[Check], Check]:
-    """State the fields of a scene that a part's check draws on; a lattice is then checked along
-    those, and not cell by cell.
-    """
-
-    def stated(check: Check) -> Check:
-        check.reads = frozenset(names)  # type: ignore[attr-defined]
-        return check
-
-    return stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +51,6 @@ class Part:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])
 
-    @classmethod
-    def what_it_is(cls) -> object:
-        """What parts of a user's own that are the same have in common, and no others."""
-        return cls
-
     def numbers(self, scene: Scene) -> Numbers:
         """What the functions of the part read from the place of its slot on, such as ``p[LAW]``.
 
@@ -78,7 +58,6 @@ class Part:
         """
         return ()
 
-    @reads()
     def check(self, scene: Scene) -> None:
         """Raise InvalidValue where its values do not go with one another or with the scene."""
 
@@ -91,13 +70,6 @@ class Part:
     def functions(cls) -> tuple[str, ...]:
         """Names of the functions that the part must state."""
         return ()
-
-    @classmethod
-    def checked_by(cls) -> frozenset[str] | None:
-        """Fields of a scene that decide whether the part goes with it; None where any may."""
-        if hasattr(cls, "__post_init__"):
-            return None
-        return getattr(cls.check, "reads", None)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
@@ -149,9 +121,9 @@ def is_flag(part: type[Part], name: str) -> bool:
 
 
 def names_of(part: type[Part]) -> tuple[str, ...]:
-    """Names of the fields of a part."""
+    """Names of the fields that a part brings to a scene: those made by `number` or `flag`."""
     if part not in _NAMES:
-        _NAMES[part] = tuple(f.name for f in fields(part))
+        _NAMES[part] = tuple(f.name for f in fields(part) if "about" in f.metadata)
     return _NAMES[part]
 
 
@@ -160,7 +132,8 @@ _NAMES: dict[type[Part], tuple[str, ...]] = {}
 
 def quantities_of(part: type[Part]) -> list[Quantity]:
     """What the fields of a part mean."""
-    return [Quantity(f.name, **f.metadata["about"]) for f in fields(part)]
+    stated = (part.__dataclass_fields__[name] for name in names_of(part))
+    return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 
 
 def checked(part: type[Part], name: str, value: Any) -> Any:
@@ -193,22 +166,6 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
     if not RULES[rule](plain):
         raise InvalidValue(name, plain, rule, remedy=remedy)
     return plain
-
-
-def copier(part: Part) -> Callable[[Mapping[str, Any]], Part]:
-    """What makes copies of a part with other values, which must have been checked."""
-    kind = type(part)
-    if hasattr(kind, "__post_init__"):
-        return lambda values: replace(part, **values)
-    kept = {name: part.__dict__[name] for name in names_of(kind)}
-
-    def copy(values: Mapping[str, Any]) -> Part:
-        made: Part = object.__new__(kind)
-        made.__dict__.update(kept)
-        made.__dict__.update(values)
-        return made
-
-    return copy
 
 
 def found_in(package: str, path: Iterable[str]) -> dict[str, type[Part]]:

@@ -46,11 +46,11 @@ def numbers_of_friction(scene: Scene) -> Numbers:
 
 
 def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate: float) -> Numbers:
-    parts, law = scene.parts, scene.parts.law
-    size = scene.b if law.states == 1 else scene.a * law.size_over_a
+    parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
+    size = scene.b if law.states == 1 else slider.a * law.size_over_a
     of_load = load_velocity, log_load_rate
     of_stress = law.stress_dependence, scene.imposed_normal_stress
-    common = scene.a, size, scene.mu_star, stiffness, *of_load, *of_stress
+    common = slider.a, size, slider.mu_star, stiffness, *of_load, *of_stress
     own = (
         *_filled_up(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
         *_filled_up(scene.pressing, scene, DYNAMICS - FLUID),

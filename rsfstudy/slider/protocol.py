@@ -1,17 +1,16 @@
 """A loading history of a user's own, from a list of segments.
 
-The class that `protocol` makes is a part of the user's own, as any other is: its name stands for it
-in results, and its segments count for what decided the numbers.
+Its name stands for it in results, and its segments count for what decided the numbers.
 """
 
 from __future__ import annotations
 
-import copyreg
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
@@ -21,43 +20,38 @@ from rsfstudy.slider.loading import Loading, Segment
 KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
-class _Kind(type):
-    """The type of protocols, which are pickled by their segments."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class Protocol(Loading, metaclass=_Kind):
-    """Base of the protocols."""
+class Protocol(Loading):
+    """A loading history as it was stated.
 
-    name = "protocol"
-    history: ClassVar[tuple[Segment, ...]] = ()
-    #: How long in D_c/V_* the last segment was stated to last, and all of those that say so; after
-    #: that the last velocity goes on.
-    last: ClassVar[float] = math.inf
-    lasts: ClassVar[float] = 0.0
+    Attributes
+    ----------
+    name : str
+        What stands for it in results.
+    history : tuple of Segment
+        Its segments; the last may say how long it lasts.
+    """
 
-    @property
-    def segments(self) -> tuple[Segment, ...]:
-        """As they were stated, the last without end."""
-        return self.history
+    name: str  # type: ignore[misc]  # of each, and not of the class
+    history: tuple[Segment, ...]
 
     @property
     def stated(self) -> tuple[Segment, ...]:
-        """As they were stated."""
-        return *self.history[:-1], self.history[-1]._replace(duration=self.last)
+        return self.history
 
-    @classmethod
-    def what_it_is(cls) -> object:
-        """Its name and segments."""
-        if cls.__module__ != _NOWHERE:
-            return cls
-        return cls.name, cls.history, cls.lasts
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """As they were stated, the last without end."""
+        return *self.history[:-1], self.history[-1]._replace(duration=math.inf)
+
+    @property
+    def lasts(self) -> float:
+        """How long in D_c/V_* the segments last that say so."""
+        return math.fsum(s.duration for s in self.history if s.duration < math.inf)
 
 
-def protocol(
-    segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol"
-) -> type[Protocol]:
-    """A loading history, as a part of your own: ``Scene(loading=protocol([...]))``.
+def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol") -> Protocol:
+    """A loading history of your own: ``Scene(loading=protocol([...]))``.
 
     Parameters
     ----------
@@ -95,33 +89,7 @@ def protocol(
             raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).at(
                 f"segment {number}"
             )
-    return _made(name, tuple(history))
-
-
-def _made(name: str, stated: tuple[Segment, ...]) -> type[Protocol]:
-    members = {
-        "name": name,
-        "history": (*stated[:-1], stated[-1]._replace(duration=math.inf)),
-        "last": stated[-1].duration,
-        "lasts": math.fsum(s.duration for s in stated if s.duration < math.inf),
-        # no module has it, so that it is sent to workers as it is, and its segments are looked at
-        "__module__": _NOWHERE,
-    }
-    return dataclass(frozen=True, kw_only=True)(type(name, (Protocol,), members))
-
-
-def _reduced(kind: type[Protocol]) -> str | tuple[Any, ...]:
-    if kind.__module__ != _NOWHERE:
-        return kind.__qualname__
-    return _made, (kind.name, kind().stated)
-
-
-# a class has no `__reduce__` that pickle would ask
-copyreg.pickle(_Kind, _reduced)  # type: ignore[arg-type]
-
-
-#: The module of protocols, which is none.
-_NOWHERE = "protocols_of_the_user"
+    return Protocol(name=name, history=tuple(history))
 
 
 def _segment(stated: Any, normal_stress: float, place: str) -> Segment:

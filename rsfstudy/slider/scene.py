@@ -1,33 +1,45 @@
-"""The Scene: which slider. Five parts and the numbers every slider has, checked when made."""
+"""The Scene: which slider. The numbers that every slider has and what fills its five slots,
+checked when made.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import FrozenInstanceError
-from functools import cached_property, partial
-from typing import Any, Never, NoReturn
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import loading, places, stability, system
-from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.fields import (
-    SLOT_NAMES,
-    SLOTS,
-    Layout,
-    chosen,
-    layout_of,
-    refuse_unless_idle,
-    unknown_field,
-    unnamed,
-    without_meaning,
+from rsfstudy.markup import ShownAsTable
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider import (
+    dynamics,
+    fluid,
+    laws,
+    loading,
+    normal_stress,
+    places,
+    registry,
+    stability,
+    system,
 )
-from rsfstudy.slider.following import Following, Parts
+from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.numbers import SPRING, with_spring
-from rsfstudy.slider.parts import Numbers, Part, checked, copier
+from rsfstudy.slider.numbers import SPRING, Slider
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.registry import Layout, Own, Parts
+
+#: Critical stiffnesses that are kept: studies come back to those along their other axes.
+_KEPT = 4096
+#: Attributes of a scene that only its equations and its lattice ask for.
+_INNER = frozenset(
+    {"layout", "made", "functions", "numbers", "numbers_of_friction", "under", "shown"}
+)
 
 
-class Scene(Following):
+@dataclass(frozen=True, init=False, repr=False)
+class Scene(ShownAsTable):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -124,7 +136,8 @@ class Scene(Following):
     Attributes
     ----------
     parts : Parts
-        What fills the slots: ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and ``loading``.
+        What it is made of: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
+        ``loading``; each field is that of one of them.
 
     Raises
     ------
@@ -132,112 +145,117 @@ class Scene(Following):
         For a value that is wrong or means nothing, with the rule it breaks and the remedy.
     """
 
-    _slider: Part
-    _layout: Layout
-    #: What scenes share that differ in the spring and the loading alone.
-    _known_of_friction: dict[str, float]
+    parts: Parts
 
-    def __init__(self, *nameless: Never, **given: Any) -> None:
-        if nameless:
-            raise unnamed(nameless[0])
-        layout = layout_of(tuple(chosen(slot, given) for slot in SLOTS))
-        own: tuple[dict[str, Any], ...] = tuple({} for _part in layout.parts)
-        for name, value in given.items():
-            if name not in layout.fields and name not in SLOT_NAMES:
-                raise unknown_field(name, value, layout)
-            if value is None or name in SLOT_NAMES:
-                continue
-            place = layout.places.get(name)
-            if place is None:
-                refuse_unless_idle(name, value, layout.refusing[name])
-            else:
-                own[place][name] = checked(layout.parts[place], name, value)
-        own[0].update(with_spring(own[0]))
-        made = [part(**values) for part, values in zip(layout.parts, own, strict=True)]
-        self._fill(layout, made)
-
-    def _fill(self, layout: Layout, made: Sequence[Part]) -> None:
-        """Take the fields from the parts, and let the parts say whether they go together."""
-        slider, *parts = made
-        self.__dict__.update(layout.elsewhere, _layout=layout, _slider=slider)
-        self.__dict__["_known_of_friction"] = {}
-        self.__dict__["parts"] = Parts(*parts)  # type: ignore[arg-type]
-        for part in (slider, *parts):
-            self.__dict__.update(part.__dict__)
-        self._check()
-
-    def _check(self) -> None:
-        """The law last: it may ask what all of friction makes of steady sliding."""
-        for part in reversed(self.every_part):
+    def __init__(self, parts: Parts | None = None, /, **given: Any) -> None:
+        if parts is None:
+            parts = registry.parts_of(given)
+        elif not isinstance(parts, Parts):
+            raise registry.unnamed(parts)
+        object.__setattr__(self, "parts", parts)
+        # the law last: it may ask what all of friction makes of steady sliding
+        for part in (*parts[:1], *reversed(parts[2:]), parts.law):
             part.check(self)
 
-    def __setattr__(self, name: str, value: Any) -> NoReturn:
-        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+    if TYPE_CHECKING:
+        a: float
+        mu_star: float
+        period: float
+        reference_rate: float
+        instability_norm: float
+        initial_stress: float
+        initial_state: float
 
-    def __delattr__(self, name: str) -> NoReturn:
-        raise FrozenInstanceError(f"cannot delete field {name!r}")
+    def __getattr__(self, name: str) -> Any:
+        """A field, which is that of a part, or of none in this scene."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        layout = self.layout
+        if name in layout.places:
+            return getattr(self.parts[layout.places[name]], name)
+        if name in layout.named:
+            return getattr(self.parts, name).name
+        if name in layout.idle:
+            return layout.idle[name]
+        raise AttributeError(f"a Scene has no field or attribute {name!r}")
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and self._what_it_is() == other._what_it_is()
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
-    def __hash__(self) -> int:
-        return hash(self._what_it_is())
-
-    def _what_it_is(self) -> tuple[object, ...]:
-        """Its fields, and its parts of the user's own: a name may stand for several."""
-        return *self.as_dict().values(), *(part.what_it_is() for part in self.own_parts)
+    def __dir__(self) -> list[str]:
+        """What users ask for; a field without meaning in this scene is left out."""
+        # what is not stated may follow from other fields
+        stated = {name for name, value in self.as_dict().items() if value is not None}
+        names = {*super().__dir__(), *stated} - _INNER
+        return sorted(name for name in names if not name.startswith("_"))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(Scene, **{**self.as_dict(), **self._layout.own}), ()
+        return Scene, (self.parts,)
+
+    # ---- its fields -----------------------------------------------------------------------------
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Where its fields are."""
+        return registry.layout_of(tuple(map(type, self.parts[1:])))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields as plain Python values."""
+        values = dict(self.layout.idle)
+        for name in self.layout.named:
+            values[name] = getattr(self.parts, name).name
+        for part in self.parts:
+            values |= vars(part)
+        return {name: values[name] for name in self.layout.fields}
+
+    def describe(self) -> dict[str, Any]:
+        """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
+        stated = self.parts.loading.stated if "loading" in self.layout.named else ()
+        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
 
     @property
-    def every_part(self) -> tuple[Part, ...]:
-        """The law, the numbers that every slider has, and the other parts."""
-        return self.parts.law, self._slider, *self.parts[1:]
+    def own_parts(self) -> tuple[Own, ...]:
+        """Those of its parts that are the user's own."""
+        return tuple(registry.own_parts(self.parts).values())
+
+    def shown(self) -> Iterator[tuple[Quantity, object]]:
+        """The fields that mean something in it, with their values."""
+        return registry.shown(self.as_dict(), self.own_parts)
+
+    # ---- other scenes ---------------------------------------------------------------------------
+
+    def with_(self, **changes: Any) -> Scene:
+        """A copy with some fields changed, checked anew.
+
+        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
+        the place of its ratio, and the other way round.
+        """
+        if all(n in self.layout.plain and value is not None for n, value in changes.items()):
+            return self.with_numbers(changes)
+        own = registry.own_parts(self.parts)
+        kept = {**self.as_dict(), **own}
+        for name in registry.without_meaning({**kept, **changes}, own.values()):
+            kept.pop(name, None)
+        if any(changes.get(name) is not None for name in SPRING):
+            kept |= dict.fromkeys(SPRING)
+        return Scene(**kept | changes)
+
+    def with_numbers(self, changes: Mapping[str, Any]) -> Scene:
+        """A copy with other numbers in fields of the parts it has, checked anew."""
+        return Scene(registry.with_numbers(self.parts, changes))
 
     def without_mass(self) -> Scene:
         """The same slider in quasi-static motion, if it has mass."""
-        if not self.has_mass:
-            return self
-        return self._with_parts(self.parts._replace(dynamics=QuasiStatic()))
+        return Scene(self.parts._replace(dynamics=QuasiStatic())) if self.has_mass else self
 
-    @cached_property
-    def critical_stiffness(self) -> float:
-        """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
-        (see `stability.critical_stiffness`).
-        """
-        known = self._known_of_friction
-        if "critical_stiffness" not in known:
-            unloaded = self.parts._replace(loading=Step())
-            before = self._with_parts(unloaded) if self._is_changed else self
-            found = stability.critical_stiffness(before, 0.0, quasi_static=True)
-            known["critical_stiffness"] = found
-        return known["critical_stiffness"]
-
-    @property
-    def _is_changed(self) -> bool:
-        """Whether friction is another than before the loading."""
-        return self.imposed_normal_stress != 0.0 or bool(self.parts.loading.unknowns)
-
-    @cached_property
-    def made(self) -> dict[tuple[Any, ...], Any]:
-        """What others make of it once and for all."""
-        return {}
-
-    @cached_property
-    def numbers(self) -> Numbers:
-        """All numbers, as the functions of the equations read them (see `places`)."""
-        return places.numbers(self)
-
-    @cached_property
-    def numbers_of_friction(self) -> Numbers:
-        """The same for functions that friction alone decides."""
-        return places.numbers_of_friction(self)
-
-    @cached_property
-    def functions(self) -> system.System:
-        """The functions of the equations, by name (see `system`)."""
-        return system.functions(self)
+    def under(self, segment: loading.Segment) -> Scene:
+        """The same slider, loaded by one segment."""
+        step = Step(
+            load_velocity_ratio=segment.load_velocity,
+            displacement_step=segment.displacement,
+            normal_stress_step=segment.normal_stress,
+        )
+        return Scene(self.parts._replace(loading=step))
 
     @property
     def unforced(self) -> Scene:
@@ -259,118 +277,152 @@ class Scene(Following):
             acting[0] = self
         return tuple((scene, s.duration) for scene, s in zip(acting, history, strict=True))
 
-    def under(self, segment: loading.Segment) -> Scene:
-        """The same slider, loaded by one segment."""
-        step = Step(
-            load_velocity_ratio=segment.load_velocity,
-            displacement_step=segment.displacement,
-            normal_stress_step=segment.normal_stress,
-        )
-        scene = self._with_parts(self.parts._replace(loading=step))
-        scene.__dict__["_known_of_friction"] = self._known_of_friction
-        if not self.parts.loading.unknowns:
-            scene.__dict__["functions"] = self.functions
-        return scene
+    # ---- its equations --------------------------------------------------------------------------
 
-    def _with_parts(self, parts: Parts) -> Scene:
-        """A copy with other parts in the slots."""
-        scene = Scene.__new__(Scene)
-        scene._fill(layout_of(tuple(type(part) for part in parts)), [self._slider, *parts])
-        return scene
+    @cached_property
+    def made(self) -> dict[tuple[Any, ...], Any]:
+        """What others make of it once and for all."""
+        return {}
 
-    def with_(self, **changes: Any) -> Scene:
-        """A copy with some fields changed, checked anew.
+    @cached_property
+    def numbers(self) -> Numbers:
+        """All numbers, as the functions of the equations read them (see `places`)."""
+        return places.numbers(self)
 
-        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
-        the place of its ratio, and the other way round.
-        """
-        plain = self._layout.plain
-        if all(name in plain and value is not None for name, value in changes.items()):
-            return self._with_numbers(changes)
-        kept = {**self.as_dict(), **self._layout.own}
-        for name in without_meaning({**kept, **changes}, self._layout.own.values()):
-            kept.pop(name, None)
-        if any(changes.get(name) is not None for name in SPRING):
-            kept |= dict.fromkeys(SPRING)
-        return Scene(**kept | changes)
+    @cached_property
+    def numbers_of_friction(self) -> Numbers:
+        """The same for functions that friction alone decides."""
+        return places.numbers_of_friction(self)
 
-    def _with_numbers(self, changes: Mapping[str, Any]) -> Scene:
-        """A copy with the same parts, of which those that change are made and checked anew."""
-        layout, values = self._layout, list[Any]()
-        for name, value in changes.items():
-            place = layout.places.get(name)
-            if place is None:
-                raise layout.refusing[name].refuse(name, value)
-            values.append(checked(layout.parts[place], name, value))
-        (scene,) = self.varied(tuple(changes), [values])
-        scene._check()
-        return scene
+    @cached_property
+    def functions(self) -> system.System:
+        """The functions of the equations, by name (see `system`)."""
+        return system.functions(self)
 
-    def varied(self, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Scene]:
-        """Copies with other numbers in fields of its parts, which must have been checked.
-
-        Parameters
-        ----------
-        names : sequence of str
-            The fields, each one of a part that this scene has.
-        rows : iterable of sequence of float
-            Their values in each copy.
-        """
-        kept, copiers = self._copying(tuple(names))
-        parts = self._slider, *self.parts
-        others = {name for name in names if self._layout.places[name] != len(parts) - 1}
-        if not others and "functions" in self.__dict__:
-            kept = {**kept, "functions": self.functions}
-        known = self._known_of_friction if others <= {*SPRING} else None
-        for row in rows:
-            scene, made = Scene.__new__(Scene), list(parts)
-            scene.__dict__.update(kept, _known_of_friction={} if known is None else known)
-            for place, copy, own in copiers:
-                made[place] = copy({name: row[i] for name, i in own})
-                scene.__dict__.update(made[place].__dict__)
-            scene.__dict__["_slider"], scene.__dict__["parts"] = made[0], Parts._make(made[1:])
-            yield scene
-
-    def _copying(self, names: tuple[str, ...]) -> tuple[dict[str, Any], list[tuple[Any, ...]]]:
-        """What copies with other numbers in these fields share; and where the parts are that have
-        them, what copies those, and which of the fields they have. Found once.
-        """
-        key = "copying", *names
-        if key not in self.made:
-            layout, parts = self._layout, (self._slider, *self.parts)
-            kept = {**layout.elsewhere, "_layout": layout, "_slider": self._slider}
-            copiers = []
-            for place, part in enumerate(parts):
-                kept |= part.__dict__
-                own = [(name, i) for i, name in enumerate(names) if layout.places[name] == place]
-                copiers += [(place, copier(part), own)] if own else []
-            self.made[key] = kept, copiers
-        found: tuple[dict[str, Any], list[tuple[Any, ...]]] = self.made[key]
-        return found
-
-    def as_dict(self) -> dict[str, Any]:
-        """The fields as plain Python values."""
-        return {name: self.__dict__[name] for name in self._layout.fields}
-
-    def describe(self) -> dict[str, Any]:
-        """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
-        stated = self.parts.loading.stated if "loading" in self._layout.own else ()
-        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
-
-    def owner(self, name: str) -> type[Part] | None:
-        """The kind of its part that owns a field, if one does."""
-        place = self._layout.places.get(name)
-        return None if place is None else self._layout.parts[place]
+    # ---- what follows from its fields -----------------------------------------------------------
 
     @property
-    def combination(self) -> int:
-        """Number of its combination of parts, in this process."""
-        return id(self._layout)
+    def dynamics(self) -> dynamics.Dynamics:
+        """What balances the spring besides friction."""
+        return self.parts.dynamics
 
     @property
-    def own_parts(self) -> tuple[type[Part], ...]:
-        """Those of its parts that are the user's own."""
-        return tuple(self._layout.own.values())
+    def pressing(self) -> fluid.Fluid | loading.Loading:
+        """What has the unknowns of which the last takes from normal stress, if any has."""
+        return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
+
+    @property
+    def has_mass(self) -> bool:
+        """Whether mass acts in ruptures."""
+        return self.parts.dynamics.rupture_rate is not None
+
+    @property
+    def states(self) -> int:
+        """How many states there are: those of the law, and the unknowns of the fluid, or of a
+        loading that goes on changing normal stress.
+        """
+        return self.parts.law.states + len(self.pressing.unknowns)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that act in this scene."""
+        return tuple(effect for part in self.parts for effect in part.effects)
+
+    @property
+    def b(self) -> float:
+        """Evolution effect parameter, of all states together."""
+        return float(self.parts.slider.a * self.parts.law.b_over_a)
+
+    @property
+    def stiffness(self) -> float:
+        """K = k D_c/sigma_*."""
+        given = self.parts.slider.stiffness
+        return float(given) if given is not None else self._relative_stiffness
+
+    @cached_property
+    def _relative_stiffness(self) -> float:
+        ratio = self.parts.slider.stiffness_ratio
+        assert ratio is not None  # one of the two is given
+        if not 0.0 < self.critical_stiffness < math.inf:
+            rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
+            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
+        return float(ratio * self.critical_stiffness)
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough. One below 1
+        need not be unstable with several states, which may be so between two stiffnesses only.
+        """
+        given = self.parts.slider.stiffness_ratio
+        if given is not None:
+            return float(given)
+        return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
+
+    @cached_property
+    def load_velocity(self) -> float:
+        """V_0/V_* after the last step."""
+        return self.parts.loading.segments[-1].load_velocity
+
+    @cached_property
+    def log_load_rate(self) -> float:
+        """ln(V_0/V_*), and -inf for a load point at rest."""
+        return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
+
+    @cached_property
+    def imposed_normal_stress(self) -> float:
+        """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
+        return self.parts.loading.segments[-1].normal_stress
+
+    @property
+    def spring_stress_step(self) -> float:
+        """Change of spring stress over sigma_* by the first displacement step, K d."""
+        return self.stiffness * self.parts.loading.segments[0].displacement
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether it does anything but slide on steadily at V_*."""
+        return self.begins_elsewhere or self.parts.loading.is_a_step
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether it begins with other stress or state than those of steady sliding at V_*."""
+        return bool(self.initial_stress or self.initial_state)
+
+    @cached_property
+    def inertial_time(self) -> float:
+        """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
+
+        Slip rate in V_* times this number is what the instability norm is compared with.
+        """
+        slider = self.parts.slider
+        return slider.period * slider.reference_rate / (2.0 * math.pi)
+
+    @property
+    def log_norm_rate(self) -> float:
+        """ln(V/V_*) at which the instability norm is reached."""
+        return math.log(self.instability_norm / self.inertial_time)
+
+    @property
+    def critical_stiffness(self) -> float:
+        """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
+        (see `stability.critical_stiffness`).
+        """
+        slider, law, stress, pores, *_others = self.parts
+        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
+
+
+@lru_cache(_KEPT)
+def _critical_stiffness(
+    a: float,
+    mu_star: float,
+    law: laws.LawOfStates,
+    stress: normal_stress.NormalStress,
+    pores: fluid.Fluid,
+) -> float:
+    """That of any slider with this friction: of one whose spring is as stiff as a."""
+    slider = Slider(a=a, mu_star=mu_star, stiffness=a)
+    scene = Scene(Parts(slider, law, stress, pores, QuasiStatic(), Step()))
+    return stability.critical_stiffness(scene, 0.0, quasi_static=True)
 
 
 def check_scene(value: object) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Function, Numbers, Part, flag, found_in, number, reads
+from rsfstudy.slider.parts import Function, Numbers, Part, flag, found_in, number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -24,13 +24,6 @@ if TYPE_CHECKING:
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
 #: motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
-
-
-#: Fields of a scene that decide whether the effects of a law go with it.
-OF_EFFECTS = (
-    *("stress_dependence", "normal_stress", "fluid", "normal_stress_step"),
-    *("regularised", "dynamics", "inertia", "radiation_damping"),
-)
 
 
 def exp_less_one(exponent: float) -> float:
@@ -122,7 +115,6 @@ class LawOfStates(Part):
         named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
         return tuple(name for name, acts in named.items() if acts)
 
-    @reads(*OF_EFFECTS)
     def check(self, scene: Scene) -> None:
         """Normal stress of which the integral of ``dtau/sigma`` is known, and motion that may
         reverse, where that matters.
@@ -172,12 +164,6 @@ class Law(LawOfStates):
         """What b/a must exceed for steady friction to fall with slip rate at V_*."""
         return 1.0
 
-    @classmethod
-    def checked_by(cls) -> frozenset[str] | None:
-        """Anything may decide how states rest that do so in their own way."""
-        return super().checked_by() if cls.resting is None else None
-
-    @reads("b_over_a", "stiffness", *OF_EFFECTS)
     def check(self, scene: Scene) -> None:
         """A critical stiffness, where the spring is given by its ratio to it; rate weakening is
         enough.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
@@ -80,8 +80,6 @@ class Oscillation(Loading):
     seepage = staticmethod(seepage)
     seeped = staticmethod(seeped)
 
-    @reads("oscillation_amplitude", "oscillation_period", "fluid", "inertia", "period",
-           "reference_rate")  # fmt: skip
     def check(self, scene: Scene) -> None:
         """Normal stress that stays positive, slow enough where there is no mass, and is not that of
         a fluid too.

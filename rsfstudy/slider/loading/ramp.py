@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
@@ -72,7 +72,6 @@ class Ramp(Loading):
     seepage = staticmethod(seepage)
     seeped = staticmethod(seeped)
 
-    @reads("fluid")
     def check(self, scene: Scene) -> None:
         """No fluid that changes normal stress too."""
         refuse_fluid(scene, "normal_stress_ramp", self.normal_stress_ramp)

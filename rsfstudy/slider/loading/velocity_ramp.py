@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import number, reads
+from rsfstudy.slider.parts import number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -53,7 +53,6 @@ class VelocityRamp(Loading):
     name = "velocity_ramp"
     called_by = "velocity_ramp"
 
-    @reads("velocity_ramp_stairs")
     def check(self, scene: Scene) -> None:
         """A whole number of stairs."""
         if self.velocity_ramp_stairs % 1.0 or self.velocity_ramp_stairs > _MOST_STAIRS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import number, reads
+from rsfstudy.slider.parts import number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -54,7 +54,6 @@ class VelocitySteps(Loading):
     name = "velocity_steps"
     called_by = "velocity_steps"
 
-    @reads("velocity_steps")
     def check(self, scene: Scene) -> None:
         """A whole number of steps."""
         if self.velocity_steps % 1.0 or self.velocity_steps > _MOST_STEPS:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import reads
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -20,7 +19,6 @@ class Constant(NormalStress):
     name = "constant"
     coupling = (0.0, 0.0)
 
-    @reads("normal_stress_step", "oscillation_amplitude", "normal_stress_ramp")
     def check(self, scene: Scene) -> None:
         """Nothing that changes it."""
         if scene.parts.loading.imposes:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
-from rsfstudy.slider.parts import Numbers, number, reads
+from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
 
 if TYPE_CHECKING:
@@ -72,7 +72,6 @@ class Variable(StateEffect):
     def weakest(self, scene: Scene) -> float:
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
-    @reads("phi", "mu_star")
     def check(self, scene: Scene) -> None:
         """An angle at which normal stress varies, and sigma_3 is positive."""
         if self.phi >= 90.0:
