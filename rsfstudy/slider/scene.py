@@ -14,6 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.markup import ShownAsTable
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import (
+    assembly,
     dynamics,
     fluid,
     laws,
@@ -24,11 +25,12 @@ from rsfstudy.slider import (
     stability,
     system,
 )
+from rsfstudy.slider.assembly import Layout, Parts
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import SPRING, Slider
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.registry import Layout, Own, Parts
+from rsfstudy.slider.registry import Own
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
 _KEPT = 4096
@@ -149,9 +151,9 @@ class Scene(ShownAsTable):
 
     def __init__(self, parts: Parts | None = None, /, **given: Any) -> None:
         if parts is None:
-            parts = registry.parts_of(given)
+            parts = assembly.parts_of(given)
         elif not isinstance(parts, Parts):
-            raise registry.unnamed(parts)
+            raise assembly.unnamed(parts)
         object.__setattr__(self, "parts", parts)
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*parts[:1], *reversed(parts[2:]), parts.law):
@@ -197,7 +199,7 @@ class Scene(ShownAsTable):
     @cached_property
     def layout(self) -> Layout:
         """Where its fields are."""
-        return registry.layout_of(tuple(map(type, self.parts[1:])))
+        return assembly.layout_of(tuple(map(type, self.parts[1:])))
 
     def as_dict(self) -> dict[str, Any]:
         """The fields as plain Python values."""
@@ -216,7 +218,7 @@ class Scene(ShownAsTable):
     @property
     def own_parts(self) -> tuple[Own, ...]:
         """Those of its parts that are the user's own."""
-        return tuple(registry.own_parts(self.parts).values())
+        return tuple(assembly.own_parts(self.parts).values())
 
     def shown(self) -> Iterator[tuple[Quantity, object]]:
         """The fields that mean something in it, with their values."""
@@ -232,7 +234,7 @@ class Scene(ShownAsTable):
         """
         if all(n in self.layout.plain and value is not None for n, value in changes.items()):
             return self.with_numbers(changes)
-        own = registry.own_parts(self.parts)
+        own = assembly.own_parts(self.parts)
         kept = {**self.as_dict(), **own}
         for name in registry.without_meaning({**kept, **changes}, own.values()):
             kept.pop(name, None)
@@ -242,7 +244,7 @@ class Scene(ShownAsTable):
 
     def with_numbers(self, changes: Mapping[str, Any]) -> Scene:
         """A copy with other numbers in fields of the parts it has, checked anew."""
-        return Scene(registry.with_numbers(self.parts, changes))
+        return Scene(assembly.with_numbers(self.parts, changes))
 
     def without_mass(self) -> Scene:
         """The same slider in quasi-static motion, if it has mass."""

@@ -1,0 +1,207 @@
+"""How fields of a scene become its parts, and where each field is among them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider.numbers import Slider, with_spring
+from rsfstudy.slider.parts import Part, checked, names_of
+from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.registry import (
+    FIELDS,
+    NAMED,
+    OWNERS,
+    PLAIN_FIELDS,
+    SLOT_FIELDS,
+    SLOT_NAMES,
+    SLOTS,
+    Own,
+    Slot,
+    fields_with,
+    kind_of,
+    resolve,
+)
+from rsfstudy.slider.synonyms import instead_of_choice, instead_of_field, instead_of_unnamed
+
+
+class Parts(NamedTuple):
+    """What a scene is made of: the numbers that every slider has, and what fills each slot."""
+
+    slider: Slider
+    law: laws.LawOfStates
+    normal_stress: normal_stress.NormalStress
+    fluid: fluid.Fluid
+    dynamics: dynamics.Dynamics
+    loading: loading.Loading
+
+
+def parts_of(given: Mapping[str, Any]) -> Parts:
+    """The parts that fields of a scene ask for, made of what they hold.
+
+    Raises
+    ------
+    InvalidValue
+        For a name that is no field, and for a value that breaks its rule or has no meaning here.
+    """
+    chosen = tuple(_chosen(slot, given) for slot in SLOTS)
+    layout = layout_of(tuple(map(kind_of, chosen)))
+    values: tuple[dict[str, Any], ...] = tuple({} for _part in layout.kinds)
+    for name, value in given.items():
+        if name not in layout.fields and name not in SLOT_NAMES:
+            raise _unknown_field(name, value, layout)
+        if value is None or name in SLOT_NAMES:
+            continue
+        place = layout.places.get(name)
+        if place is None:
+            _refuse_unless_idle(name, value, layout.refusing[name])
+        else:
+            values[place][name] = checked(layout.kinds[place], name, value)
+    made = [
+        part(**own) if isinstance(part, type) else part
+        for part, own in zip(chosen, values[1:], strict=True)
+    ]
+    return Parts(Slider(**with_spring(values[0])), *made)  # type: ignore[arg-type]
+
+
+def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
+    """The same parts, of which those that own these fields hold other numbers.
+
+    Raises
+    ------
+    InvalidValue
+        For a value that breaks its rule or has no meaning for these parts.
+    """
+    layout = layout_of(tuple(map(type, parts[1:])))
+    changed: dict[int, dict[str, Any]] = {}
+    for name, value in changes.items():
+        place = layout.places.get(name)
+        if place is None:
+            raise layout.refusing[name].refuse(name, value)
+        changed.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
+    made: list[Any] = list(parts)
+    for place, values in changed.items():
+        made[place] = replace(made[place], **values)
+    return Parts._make(made)
+
+
+def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
+    """The part that is asked for in a slot."""
+    value = given.get(slot.name)
+    if isinstance(value, type | Protocol):
+        return resolve(slot, value)
+    if isinstance(value, str) and value in slot.own and value not in slot.choices:
+        return slot.own[value]
+    if slot.name in SLOT_FIELDS:
+        name = given.get(slot.name, slot.default)
+        if not isinstance(name, str) or name not in slot.choices:
+            choices = (*slot.choices, *slot.own)
+            remedy = instead_of_choice(slot.name, name, choices)
+            raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
+        return slot.choices[name]
+    if value is not None:
+        others = ", ".join(slot.callers) or "the other fields"
+        remedy = f"Those of rsfstudy are called for by {others}."
+        raise InvalidValue(slot.name, value, "is unknown", choices=slot.own, remedy=remedy)
+    for caller, part in slot.callers.items():
+        value = given.get(caller)
+        if value is not None and checked(part, caller, value):
+            return part
+    return slot.choices[slot.default]
+
+
+class Layout(NamedTuple):
+    """Where the fields of scenes with certain parts are.
+
+    Attributes
+    ----------
+    kinds : tuple of type
+        The classes of the parts, the numbers of every slider first.
+    places : mapping of str to int
+        The place of the part that owns each field.
+    refusing : mapping of str to type
+        The part that refuses each of the others,
+    idle : mapping of str to value
+        and what those hold.
+    named : tuple of str
+        The slots whose parts are fields of the scene by their names.
+    fields : tuple of str
+        Names of all fields: those of every scene, and those of parts of the user's own.
+    plain : frozenset of str
+        Those that decide nothing but a number.
+    """
+
+    kinds: tuple[type[Part], ...]
+    places: Mapping[str, int]
+    refusing: Mapping[str, type[Part]]
+    idle: Mapping[str, Any]
+    named: tuple[str, ...]
+    fields: tuple[str, ...]
+    plain: frozenset[str]
+
+
+@cache
+def layout_of(chosen: tuple[type[Part], ...]) -> Layout:
+    """The layout of scenes with parts of these classes in the slots."""
+    kinds: tuple[type[Part], ...] = (Slider, *chosen)
+    filled = list(zip(SLOTS, chosen, strict=True))
+    owned = {slot.name: part for slot, part in filled if part not in slot.choices.values()}
+    places = {name: place for place, part in enumerate(kinds) for name in names_of(part)}
+    if len(places) < sum(len(names_of(part)) for part in kinds):
+        names = ", ".join(part.name for part in owned.values())
+        raise InvalidValue("parts", names, "have a field of one name", remedy="Rename one.")
+    refusing: dict[str, type[Part]] = {}
+    idle: dict[str, Any] = {}
+    for slot, part in filled:
+        for other in slot.choices.values():
+            for name in set(names_of(other)) - set(places):
+                refusing[name] = part
+                calls = name == other.called_by
+                idle[name] = other.__dataclass_fields__[name].default if calls else None
+    named = tuple(slot.name for slot in SLOTS if slot.name in (*SLOT_FIELDS, *owned))
+    fields = fields_with(owned.values())
+    plain = PLAIN_FIELDS | (set(fields) - {*FIELDS, *SLOT_NAMES})
+    return Layout(kinds, places, refusing, idle, named, fields, plain)
+
+
+def own_parts(parts: Parts) -> dict[str, Own]:
+    """Those of the parts that are the user's own, by slot."""
+    filled = zip(SLOTS, parts[1:], strict=True)
+    return {
+        slot.name: part if isinstance(part, Protocol) else type(part)
+        for slot, part in filled
+        if type(part) not in slot.choices.values()
+    }
+
+
+def _refuse_unless_idle(name: str, value: Any, part: type[Part]) -> None:
+    """Refuse a value for a field of another part than the one chosen, but for one that calls for
+    that part and does not call.
+    """
+    owner = OWNERS[name]
+    if name != owner.called_by or checked(owner, name, value):
+        raise part.refuse(name, value)
+
+
+def _unknown_field(name: str, value: Any, layout: Layout) -> InvalidValue:
+    """The error for a name that is no field of a scene with these parts."""
+    for slot, part in zip(SLOTS, layout.kinds[1:], strict=True):
+        known = map(kind_of, slot.own.values())
+        owner = next((other for other in known if name in names_of(other)), None)
+        if owner is not None:
+            rule = f"has no meaning for {slot.name}={part.name!r}"
+            remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
+            return InvalidValue(name, value, rule, remedy=remedy)
+    remedy, rule = instead_of_field(name), "is not a field of a scene"
+    # what looks alike would mislead where the name is known to mean something else
+    return InvalidValue("field", name, rule, choices=() if remedy else layout.fields, remedy=remedy)
+
+
+def unnamed(value: Any) -> InvalidValue:
+    """The error for a value that is given to a scene without a name."""
+    remedy = instead_of_unnamed(value, {slot.name: slot.choices for slot in NAMED})
+    return InvalidValue("Scene", value, "is given without a name", remedy=remedy)
