@@ -160,7 +160,6 @@ class Scene(ShownAsTable):
             part.check(self)
 
     if TYPE_CHECKING:
-        a: float
         mu_star: float
         period: float
         reference_rate: float
@@ -308,7 +307,7 @@ class Scene(ShownAsTable):
         """What balances the spring besides friction."""
         return self.parts.dynamics
 
-    @property
+    @cached_property
     def pressing(self) -> fluid.Fluid | loading.Loading:
         """What has the unknowns of which the last takes from normal stress, if any has."""
         return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
@@ -318,7 +317,7 @@ class Scene(ShownAsTable):
         """Whether mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
 
-    @property
+    @cached_property
     def states(self) -> int:
         """How many states there are: those of the law, and the unknowns of the fluid, or of a
         loading that goes on changing normal stress.
@@ -330,7 +329,12 @@ class Scene(ShownAsTable):
         """Names of the effects that act in this scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
-    @property
+    @cached_property
+    def a(self) -> float:
+        """Direct effect parameter."""
+        return self.parts.slider.a
+
+    @cached_property
     def b(self) -> float:
         """Evolution effect parameter, of all states together."""
         return float(self.parts.slider.a * self.parts.law.b_over_a)
@@ -404,7 +408,7 @@ class Scene(ShownAsTable):
         """ln(V/V_*) at which the instability norm is reached."""
         return math.log(self.instability_norm / self.inertial_time)
 
-    @property
+    @cached_property
     def critical_stiffness(self) -> float:
         """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
         (see `stability.critical_stiffness`).
