@@ -466,7 +466,8 @@ def test_numbers_that_are_read_in_the_place_of_others_are_refused(source):
     ) as e:
         Scene(law=made(name="elsewhere", evolution=read))
     assert "Import LAW from rsfstudy.slider.places" in str(e.value)
-    inside = made(name="base_elsewhere", resting=read)
+    inside = made(name="base_elsewhere", resting=read)  # as the steady states were called before
+    assert inside.steady_states is inside.resting
     with pytest.raises(InvalidValue, match="reads its numbers at OWN = 0"):
         Scene(law=made(inside, name="derived_elsewhere"))
     there = made(name="placed", evolution=staticmethod(by_its_own(source, OWN=places.LAW)))

@@ -509,8 +509,8 @@ class Tight(Fluid):
 
     name = "tight"
     unknowns = Dilatant.unknowns
-    seepage = staticmethod(tight)
-    seeped = staticmethod(filled)
+    auxiliary_rates = staticmethod(tight)
+    auxiliary_steady_states = staticmethod(filled)
 
     def numbers(self, scene):
         return (self.opening,)

@@ -18,7 +18,7 @@ from rsfstudy.motion.events import Kind
 from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import laws, steady
-from rsfstudy.slider.equations import evolution_of, evolutions_of, resting_of, rigid
+from rsfstudy.slider.equations import evolution_of, evolutions_of, rigid, steady_states_of
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.slider.system import functions, velocity_ratios
 
@@ -34,7 +34,7 @@ def test_every_law_rests_where_it_says(law):
     scene = Scene(law=law)
     evolutions = evolutions_of(scene)
     for log_rate in (-30.0, 0.0, 12.0):
-        steady = resting_of(scene, log_rate, 0.0)
+        steady = steady_states_of(scene, log_rate, 0.0)
         if law not in CUT_OFFS:
             assert sum(steady) == pytest.approx(-scene.b * log_rate, rel=1e-14)
         assert evolutions(log_rate, steady, 0.0) == pytest.approx([0.0] * len(steady), abs=1e-15)
@@ -158,10 +158,10 @@ def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
             log_ratio = math.log(cutoff) - log_rate
             exact = max(log_ratio, 0.0) + math.log1p(math.exp(-abs(log_ratio)))
             exact -= math.log1p(cutoff)
-            ours = resting_of(scene, log_rate, 0.0)[0] / scene.b
+            ours = steady_states_of(scene, log_rate, 0.0)[0] / scene.b
             assert ours == pytest.approx(exact, rel=1e-12, abs=1e-12)
         share = cutoff / (1.0 + cutoff)
-        tiny = resting_of(scene, 1e-9, 0.0)[0] / scene.b
+        tiny = steady_states_of(scene, 1e-9, 0.0)[0] / scene.b
         assert tiny == pytest.approx(-share * 1e-9, rel=1e-8)  # of second order: 1e-9 of it
 
 

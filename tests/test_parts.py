@@ -163,7 +163,7 @@ class HalfEffect(Variable):
 @dataclass(frozen=True, kw_only=True)
 class LeakyFault(Dilatant):
     name = "leaky"
-    seepage = staticmethod(Dilatant.seepage)
+    auxiliary_rates = staticmethod(Dilatant.auxiliary_rates)
 
 
 def test_a_part_with_equations_of_its_own_inherits_no_conclusions():

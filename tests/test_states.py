@@ -26,7 +26,7 @@ FIRST = 0.3  # share of the first state in b
 CONSTANT = {"normal_stress": "constant"}
 
 
-def resting(log_rate, shift, p):
+def steady_states(log_rate, shift, p):
     return tuple(part * (shift - p[LAW] * log_rate) for part in (FIRST, 1.0 - FIRST))
 
 
@@ -54,7 +54,7 @@ class TwoSlipStates(SlipLaw):
     states = 2
     evolution = None
     evolutions = staticmethod(two_slip_states)
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class TwoSlownessStates(SlownessLaw):
     states = 2
     evolution = None
     evolutions = staticmethod(two_slowness_states)
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
 
 
 def of_two_lengths(log_rate, psis, shift, share, p):
@@ -89,7 +89,7 @@ class TwoLengths(laws.Law):
     name = "two_lengths"
     states = 2
     evolutions = staticmethod(of_two_lengths)
-    resting = staticmethod(resting_at_two_lengths)
+    steady_states = staticmethod(resting_at_two_lengths)
 
     def numbers(self, scene):
         return self.first_over_second, self.second
@@ -167,7 +167,7 @@ APART = 0.05
 
 
 def resting_apart(log_rate, shift, p):
-    one, other = resting(log_rate, shift, p)
+    one, other = steady_states(log_rate, shift, p)
     return one + APART, other - APART
 
 
@@ -179,7 +179,7 @@ def two_states_apart(log_rate, psis, shift, share, p):
 class TwoStatesApart(TwoSlipStates):
     name = "two_states_apart"
     evolutions = staticmethod(two_states_apart)
-    resting = staticmethod(resting_apart)
+    steady_states = staticmethod(resting_apart)
 
 
 def test_states_that_rest_apart_begin_at_rest():

@@ -16,7 +16,7 @@ from rsfstudy.slider.equations import by_displacement, by_inertial_time, normal_
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
 WITH_ONE_B = {name: law for name, law in laws.PARTS.items() if issubclass(law, laws.Law)}
-PLAIN = sorted(name for name, law in WITH_ONE_B.items() if law.resting is None)
+PLAIN = sorted(name for name, law in WITH_ONE_B.items() if law.steady_states is None)
 LAWS = st.sampled_from(PLAIN)
 RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
 

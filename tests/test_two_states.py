@@ -274,7 +274,7 @@ def evolutions(log_rate, psis, shift, share, p):
     )
 
 
-def resting(log_rate, shift, p):
+def steady_states(log_rate, shift, p):
     at = shift - p[LAW] * log_rate
     return 0.5 * at, 0.2 * at, 0.3 * at
 
@@ -289,7 +289,7 @@ class ThreeSlipStates(laws.Law):
     name = "three_slip_states"
     states = 3
     evolutions = staticmethod(evolutions)
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
 
     def numbers(self, scene):
         return (*super().numbers(scene), self.second, self.third)

@@ -15,7 +15,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
 from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider.equations import IN_RUPTURE, evolutions_of, relation_of, resting_of
+from rsfstudy.slider.equations import IN_RUPTURE, evolutions_of, relation_of, steady_states_of
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.system import SLOWEST
@@ -97,8 +97,8 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
     fallen = scene.stiffness * slope * (1.0 - _OUTWEIGHED)
     for distance in _FALLS:
         x = point.log_rate - distance
-        rest = resting_of(scene, x, shift)
-        later = resting_of(scene, x - fallen / scene.a, shift - scene.stiffness * shift_slope)
+        rest = steady_states_of(scene, x, shift)
+        later = steady_states_of(scene, x - fallen / scene.a, shift - scene.stiffness * shift_slope)
         weakening = evolve(x + raised, rest, least_shift)
         if -sum(weakening[i] for i in states) > fallen or any(later[i] < rest[i] for i in states):
             return False

@@ -14,7 +14,7 @@ from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.closed_forms import effective_friction
-from rsfstudy.slider.equations import resting_of
+from rsfstudy.slider.equations import steady_states_of
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -143,5 +143,5 @@ class NormalStressSteps(ShotSteps):
     def _log_rate_after(self, size: float) -> float:
         """ln(V/V_*) just after a step, without mass."""
         scene = self.scene_at(size).without_mass()
-        resting = resting_of(scene, 0.0, 0.0)
-        return on_slow_manifold(scene, scene.spring_stress_step, resting).log_rate
+        steady_states = steady_states_of(scene, 0.0, 0.0)
+        return on_slow_manifold(scene, scene.spring_stress_step, steady_states).log_rate

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rsfstudy.motion.events import Watch, rise
-from rsfstudy.slider.equations import evolution_of, relation_of, resting_of
+from rsfstudy.slider.equations import evolution_of, relation_of, steady_states_of
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess, stress_at
@@ -53,7 +53,7 @@ def rises_to_load_point(scene: Scene, point: Point) -> bool:
     def farthest(x: float) -> float:
         return _BEHIND * change(x, 0.0)[1]
 
-    lag = point.state - resting_of(scene, point.log_rate, 0.0)[0]
+    lag = point.state - steady_states_of(scene, point.log_rate, 0.0)[0]
     if not 0.0 <= lag <= farthest(point.log_rate):
         return False
     several = max(2, round(np.log(distance / _NEAREST) / _APART))
@@ -78,11 +78,11 @@ def _changes(scene: Scene) -> Callable[[float, float], tuple[float, float]]:
         if friction is None:
             return np.nan, np.nan
         _value, slope, _shift, shift_slope = relation(friction)
-        rest, damping = resting_of(scene, x, 0.0)[0], scene.dynamics.damping(x)
+        rest, damping = steady_states_of(scene, x, 0.0)[0], scene.dynamics.damping(x)
         pulled = scene.stiffness * float(np.expm1(scene.log_load_rate - x))
         evolves = evolution(x, rest + lag)
         faster = (slope * pulled - evolves) / (scene.a + slope * damping)
-        follows = (resting_of(scene, x + _STEP, 0.0)[0] - rest) / _STEP
+        follows = (steady_states_of(scene, x + _STEP, 0.0)[0] - rest) / _STEP
         return faster, evolves - shift_slope * (pulled - damping * faster) - follows * faster
 
     return at

@@ -109,7 +109,7 @@ class Steps:
         law has a slip rate of its own: then it may rise between them.
         """
         sizes = [self.smallest, size]
-        if self.scene.parts.law.resting is not None:
+        if self.scene.parts.law.steady_states is not None:
             sizes = np.geomspace(self.smallest, size, _SIZES_BETWEEN).tolist()
         return all(settles(self.scene_at(each)) for each in sizes)
 

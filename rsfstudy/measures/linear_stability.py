@@ -137,7 +137,7 @@ def _over(stiffness: float, at_reference: float) -> float:
 def _explicit(scene: Scene) -> float:
     """The published formula, for scenes it speaks of; NaN for others."""
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
-    others = law.resting or law.feels_stress or scene.parts.fluid.effects
+    others = law.steady_states or law.feels_stress or scene.parts.fluid.effects
     if scene.imposed_normal_stress:
         return math.nan
     if coupling is None or others:

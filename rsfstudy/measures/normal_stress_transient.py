@@ -185,7 +185,7 @@ class NormalStressTransient(Reading):
         step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
         if step.load_velocity != 1.0 or step.displacement:
             return "the load point does not move on at V_* as before"
-        if coupling is None or coupling[0] or scene.pressing.unknowns:
+        if coupling is None or coupling[0] or scene.pressure_source.unknowns:
             return "effective normal stress follows shear stress or pore pressure"
         if step.duration < self.record:
             return "normal stress does not stay so for all of the record"
@@ -283,16 +283,16 @@ class NormalStressTransient(Reading):
 
     def _departure(self, scene: Scene, record: _Record) -> float:
         """Largest departure of friction, from `fit_from` on, from what a stiff slider shows after
-        so much slip, ``b stress_left(-(alpha/b) ln r, slip)``; NaN where there is no such form.
+        so much slip, ``b relaxation(-(alpha/b) ln r, slip)``; NaN where there is no such form.
         """
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
-        if law.stress_left is None or law.feels_stress or coupling is None:
+        if law.relaxation is None or law.feels_stress or coupling is None:
             return math.nan
         slip = record.rows[:, OBSERVED.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         away = -coupling[1] / scene.b * math.log(ratio)
-        left = np.array([law.stress_left(away, at) for at in slip[read].tolist()])
+        left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
         seen = friction_of(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 

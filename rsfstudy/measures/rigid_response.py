@@ -20,7 +20,7 @@ from rsfstudy.motion.events import Kind, fall, rise
 from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Output
-from rsfstudy.slider.equations import resting_of, rigid
+from rsfstudy.slider.equations import rigid, steady_states_of
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_sliding, stress_after_jump
 from rsfstudy.status import Status
@@ -159,7 +159,7 @@ class RigidResponse(Measure):
         equations = rigid(scene, scene.log_load_rate)
         watches = (rise("friction", level), fall("friction", level))
         # states freed of stress are still those of steady sliding at V_* before the step
-        state = (start, *resting_of(scene, 0.0, 0.0)[1:])
+        state = (start, *steady_states_of(scene, 0.0, 0.0)[1:])
         tolerance, complete = accuracy.solver, False
         for event in along(equations, state, tolerance, meter, watches, recording=recording):
             if event.watch is not None and math.isnan(distance):
@@ -182,9 +182,9 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
     """
     law, parts = scene.parts.law, scene.parts
     stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.feels_stress
-    if stress_acts or law.stress_left is None:
+    if stress_acts or law.relaxation is None:
         return math.nan
-    left = np.array([law.stress_left(scene.log_load_rate, at) for at in slip.tolist()])
+    left = np.array([law.relaxation(scene.log_load_rate, at) for at in slip.tolist()])
     exact = steady + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 

@@ -148,7 +148,7 @@ def _without_effective_friction(scene: Scene) -> str:
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     if stress.coupling is None or stress.normal_stress is None:
         return f"{stress.name} normal stress"
-    if law.resting is not None and law.states == 1:
+    if law.steady_states is not None and law.states == 1:
         return f"{law.name}, a law with a slip rate of its own,"
     return f"a fault that is {fluid.name}" if fluid.unknowns else ""
 

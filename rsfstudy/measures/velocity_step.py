@@ -294,18 +294,18 @@ def _turn(scene: Scene, step: _Step) -> Watch:
 
 def _departure(scene: Scene, step: _Step, record: _Record) -> float:
     """Largest departure of friction, from the peak on, from what a stiff slider shows after so much
-    slip: the steady change, ``(a - b) ln r`` by most laws, and ``b stress_left(ln r, slip)``; NaN
+    slip: the steady change, ``(a - b) ln r`` by most laws, and ``b relaxation(ln r, slip)``; NaN
     where there is no such form.
     """
-    stress_left = scene.parts.law.stress_left
-    if stress_left is None or record.peak is None or not _has_closed_form(scene, step, record):
+    relaxation = scene.parts.law.relaxation
+    if relaxation is None or record.peak is None or not _has_closed_form(scene, step, record):
         return math.nan
     before, after = math.log(step.before), math.log(step.after)
     steady = steady_excess(scene, after) - steady_excess(scene, before)
     steady += scene.dynamics.radiated(after) - scene.dynamics.radiated(before)
     slip = record.rows[:, OBSERVED.index("slip")]
     later = record.rows[:, 0] >= record.peak.time
-    left = np.array([stress_left(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
+    left = np.array([relaxation(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
     expected = steady + scene.b * left
     seen = (friction_of(record.rows) - record.begin.point.reading)[later]
     return float(np.abs(seen - expected).max())

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from rsfstudy.motion.layout import (
     COEFFICIENT,
+    DISTANCE,
     FRICTION,
     GROWTH,
     IMBALANCE,
@@ -24,7 +25,6 @@ from rsfstudy.motion.layout import (
     READING_GROWTH,
     SPRING,
     STATE,
-    UNREST,
 )
 from rsfstudy.motion.steppers import unrolled
 from rsfstudy.slider.equations import Equations
@@ -96,7 +96,7 @@ def point_into(point_of: Function, unknowns: Function, numbers: Function, states
         result[PSI] = point.psi
         result[STATE] = point.state
         result[IMBALANCE] = point.imbalance
-        result[UNREST] = point.unrest
+        result[DISTANCE] = point.distance_from_steady_state
         result[COEFFICIENT] = point.coefficient
         result[RATIO] = point.normal_stress
         result[READING] = point.reading

@@ -11,6 +11,7 @@ from rsfstudy.motion.layout import (
     CHANGE,
     CLOCK,
     CODE,
+    DISTANCE,
     ENDS,
     FARTHEST,
     FRICTION,
@@ -33,7 +34,6 @@ from rsfstudy.motion.layout import (
     SPENT,
     SPRING,
     TIME,
-    UNREST,
     WAITS,
     WATCHED,
 )
@@ -220,7 +220,7 @@ def detect(motion, space, limits):
         watch = watch_of(space, w)
         space.when[w] = math.nan
         if watch[KIND] == SETTLED:
-            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[UNREST] / p[B])
+            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[DISTANCE] / p[B])
             watch[FARTHEST] = max(watch[FARTHEST], away)
             if away < watch[LEVEL] * watch[FARTHEST]:
                 space.when[w] = motion.end

@@ -71,7 +71,7 @@ CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
 BEGIN, CHANGE, END, SAMPLED = -1, -2, -3, -4
 
 #: Columns of a point; its states follow.
-LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, UNREST, COEFFICIENT, RATIO = range(10)
+LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, DISTANCE, COEFFICIENT, RATIO = range(10)
 READING, READING_GROWTH, PSIS = 10, 11, 12
 
 #: Why a call returns: to hand over what it has told; because the motion has ended; because the

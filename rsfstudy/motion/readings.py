@@ -28,7 +28,9 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
     b.
     """
     size = scene.a * scene.parts.law.size_over_a
-    return max(abs(point.log_rate - math.log(load_velocity)), point.unrest / size)
+    return max(
+        abs(point.log_rate - math.log(load_velocity)), point.distance_from_steady_state / size
+    )
 
 
 def watched(scene: Scene) -> tuple[str, float]:

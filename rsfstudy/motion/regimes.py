@@ -18,7 +18,7 @@ from rsfstudy.slider.equations import (
     between_ruptures,
     in_rupture,
     normal_stress_at,
-    resting_of,
+    steady_states_of,
 )
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.parts import Numbers
@@ -52,7 +52,7 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    psis, log_rate = resting_of(scene, 0.0, 0.0), 0.0
+    psis, log_rate = steady_states_of(scene, 0.0, 0.0), 0.0
     if scene.begins_elsewhere:
         psis, log_rate = _stated(scene, psis)
     begun = scene.parts.loading.beginning
@@ -61,12 +61,12 @@ def starting(scene: Scene) -> Point:
     return at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
 
 
-def _stated(scene: Scene, resting: Numbers) -> tuple[Numbers, float]:
+def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
     """States freed of stress, and ln(V/V_*), of the stress and state that a scene begins with: Psi
     is sought with which the state variable is the one stated.
     """
     before = scene.under(Segment(1.0))
-    others = resting[1 : before.states]
+    others = steady_states[1 : before.states]
 
     def begun(psi: float) -> Point:
         return on_slow_manifold(before, scene.initial_stress, (psi, *others))
@@ -75,7 +75,7 @@ def _stated(scene: Scene, resting: Numbers) -> tuple[Numbers, float]:
         return scene.initial_state - begun(psi).state
 
     psi = float(newton(missing, scene.initial_state, tol=1e-15))
-    return (psi, *resting[1:]), begun(psi).log_rate
+    return (psi, *steady_states[1:]), begun(psi).log_rate
 
 
 def jumped(scene: Scene, point: Point) -> Point:

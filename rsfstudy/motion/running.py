@@ -45,7 +45,7 @@ _COLUMNS = {
     "psi": layout.PSI,
     "state": layout.STATE,
     "imbalance": layout.IMBALANCE,
-    "unrest": layout.UNREST,
+    "distance_from_steady_state": layout.DISTANCE,
     "coefficient": layout.COEFFICIENT,
     "normal_stress": layout.RATIO,
     "reading": layout.READING,

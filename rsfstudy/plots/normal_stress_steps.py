@@ -73,7 +73,7 @@ def _records(dataset: xr.Dataset, axes: Axes, law: int) -> Axes:
 def _rigid(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Slip, and the transient of a rigid slider by the closed form of its law."""
     scene, slip = scene_of(row), np.linspace(0.0, _SHOWN, 100)
-    form = scene.parts.law.stress_left
+    form = scene.parts.law.relaxation
     away = -scene.alpha / scene.b * math.log1p(float(row["normal_stress_step"]))
     left = [form(away, at) if form else math.nan for at in slip.tolist()]
     return slip, scene.b * np.array(left)

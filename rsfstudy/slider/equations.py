@@ -129,7 +129,7 @@ def _states(scene: Scene) -> tuple[str, ...]:
     """Names of the states."""
     count = scene.parts.law.states
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
-    return (*of_law, *(unknown.name for unknown in scene.pressing.unknowns))
+    return (*of_law, *(unknown.name for unknown in scene.pressure_source.unknowns))
 
 
 @_once
@@ -233,7 +233,7 @@ def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
     return at
 
 
-def resting_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
+def steady_states_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
     psis: Numbers = scene.functions.friction.steady_states(
         log_rate, shift, scene.numbers_of_friction

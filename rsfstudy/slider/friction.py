@@ -277,7 +277,7 @@ class Parts(NamedTuple):
     ----------
     states : int
         How many states the law has.
-    evolution, evolutions, resting : callable or None
+    evolution, evolutions, steady_states : callable or None
         Of the law; either the first or the second.
     state_effects : tuple of callable
         By how much stress lowers the state: of normal stress, of the law, of shear stress.
@@ -287,7 +287,7 @@ class Parts(NamedTuple):
         Of the case of normal stress.
     unknowns : int
         How many states end in P.
-    seepage, seeped : callable or None
+    auxiliary_rates, auxiliary_steady_states : callable or None
         Theirs: auxiliary rates, and what they are in steady sliding.
     inside : bool
         Whether P is pore pressure inside the fault, which a rig does not know of.
@@ -296,13 +296,13 @@ class Parts(NamedTuple):
     states: int
     evolution: Function | None
     evolutions: Function | None
-    resting: Function | None
+    steady_states: Function | None
     state_effects: tuple[Function, ...]
     regularised: bool
     normal_stress: Function | None
     unknowns: int
-    seepage: Function | None
-    seeped: Function | None
+    auxiliary_rates: Function | None
+    auxiliary_steady_states: Function | None
     inside: bool
 
 
@@ -315,13 +315,13 @@ def friction_of(parts: Parts) -> Friction:
     strength = strength_of(None if wet is constant_stress else wet, effect)
     if parts.regularised:
         strength = reversible(strength)
-    evolutions, steady_states = parts.evolutions, parts.resting or usual_steady_state
+    evolutions, steady_states = parts.evolutions, parts.steady_states or usual_steady_state
     if evolutions is None:
         assert parts.evolution is not None
         evolutions = only(parts.evolution)
-    if parts.seepage is not None and parts.seeped is not None:
-        evolutions = with_auxiliary(evolutions, parts.seepage, parts.states)
-        steady_states = with_auxiliary_at_rest(steady_states, parts.seeped)
+    if parts.auxiliary_rates is not None and parts.auxiliary_steady_states is not None:
+        evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
+        steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)
     by_pressure = by_pressure_of(wet, effect)
     return Friction(
         strength=strength,

@@ -23,6 +23,14 @@ from rsfstudy.quantity import Quantity
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
+#: Names that members of a user's own part may still bear.
+_FORMER_NAMES = {
+    "resting": "steady_states",
+    "stress_left": "relaxation",
+    "seepage": "auxiliary_rates",
+    "seeped": "auxiliary_steady_states",
+}
+
 #: A function of floats, the last argument being the numbers of a scene.
 Function = Callable[..., Any]
 Numbers = tuple[float, ...]
@@ -45,6 +53,9 @@ class Part:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        for former, name in _FORMER_NAMES.items():
+            if former in vars(cls):
+                setattr(cls, name, vars(cls)[former])
         if cls.equations & vars(cls).keys():
             base = next(kind for kind in cls.__mro__ if "conclusions" in vars(kind))
             for name in cls.conclusions:

@@ -53,7 +53,7 @@ def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate
     common = slider.a, size, slider.mu_star, stiffness, *of_load, *of_stress
     own = (
         *_filled_up(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
-        *_filled_up(scene.pressing, scene, DYNAMICS - FLUID),
+        *_filled_up(scene.pressure_source, scene, DYNAMICS - FLUID),
         *_filled_up(parts.dynamics, scene, LAW - DYNAMICS),
     )
     return (*common, *own, *law.numbers(scene))

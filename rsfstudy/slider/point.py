@@ -24,7 +24,7 @@ class Point(NamedTuple):
         State variable Theta (the sum, where a law has several).
     imbalance : float
         Its distance from steady sliding at this slip rate, Theta + b ln(V/V_*) for most laws.
-    unrest : float
+    distance_from_steady_state : float
         The largest such distance of a state, without sign.
     coefficient : float
         Friction coefficient.
@@ -45,7 +45,7 @@ class Point(NamedTuple):
     psi: float
     state: float
     imbalance: float
-    unrest: float
+    distance_from_steady_state: float
     coefficient: float
     normal_stress: float
     reading: float

@@ -308,7 +308,7 @@ class Scene(ShownAsTable):
         return self.parts.dynamics
 
     @cached_property
-    def pressing(self) -> fluid.Fluid | loading.Loading:
+    def pressure_source(self) -> fluid.Fluid | loading.Loading:
         """What has the unknowns of which the last takes from normal stress, if any has."""
         return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
 
@@ -322,7 +322,7 @@ class Scene(ShownAsTable):
         """How many states there are: those of the law, and the unknowns of the fluid, or of a
         loading that goes on changing normal stress.
         """
-        return self.parts.law.states + len(self.pressing.unknowns)
+        return self.parts.law.states + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:

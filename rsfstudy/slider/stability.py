@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.equations import evolutions_of, relation_of, resting_of
+from rsfstudy.slider.equations import evolutions_of, relation_of, steady_states_of
 from rsfstudy.slider.steady import Steady, steady_sliding
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
     of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
     if len(steady.psis) == 1:
         return [1.0, of_shift, size]
-    slow, fast = (resting_of(scene, steady.log_rate + x, shift) for x in (-1.0, 1.0))
+    slow, fast = (steady_states_of(scene, steady.log_rate + x, shift) for x in (-1.0, 1.0))
     moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
     return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
 
@@ -274,7 +274,7 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
     """
     still = scene.unforced
     steady = _sliding(still, log_rate)
-    psis = (*steady.psis, *(0.0 for _unknown in scene.pressing.unknowns))
+    psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
     _by_rate, by_shift, by_state = slopes_of_law(still, steady)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import relation_of, resting_of
+from rsfstudy.slider.equations import relation_of, steady_states_of
 from rsfstudy.slider.parts import Numbers
 
 if TYPE_CHECKING:
@@ -55,12 +55,12 @@ def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
         return None
     spring = friction + scene.dynamics.radiated(log_rate)
     shift = relation_of(scene)(friction)[2]
-    return Steady(log_rate, friction, spring, resting_of(scene, log_rate, shift))
+    return Steady(log_rate, friction, spring, steady_states_of(scene, log_rate, shift))
 
 
 def steady_excess(scene: Scene, log_rate: float) -> float:
     """Steady friction coefficient at ln(V/V_*), less mu_*: (a - b) ln(V/V_*) by most laws."""
-    psi = scene.functions.friction.state_sum(resting_of(scene, log_rate, 0.0))
+    psi = scene.functions.friction.state_sum(steady_states_of(scene, log_rate, 0.0))
     return float(scene.a * log_rate + psi)
 
 
@@ -127,7 +127,7 @@ def slowest_steady(scene: Scene) -> float:
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
-    if scene.parts.law.resting is None:
+    if scene.parts.law.steady_states is None:
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
     slower = -1.0
     while steady_excess(scene, slower) <= strongest:

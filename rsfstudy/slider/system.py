@@ -377,7 +377,7 @@ def system_of(
 
 def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
     """The functions of a scene, with other dynamics than its own where some are given."""
-    law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressing
+    law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
     of_shear_stress = friction.stress_dependence if law.stress_dependence else None
     effects = stress.state_effect, law.state_effect, of_shear_stress
     acting = scene.dynamics if dynamics is None else dynamics
@@ -385,13 +385,13 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
         states=law.states,
         evolution=law.evolution,
         evolutions=law.evolutions,
-        resting=law.resting,
+        steady_states=law.steady_states,
         state_effects=tuple(effect for effect in effects if effect is not None),
         regularised=law.regularised,
         normal_stress=stress.normal_stress,
         unknowns=len(source.unknowns),
-        seepage=source.seepage,
-        seeped=source.seeped,
+        auxiliary_rates=source.auxiliary_rates,
+        auxiliary_steady_states=source.auxiliary_steady_states,
         inside=source is scene.parts.fluid,
     )
     return system_of(parts, acting.slip_rate, acting.rupture_rate)

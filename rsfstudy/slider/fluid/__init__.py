@@ -20,15 +20,16 @@ class Fluid(Part):
 
     A case with unknowns of its own says what they are, pore pressure P last, and states
 
-    - ``seepage(log_rate, states, share, p)``: their changes per unit slip in D_c, times a share;
-    - ``seeped(log_rate, p)``: what they are in steady sliding, where P is 0.
+    - ``auxiliary_rates(log_rate, states, share, p)``: their changes per unit slip in D_c, times a
+      share;
+    - ``auxiliary_steady_states(log_rate, p)``: what they are in steady sliding, where P is 0.
     """
 
     conclusions = ("highest_pressure",)
-    equations = frozenset({"seepage", "numbers"})
+    equations = frozenset({"auxiliary_rates", "numbers"})
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
-    seepage: ClassVar[Function | None] = None
-    seeped: ClassVar[Function | None] = None
+    auxiliary_rates: ClassVar[Function | None] = None
+    auxiliary_steady_states: ClassVar[Function | None] = None
 
     def highest_pressure(self, log_rate: float, states: Numbers) -> float:
         """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_rate`; infinite where
@@ -45,7 +46,7 @@ class Fluid(Part):
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:
-        return ("seepage", "seeped") if cls.unknowns else ()
+        return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
 
 PARTS = found_in(__name__, __path__)

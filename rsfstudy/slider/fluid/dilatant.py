@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Changes of porosity and of pore pressure per unit slip in D_c, times a share.
 
     ``D_c dphi/d(delta) = -(phi - phi_0 - eps ln(V/V_*))`` and ``dp/dt = c* (p_inf - p) -
@@ -46,7 +46,7 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
-def seeped(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
     """Porosity of steady sliding, and no pore pressure: phi = phi_0 + eps ln(V/V_*)."""
     return p[FLUID] * log_rate, 0.0
 
@@ -93,8 +93,8 @@ class Dilatant(Fluid):
             "sigma_*",
         ),
     )
-    seepage = staticmethod(seepage)
-    seeped = staticmethod(seeped)
+    auxiliary_rates = staticmethod(auxiliary_rates)
+    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: Scene) -> None:
         """Some critical stiffness, where the spring is given by its ratio to that."""

@@ -49,14 +49,14 @@ class LawOfStates(Part):
 
     A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
     slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
-    states ``resting(log_rate, shift, p)``: the states Psi of steady sliding, of which stress has
-    taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
+    states ``steady_states(log_rate, shift, p)``: the states Psi of steady sliding, of which stress
+    has taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
 
     A law of several states says how many (``states = 3``), and states ``evolutions(log_rate, psis,
     shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
-    `resting`. Both say how much of the shift each state has; the parts add up to all of it. What
-    the states together have for b it says as `b_over_a`, a field or a property; `two_slip_states`
-    is an example.
+    `steady_states`. Both say how much of the shift each state has; the parts add up to all of it.
+    What the states together have for b it says as `b_over_a`, a field or a property;
+    `two_slip_states` is an example.
     """
 
     stress_dependence: float = number(
@@ -69,7 +69,7 @@ class LawOfStates(Part):
     )
     regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
 
-    conclusions = ("orbits_close", "scale_free", "stress_left")
+    conclusions = ("orbits_close", "scale_free", "relaxation")
     equations = frozenset({"evolution", "evolutions"})
     #: How many states the law has.
     states: ClassVar[int] = 1
@@ -80,20 +80,20 @@ class LawOfStates(Part):
     logarithmic: ClassVar[bool] = True
     #: Whether the law has no slip rate of its own, so that V_* could be any other.
     scale_free: ClassVar[bool] = False
-    #: ``stress_left(rate, slip)``: the stress in units of b that is left above its steady value
+    #: ``relaxation(rate, slip)``: the stress in units of b that is left above its steady value
     #: after so much slip at constant ln(V/V_*), at constant normal stress; closed forms only. A
     #: method where it draws on numbers of the law.
-    stress_left: ClassVar[Function | None] = None
+    relaxation: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
-    resting: ClassVar[Function | None] = None
+    steady_states: ClassVar[Function | None] = None
     #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
     #: state variable, and its derivative with respect to friction; none for most laws.
     state_effect: ClassVar[Function | None] = None
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:
-        return ("evolution",) if cls.states == 1 else ("evolutions", "resting")
+        return ("evolution",) if cls.states == 1 else ("evolutions", "steady_states")
 
     @property
     def b_over_a(self) -> float:
@@ -120,7 +120,7 @@ class LawOfStates(Part):
         reverse, where that matters.
         """
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
-        loading, pressing = scene.parts.loading, scene.pressing
+        loading, source = scene.parts.loading, scene.pressure_source
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
         if not unknown and loading.imposes:
@@ -133,7 +133,7 @@ class LawOfStates(Part):
                 remedy="Leave it out, or state `coupling` where the proportion is constant.",
             )
         reverses = scene.dynamics.reverses
-        one_way = pressing if pressing.unknowns else None if reverses else scene.dynamics
+        one_way = source if source.unknowns else None if reverses else scene.dynamics
         if self.regularised and one_way:
             raise InvalidValue(
                 "regularised",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 FIRST, SECOND, OF_FIRST, OF_SECOND, OVER = range(LAW, LAW + 5)
 
 
-def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """The states of steady sliding, ``Psi_i = c_i shift - b_i ln(V/V_*)``, c_i being the shares."""
     return (
         p[OF_FIRST] * shift - p[FIRST] * log_rate,
@@ -57,7 +57,7 @@ class TwoStates(LawOfStates):
     )
 
     states = 2
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
 
     @property
     def b_over_a(self) -> float:

@@ -49,7 +49,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return b * (share_of_healing(log_rate, p[LAW + 1]) * math.exp(bounded(-ahead)) - ahead)
 
 
-def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, where ``u exp(u) = exp(-V/V_c)``."""
     ahead = lambert_w(share_of_healing(log_rate, p[LAW + 1]))
     return (shift + p[LAW] * (ahead - p[LAW + 2] - log_rate),)
@@ -83,7 +83,7 @@ class Composite(Law):
 
     name = "composite"
     evolution = staticmethod(evolution)
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
 
     @property
     def least_weakening(self) -> float:

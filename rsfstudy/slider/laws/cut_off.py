@@ -45,7 +45,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return b * exp_less_one(min(behind, LARGEST_EXPONENT))
 
 
-def resting(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
     return (shift + p[LAW] * steady_over_b(log_rate, p[LAW + 1], p[LAW + 2]),)
 
@@ -69,7 +69,7 @@ class CutOff(Law):
 
     name = "cut_off"
     evolution = staticmethod(evolution)
-    resting = staticmethod(resting)
+    steady_states = staticmethod(steady_states)
     logarithmic = False  # in 1 + theta V_c/D_c
 
     @property
@@ -81,7 +81,7 @@ class CutOff(Law):
         """b, V_c/(V_c + V_*) and V_*/(V_c + V_*)."""
         return (*super().numbers(scene), *self._parts())
 
-    def stress_left(self, rate: float, slip: float) -> float:
+    def relaxation(self, rate: float, slip: float) -> float:
         """``ln{1 + [(1 + V_c/V_*)/(1 + V_c/V) - 1] exp(-slip/D_c)}``."""
         ahead = -steady_over_b(rate, *self._parts())
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))

@@ -62,7 +62,7 @@ class Family(Law):
     scale_free = True
     orbits_close = True  # dh/du = -(1 + eps h), as at both ends
 
-    def stress_left(self, rate: float, slip: float) -> float:
+    def relaxation(self, rate: float, slip: float) -> float:
         """``ln[1 + ((V/V_*)**eps - 1) exp(-slip/D_c)]/eps``."""
         power = self.law_exponent * rate
         if self.law_exponent == 0.0:

@@ -43,7 +43,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return -b * math.sinh(max(-LARGEST_EXPONENT, min(state / b + log_rate, FARTHEST_ABOVE)))
 
 
-def stress_left(rate: float, slip: float) -> float:
+def relaxation(rate: float, slip: float) -> float:
     """``2 artanh[tanh(ln(V/V_*)/2) exp(-slip/D_c)]``, written so that it holds digits however far
     the step.
     """
@@ -58,5 +58,5 @@ class PerrinRiceZheng(Law):
 
     name = "perrin_rice_zheng"
     evolution = staticmethod(evolution)
-    stress_left = staticmethod(stress_left)
+    relaxation = staticmethod(relaxation)
     scale_free = True

@@ -37,7 +37,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return -(state + p[LAW] * log_rate)
 
 
-def stress_left(rate: float, slip: float) -> float:
+def relaxation(rate: float, slip: float) -> float:
     """``ln(V/V_*) exp(-slip/D_c)`` (eq. 17b of the paper, less its steady value)."""
     return rate * math.exp(-slip)
 
@@ -48,6 +48,6 @@ class SlipLaw(Law):
 
     name = "slip"
     evolution = staticmethod(evolution)
-    stress_left = staticmethod(stress_left)
+    relaxation = staticmethod(relaxation)
     scale_free = True
     orbits_close = True  # Gu et al. (1984)

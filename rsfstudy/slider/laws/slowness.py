@@ -39,7 +39,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     return b * exp_less_one(min(-(state / b + log_rate), LARGEST_EXPONENT))
 
 
-def stress_left(rate: float, slip: float) -> float:
+def relaxation(rate: float, slip: float) -> float:
     """``ln[1 + (V/V_* - 1) exp(-slip/D_c)]`` (eq. 17a of the paper, less its steady value)."""
     return math.log(-math.expm1(-slip) + math.exp(rate - slip))
 
@@ -50,6 +50,6 @@ class SlownessLaw(Law):
 
     name = "slowness"
     evolution = staticmethod(evolution)
-    stress_left = staticmethod(stress_left)
+    relaxation = staticmethod(relaxation)
     scale_free = True
     orbits_close = True  # Ranjith and Rice (1999)

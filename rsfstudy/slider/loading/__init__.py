@@ -56,19 +56,19 @@ class Loading(Part):
     """Base of the loading histories.
 
     One that goes on changing normal stress says by which unknowns: the last of them takes from
-    imposed normal stress, over sigma_*, as pore pressure does. It states `seepage` and `seeped` as
-    a fluid does (see `fluid`), all unknowns being 0 in steady sliding, and what they begin with.
-    They are those of its first segment; what that imposes is beside them, and is what the last one
-    does. Others are without unknowns.
+    imposed normal stress, over sigma_*, as pore pressure does. It states `auxiliary_rates` and
+    `auxiliary_steady_states` as a fluid does (see `fluid`), all unknowns being 0 in steady sliding,
+    and what they begin with. They are those of its first segment; what that imposes is beside them,
+    and is what the last one does. Others are without unknowns.
     """
 
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
-    seepage: ClassVar[Function | None] = None
-    seeped: ClassVar[Function | None] = None
+    auxiliary_rates: ClassVar[Function | None] = None
+    auxiliary_steady_states: ClassVar[Function | None] = None
 
     @classmethod
     def functions(cls) -> tuple[str, ...]:
-        return ("seepage", "seeped") if cls.unknowns else ()
+        return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
     @property
     def beginning(self) -> Numbers:

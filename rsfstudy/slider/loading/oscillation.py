@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
     and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
 
@@ -30,7 +30,7 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     states : tuple of float
         y and P.
     share : float
-        What the changes are multiplied by (see `fluid.dilatant.seepage`).
+        What the changes are multiplied by (see `fluid.dilatant.auxiliary_rates`).
     p : tuple of float
         omega D_c/V_* at LOADING, and A behind it.
     """
@@ -41,7 +41,7 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
 
 
-def seeped(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
     """No oscillation in steady sliding."""
     return 0.0, 0.0
 
@@ -77,8 +77,8 @@ class Oscillation(Loading):
         Quantity("oscillation_ahead", "$y$", "1", "oscillation a quarter ahead", "sigma_*"),
         Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
     )
-    seepage = staticmethod(seepage)
-    seeped = staticmethod(seeped)
+    auxiliary_rates = staticmethod(auxiliary_rates)
+    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: Scene) -> None:
         """Normal stress that stays positive, slow enough where there is no mass, and is not that of

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Change of P per unit slip in D_c, times a share: at a steady rate in time, by which it goes
     to 0 from all that normal stress is yet to change by.
 
@@ -26,14 +26,14 @@ def seepage(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbe
     states : tuple of float
         P.
     share : float
-        What the change is multiplied by (see `fluid.dilatant.seepage`).
+        What the change is multiplied by (see `fluid.dilatant.auxiliary_rates`).
     p : tuple of float
         Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
     """
     return (-p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS)),)
 
 
-def seeped(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
     """Nothing is left to change in steady sliding."""
     return (0.0,)
 
@@ -69,8 +69,8 @@ class Ramp(Loading):
     unknowns = (
         Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
     )
-    seepage = staticmethod(seepage)
-    seeped = staticmethod(seeped)
+    auxiliary_rates = staticmethod(auxiliary_rates)
+    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: Scene) -> None:
         """No fluid that changes normal stress too."""
