@@ -15,6 +15,7 @@ from rsfstudy.rig.units import number
 _SPACED = "must read start:stop:count, two finite numbers and a count"
 _LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 _MOST_POINTS = 1_000_000
+_FLAGS = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
@@ -76,10 +77,7 @@ def _spaced(text: str, parts: list[str]) -> list[float]:
 
 def value(text: str) -> Any:
     """A flag, a number, or else a text."""
-    flags = {"true": True, "false": False}
-    if text.lower() in flags:
-        return flags[text.lower()]
-    return number_or_text(text)
+    return _FLAGS[text.lower()] if text.lower() in _FLAGS else number_or_text(text)
 
 
 def number_or_text(text: str) -> float | str:

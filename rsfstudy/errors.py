@@ -9,8 +9,9 @@ import reprlib
 import signal
 from collections.abc import Iterable
 
-#: Most characters of a text, and most choices, that a message has room for.
-_MOST_CHARACTERS, _MOST_CHOICES = 200, 60
+#: Most characters of a text, and most choices, that a message has room for; and the most that are
+#: listed beside those that look like what was given.
+_MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
 
 _values = reprlib.Repr()
 _values.maxstring = _values.maxother = _values.maxlong = 100
@@ -33,7 +34,8 @@ class InvalidValue(RsfStudyError, ValueError):
     rule : str
         The rule it breaks, as in "must be positive".
     choices : iterable of str, optional
-        The accepted values; the ones that look like `value` are suggested.
+        The accepted values; the ones that look like `value` are suggested, alone where there are
+        many.
     remedy : str, optional
         What to do instead.
     """
@@ -53,7 +55,7 @@ class InvalidValue(RsfStudyError, ValueError):
         close = difflib.get_close_matches(shown.strip("'\""), choices, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
-        if choices:
+        if choices and not (close and (len(choices) > _FEW or len(choices) == len(close))):
             more = len(choices) - _MOST_CHOICES
             text += f" Choices: {', '.join(map(brief, choices[:_MOST_CHOICES]))}"
             text += f" and {more:,} more." if more > 0 else "."

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import rsfstudy
-from rsfstudy import Scene
+from rsfstudy import Axis, Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import laws, synonyms
 from rsfstudy.slider.parts import number
@@ -48,11 +48,6 @@ WRONG = [
     ({"k": 0.02}, r"'k': is not a field.*Write stiffness_ratio .* or stiffness"),
     ({"Dc": 1e-5}, r"'Dc': is not a field.*slip_distance to rsfstudy.Laboratory"),
     ({"b": 0.02}, r"'b': is not a field.*Write b_over_a"),
-    ({"law": "aging"}, r"law = 'aging': is unknown.*Write law='slowness'"),
-    ({"law": "ageing"}, r"law = 'ageing'.*Write law='slowness'"),
-    ({"law": "Aging"}, r"law = 'Aging'.*Write law='slowness'"),
-    ({"law": "Dieterich"}, r"law = 'Dieterich'.*Write law='slowness'"),
-    ({"law": "Ruina"}, r"law = 'Ruina'.*Write law='slip'"),
     ({"normal_stress": "Constant"}, r"Write normal_stress='constant'"),
 ]
 
@@ -137,6 +132,12 @@ def test_stiffness_is_positive_for_every_scene(a, b_over_a, mu_star, alpha, tilt
         a=a, b_over_a=b_over_a, mu_star=mu_star, alpha=alpha, phi=lowest + tilt * (90.0 - lowest)
     )
     assert 0.0 < scene.stiffness < math.inf
+
+
+@pytest.mark.parametrize("called", ["aging", "ageing", "Aging", "Dieterich", "dieterich_ruina"])
+def test_laws_by_the_names_others_give_them(called):
+    assert Scene(law=called) == Scene(law="slowness")
+    assert Axis("law", ["Ruina", called]).rows == ({"law": "slip"}, {"law": "slowness"})
 
 
 def test_tab_completion_offers_what_users_call_and_nothing_else():

@@ -80,7 +80,7 @@ def test_quantities_of_pint():
 
 #: Units of stress, of those known here and of those that pint knows.
 STRESSES = ("Pa", "kPa", "MPa", "bar", "kg/m/s^2", "kg*m**-1*s-2", "MPa m/mm", "MPa s / s")
-OF_PINT = ("psi", "inH2O", "N/m^2", "percent MPa", "mPa", "psi um/um")
+OF_PINT = ("psi", "inH2O", "lbf/m^2", "percent MPa", "mPa", "psi um/um")
 #: What has been read as a product of its numbers, ended in a traceback, or never ended.
 WRONG = (
     "2,5 MPa", "2 5 MPa", "25 MPa 3", "2 MPa!", "2*3 MPa", "1 kPa^999", "5 9**9**9**9",
@@ -149,6 +149,20 @@ def test_a_number_times_the_factor_of_the_unit(number, between, unit):
     text = f" {number}{between}{unit} "
     wanted = expected if math.isfinite(expected) else None
     assert (read(text), read_without_pint(text)) == (wanted, wanted)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "remedy"),
+    [
+        ("25 Mpa", "Pa", "Did you mean MPa, instead of Mpa"),
+        ("3 kN/mm", "Pa/m", "force over area. Divide it by the area"),
+        ("3 kN", "Pa", "force over area. Divide it by the area"),
+    ],
+)
+def test_units_that_are_nearly_right(text, units, remedy):
+    with pytest.raises(InvalidValue, match=remedy):
+        in_si("x", text, units)
+    assert in_si("x", "2 kN/mm^2", "Pa") == 2e9
 
 
 @given(NUMBERS, st.sampled_from(OF_PINT))

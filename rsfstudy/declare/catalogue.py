@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import importlib
 import importlib.util
 import pkgutil
@@ -60,9 +61,9 @@ def load(name: str) -> Study:
     if name.endswith(".py"):
         return replace(_declared_in(_run(Path(name)), name), declared_in=name)
     if name not in names():
-        raise InvalidValue(
-            "study", name, "is unknown", choices=names(), remedy="Or name a file: path/to/study.py."
-        )
+        near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
+        remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
+        raise InvalidValue("study", name, "is unknown", choices=near, remedy=remedy)
     study: Study = importlib.import_module(f"{_PACKAGE}.{name}").study
     return study
 

@@ -19,11 +19,12 @@ from rsfstudy.errors import InvalidValue
 #: A factor to SI, and the exponents of kilogram, metre and second.
 Unit = tuple[float, tuple[int, int, int]]
 
-_STRESS, _LENGTH, _TIME = (1, -1, -2), (0, 1, 0), (0, 0, 1)
+_STRESS, _FORCE, _LENGTH, _TIME = (1, -1, -2), (1, 1, -2), (0, 1, 0), (0, 0, 1)
 _KNOWN: Mapping[str, Unit] = {
     "kg": (1.0, (1, 0, 0)),
     **{f"{p}Pa": (x, _STRESS) for p, x in (("", 1.0), ("k", 1e3), ("M", 1e6), ("G", 1e9))},
     "bar": (1e5, _STRESS),
+    **{f"{p}N": (x, _FORCE) for p, x in (("", 1.0), ("k", 1e3), ("M", 1e6))},
     "m": (1.0, _LENGTH),
     "cm": (1e-2, _LENGTH),
     "mm": (1e-3, _LENGTH),
@@ -102,7 +103,11 @@ def _of_text(name: str, text: str, units: str) -> float:
     if not all(unit in _KNOWN for unit, _power in powers):
         return float(match[0]) * _factor_of_pint(name, text, powers, units)
     scale, exponents = _product(powers)
-    if exponents != _product(_powers(units.removeprefix("1")) or [])[1]:
+    wanted = _product(_powers(units.removeprefix("1")) or [])[1]
+    if exponents == (wanted[0], wanted[1] + 2, wanted[2]):
+        rule = "is of force, and stress is force over area"
+        raise InvalidValue(name, text, rule, remedy="Divide it by the area of the fault.")
+    if exponents != wanted:
         raise _misfit(name, text, units)
     return float(match[0]) * scale
 
@@ -136,6 +141,7 @@ def _factor_of_pint(name: str, text: str, powers: Iterable[tuple[str, int]], uni
     except ImportError as error:
         usual = ", ".join(n for n in _KNOWN if n != "kg" and n.isascii())
         remedy = f"{_PINT}, write it in {usual}, or give a number in {units}."
+        remedy = _known_as(powers) or remedy
         raise InvalidValue(
             name, text, "has units that are not known here", remedy=remedy
         ) from error
@@ -143,12 +149,21 @@ def _factor_of_pint(name: str, text: str, powers: Iterable[tuple[str, int]], uni
     try:
         unit = math.prod(registry.parse_units(unit) ** power for unit, power in powers)
     except Exception as error:  # of its own, and of Python's parser
-        remedy = f"Write it as in '2.5 {units}'."
+        remedy = _known_as(powers) or f"Write it as in '2.5 {units}'."
         rule = f"has units that pint does not know ({error})"
         raise InvalidValue(name, text, rule, remedy=remedy) from error
     if _converted(name, text, registry.Quantity(0.0, unit), units) != 0.0:
         raise _misfit(name, text, units)  # a logarithm, of which none is a multiple
     return float(_converted(name, text, registry.Quantity(1.0, unit), units))
+
+
+def _known_as(powers: Iterable[tuple[str, int]]) -> str:
+    """The units that differ from what was written by capital letters only, if there are any."""
+    for name, _power in powers:
+        meant = [known for known in _KNOWN if known.lower() == name.lower() and known != name]
+        if meant:
+            return f"Did you mean {' or '.join(meant)}, instead of {name}?"
+    return ""
 
 
 def _converted(name: str, value: Any, quantity: Any, units: str) -> Any:

@@ -24,6 +24,7 @@ from rsfstudy.slider.registry import (
     Slot,
     fields_with,
     kind_of,
+    name_of,
     resolve,
 )
 from rsfstudy.slider.synonyms import instead_of_choice, instead_of_field, instead_of_unnamed
@@ -97,7 +98,7 @@ def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
     if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
     if slot.name in SLOT_FIELDS:
-        name = given.get(slot.name, slot.default)
+        name = name_of(slot.name, given.get(slot.name, slot.default))
         if not isinstance(name, str) or name not in slot.choices:
             choices = (*slot.choices, *slot.own)
             remedy = instead_of_choice(slot.name, name, choices)

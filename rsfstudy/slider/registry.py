@@ -15,6 +15,7 @@ from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
 from rsfstudy.slider.numbers import SPRING, Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.synonyms import law_name
 
 #: A part of a user's own: its class, whose fields are fields of the scene; or a protocol, which is
 #: data.
@@ -176,7 +177,8 @@ def register(parts: Iterable[Own]) -> None:
 
 
 def name_of(field: str, value: Any) -> Any:
-    """A value of a field; a part that is given itself by its name, which it has from now on.
+    """A value of a field; a part that is given itself by its name, which it has from now on, and a
+    law by its name here.
 
     Raises
     ------
@@ -186,7 +188,7 @@ def name_of(field: str, value: Any) -> Any:
     for slot in SLOTS if isinstance(value, type | Protocol) else ():
         if slot.name == field:
             return resolve(slot, value).name
-    return value
+    return law_name(value) if field == "law" and isinstance(value, str) else value
 
 
 def own_named(names: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> dict[str, Own]:

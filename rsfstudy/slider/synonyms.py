@@ -57,15 +57,23 @@ def instead_of_field(name: str) -> str:
     return _FIELDS.get(name, "")
 
 
+def law_name(value: str) -> str:
+    """The name of a law here, where others call it by this one; else the value itself."""
+    return _LAWS.get(_plain(value), value)
+
+
+def _plain(value: str) -> str:
+    return value.strip().lower().replace("-", "_").replace(" ", "_")
+
+
 def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
     """What to write instead of this value of what fills a slot; empty where nobody knows."""
     if not isinstance(value, str):
         return ""
-    plain = value.strip().lower().replace("-", "_").replace(" ", "_")
+    plain = _plain(value)
     if slot == "law" and plain == "nagata":
         return "Write stress_dependence=..., beside any law."
-    ours = _LAWS.get(plain, plain) if slot == "law" else plain
-    return f"Write {slot}={ours!r}." if ours in choices else ""
+    return f"Write {slot}={plain!r}." if plain in choices else ""
 
 
 def instead_of_unnamed(value: Any, slots: Mapping[str, Iterable[str]]) -> str:
