@@ -32,13 +32,13 @@ def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
 
 
 def test_a_plan_holds_no_scenes(monkeypatch):
-    """Each scene is made once for its name and once to be sent."""
+    """Each scene is made once to be checked and once to be computed."""
     made = []
     check = Scene.__init__
 
-    def counted(self, **fields):
+    def counted(self, *parts, **fields):
         made.append(1)
-        check(self, **fields)
+        check(self, *parts, **fields)
 
     study = declared(cells=1000)
     monkeypatch.setattr(Scene, "__init__", counted)

@@ -1,8 +1,8 @@
 """Both engines, measured against one another: every hard case, named studies, and random scenes.
 
-    python tests/agreement.py                 # hard cases, 300 random scenes, 50 dilatant ones
-    python tests/agreement.py --scenes 1000
-    python tests/agreement.py --studies       # named studies too, as they are declared
+    python tests/benchmarks/agreement.py              # hard cases, 300 random, 50 dilatant scenes
+    python tests/benchmarks/agreement.py --scenes 1000
+    python tests/benchmarks/agreement.py --studies    # named studies too, as they are declared
 
 They integrate the same functions by the same method, so they must end alike, and their numbers must
 agree within the sum of their error estimates.

@@ -1,4 +1,6 @@
-"""The compiled engine against the SciPy engine and against peers: ``python tests/peers.py``.
+"""The compiled engine against the SciPy engine and against peers.
+
+    python tests/benchmarks/peers.py
 
 Needs the extra ``peers``. All contestants take turns in one process; times are the shortest of
 rounds, and ratios are to the compiled engine. Errors are measured: the larger relative error of

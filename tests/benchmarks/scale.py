@@ -1,4 +1,4 @@
-"""What a cell costs beyond its physics, measured: ``python tests/scale.py [--million]``.
+"""What a cell costs beyond its physics, measured: ``python tests/benchmarks/scale.py [--million]``.
 
 Trivial cells at 10^3, 10^4, 10^5 and perhaps 10^6, with both engines, each in a process of its own:
 time a cell by phases, CPU time of all processes, driver memory, bytes on disk. Then a real lattice

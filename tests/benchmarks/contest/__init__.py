@@ -1,0 +1,1 @@
+"""Who takes part in the benchmark ``tests/benchmarks/peers.py``, and in what."""

@@ -1,1 +1,0 @@
-"""Who takes part in the benchmark ``tests/peers.py``, and in what."""
