@@ -1,1 +1,1 @@
-"""What a study is: labelled axes over a scene, a measure, reductions, and published values."""
+"""Declaration of studies: labelled axes over a scene, a measure, reductions, published values."""

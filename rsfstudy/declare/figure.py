@@ -1,4 +1,4 @@
-"""What draws a study: a figure of rsfstudy by its name, or a function or module of a user's own."""
+"""The figure of a study: one of rsfstudy by its name, or a function or module of a user's own."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FIGURES = frozenset(
 
 
 def figure_name(plot: Any) -> str:
-    """What a declaration calls a figure: one of rsfstudy by its name, one of the user's own by that
+    """Name of a figure in a declaration: one of rsfstudy by its name, one of the user's own by that
     of its function or module.
     """
     return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]

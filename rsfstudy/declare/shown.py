@@ -1,4 +1,4 @@
-"""How a study, and the verdicts on its claims, show themselves in a notebook."""
+"""Studies, and the verdicts on their claims, as a notebook shows them."""
 
 from __future__ import annotations
 

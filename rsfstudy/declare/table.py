@@ -153,7 +153,7 @@ class Table:
         return np.array(values).reshape(len(values), len(rows[0]))
 
     def changes(self, rows: Sequence[np.ndarray]) -> list[dict[str, Any]]:
-        """What cells change of the fields of the measure; nothing, where no axis varies them."""
+        """Fields of the measure that differ in each cell; none, where no axis varies them."""
         if not self._of_measure:
             return []
         axes = [(self.study.axes[p].rows, rows[p].tolist()) for p in self._of_measure]
@@ -171,5 +171,5 @@ class Table:
             yield Rows(block.head, block.names, self.columns(block, rows), self.changes(rows))
 
     def ordered(self, numbers: np.ndarray) -> np.ndarray:
-        """The same cells, block after block."""
+        """Cells ordered block after block."""
         return np.concatenate([numbers[at] for at, _block, _rows in self.split(numbers)])

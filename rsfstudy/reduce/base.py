@@ -1,4 +1,4 @@
-"""What all reductions share: a name, a variable to reduce, and that they never use failed cells."""
+"""Base of reductions: a name, a variable to reduce, and that they never use failed cells."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Reduction:
 
 
 def failed(status: xr.DataArray) -> xr.DataArray:
-    """Where a cell failed or was not computed."""
+    """Cells that failed or were not computed."""
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
@@ -83,7 +83,7 @@ def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
 
 
 def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
-    """Whether a result must be refused because a cell failed along these dimensions, or along those
+    """True if a result must be refused because a cell failed along these dimensions, or along those
     that `of` does not have.
     """
     bad = failed(dataset["status"])
@@ -136,7 +136,7 @@ def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
 
 
 def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """What a dataset says of those of its variables that the vocabulary does not hold."""
+    """Quantities that a dataset states for variables that the vocabulary does not hold."""
     return {
         str(name): Quantity(
             str(name),

@@ -100,7 +100,7 @@ class Boundary(Reduction):
 
 @dataclass(frozen=True)
 class Inverse(Reduction):
-    """Where along a coordinate a smooth, monotone variable reaches a level; in logarithms of both.
+    """Place along a coordinate where a smooth, monotone variable reaches a level, by logarithms.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
 
 
 def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
-    """How far the place where a smooth variable reaches the level may be from that found.
+    """Error of the place that was found for where a smooth variable reaches the level.
 
     Where its slope rises, or falls, all along, the variable lies between the chord of the bracket
     and the nearer of the chords on either side, extended. Where it does not, or there is a chord on
@@ -240,7 +240,7 @@ def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
 
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """Where the interpolant through the points reaches the level; NaN unless at one place only."""
+    """Place where the interpolant through the points reaches the level; NaN unless it is one."""
     roots = PchipInterpolator(x, y).solve(level, extrapolate=False)
     return float(roots[0]) if len(roots) == 1 else np.nan
 

@@ -72,7 +72,7 @@ class _Against(Reduction):
 
 @dataclass(frozen=True)
 class RelativeDifference(_Against):
-    """How far a variable lies below its value at a reference point: ``1 - of/of_reference``."""
+    """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
 
     kind: ClassVar[str] = "relative_difference"
     formula: ClassVar[str] = "1 - {of} over {reference}"
@@ -90,7 +90,7 @@ class RelativeDifference(_Against):
 
 @dataclass(frozen=True)
 class Difference(_Against):
-    """How far a variable lies above its value at a reference point: ``of - of_reference``."""
+    """Difference of a variable above its value at a reference point: ``of - of_reference``."""
 
     kind: ClassVar[str] = "difference"
     formula: ClassVar[str] = "{of} less {reference}"
@@ -156,7 +156,7 @@ class OverClosedForm(Reduction):
 
 @dataclass(frozen=True)
 class Spread(Reduction):
-    """How far apart the values along one coordinate lie: the largest less the smallest.
+    """Spread of the values along one coordinate: the largest less the smallest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How well error estimates cover: share of errors within them, worst miss, and how tight they
+"""Coverage of error estimates: share of errors within them, worst miss, and how tight they
 are.
 """
 

@@ -1,4 +1,4 @@
-"""Where limit cycles end, between cells, and where the eigenvalues of steady sliding say so."""
+"""Ends of limit cycles between cells, and those that eigenvalues of steady sliding tell."""
 
 from __future__ import annotations
 

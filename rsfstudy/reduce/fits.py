@@ -110,7 +110,7 @@ class _Fit(Reduction):
         return values
 
     def abscissa(self, on: xr.DataArray) -> xr.DataArray:
-        """What the law is linear in."""
+        """Abscissa in which the law is linear."""
         return on
 
 

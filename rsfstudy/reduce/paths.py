@@ -19,8 +19,8 @@ _ENDS = 0.02
 
 @dataclass(frozen=True)
 class Parting(Reduction):
-    """Where a path with another effect leaves the path without it on the way to its first peak of
-    slip rate, and where it joins it again on the way down.
+    """Places where a path with another effect leaves the path without it on the way to its first
+    peak of slip rate, and where it joins it again on the way down.
 
     Parameters
     ----------

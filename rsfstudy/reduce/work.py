@@ -1,4 +1,4 @@
-"""What accuracy costs: the cheapest integrator for a number of digits, and the work of another."""
+"""Cost of accuracy: the cheapest integrator for a number of digits, and the work of another."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Cheapest(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """What is given, and the digits that it is given for."""
+        """Quantities that are given, and the digits that they are given for."""
         digits = Quantity("digits", "", "1", "correct decimal digits wanted")
         return digits, *(Quantity(f"{self.name}_{n}", "", *about) for n, about in _GIVEN.items())
 

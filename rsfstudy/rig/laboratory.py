@@ -105,7 +105,7 @@ class Laboratory:
 
     @property
     def scales(self) -> dict[str, Scale]:
-        """What dimensionless quantities are measured in, in SI units."""
+        """Scales of dimensionless quantities, in SI units."""
         rate = self.reference_velocity / self.slip_distance
         return scales(self.normal_stress, self.slip_distance, rate)
 
@@ -167,7 +167,7 @@ class Laboratory:
         return scaled(dataset, by).assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
-        """What was stated, in SI units."""
+        """Quantities that were stated, in SI units."""
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in stated.items() if value is not None}
 

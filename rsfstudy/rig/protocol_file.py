@@ -74,7 +74,7 @@ def read_protocol(
 
 
 def _column(text: str) -> tuple[str, str]:
-    """What a column holds, and its units."""
+    """Key and units of a column."""
     match = _HEADER.fullmatch(text.strip())
     if not match:
         remedy = f"Write the header as in {_EXAMPLE}."

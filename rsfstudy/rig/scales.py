@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 
 
 class Scale(NamedTuple):
-    """What 1 is in some units; of each cell, where it varies among them."""
+    """Value of 1 in some units; of each cell, where it varies among them."""
 
     factor: float | xr.Variable
     units: str

@@ -89,7 +89,7 @@ def in_si(name: str, value: Any, units: str) -> float:
 
 
 def factor(name: str, stated: str, units: str) -> float:
-    """What one of the units that were stated is in SI units; raises as `in_si`."""
+    """Factor from the units that were stated to SI units; raises as `in_si`."""
     return in_si(name, f"1 {stated}", units)
 
 
@@ -167,7 +167,7 @@ def _known_as(powers: Iterable[tuple[str, int]]) -> str:
 
 
 def _converted(name: str, value: Any, quantity: Any, units: str) -> Any:
-    """What a quantity of pint is in SI units."""
+    """Magnitude of a quantity of pint in SI units."""
     try:
         magnitude = quantity.to(units).magnitude
     except Exception as error:

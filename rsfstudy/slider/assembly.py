@@ -1,4 +1,4 @@
-"""How fields of a scene become its parts, and where each field is among them."""
+"""Assembly of the parts of a scene from its fields, and the place of each field among them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from rsfstudy.slider.synonyms import instead_of_choice, instead_of_field, instea
 
 
 class Parts(NamedTuple):
-    """What a scene is made of: the numbers that every slider has, and what fills each slot."""
+    """Parts of a scene: the numbers that every slider has, and what fills each slot."""
 
     slider: Slider
     law: laws.LawOfStates
@@ -70,7 +70,7 @@ def parts_of(given: Mapping[str, Any]) -> Parts:
 
 
 def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
-    """The same parts, of which those that own these fields hold other numbers.
+    """Parts of which those that own these fields hold other numbers.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
 
 
 class Layout(NamedTuple):
-    """Where the fields of scenes with certain parts are.
+    """Places of the fields of scenes with certain parts.
 
     Attributes
     ----------

@@ -70,7 +70,7 @@ def velocity_step(b_over_a: float, exponent: float) -> float:
 
 
 def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
-    """What a small change of normal stress is to be multiplied by to be a change of Coulomb stress:
+    """Effective friction, which makes of a small change of normal stress one of Coulomb stress:
     ``mu' = mu_* - alpha (1 - a/b)``, because a fall of normal stress also strengthens the state.
     """
     return mu_star - alpha * (1.0 - 1.0 / b_over_a)

@@ -75,11 +75,11 @@ class Equations:
 
     @property
     def is_rigid(self) -> bool:
-        """Whether slip is the clock."""
+        """True if slip is the clock."""
         return self.regime == RIGID
 
     def at(self, state: Numbers) -> Point:
-        """What the slider does."""
+        """The point of the motion at a state."""
         now: Point = self.point(state, self.rate(state, self.p), self.p)
         return now
 
@@ -108,7 +108,7 @@ def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
 
 @_once
 def without_mass(scene: Scene, *, clock: bool) -> Equations:
-    """The same, with mass left out altogether."""
+    """The form between ruptures with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
         return between_ruptures(scene, clock=clock)
     return _slow(scene, QuasiStatic(), clock=clock)
@@ -162,7 +162,7 @@ def by_displacement(scene: Scene) -> Equations:
 
 
 def by_inertial_time(scene: Scene) -> Equations:
-    """The same of the full equations, in inertial time T/(2 pi)."""
+    """The full equations in inertial time T/(2 pi)."""
     along = in_rupture(scene)
     return replace(along, rate=_full(scene).against_time)
 

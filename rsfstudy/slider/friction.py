@@ -270,7 +270,7 @@ def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
 
 
 class Parts(NamedTuple):
-    """What the parts of a scene say of friction (see their bases): functions, and how many states a
+    """Friction as the parts of a scene state it (see their bases): functions, and how many states a
     law has and what may change normal stress beside shear stress.
 
     Attributes

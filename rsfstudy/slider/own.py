@@ -123,7 +123,7 @@ def check_name(slot: Slot, part: type[Part] | Part, slots: Iterable[Slot]) -> No
 
 
 def origin(part: type[Part] | Part) -> tuple[str, str]:
-    """Where a part is defined: what it has in common with an earlier definition of it."""
+    """Module and name of a definition, which an earlier definition of the part shares."""
     kind = part if isinstance(part, type) else type(part)
     return kind.__module__, kind.__qualname__
 

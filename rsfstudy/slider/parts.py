@@ -1,4 +1,4 @@
-"""What a part is: one choice of a slot of the slider, with its fields and its functions of floats.
+"""Parts: each is one choice of a slot of the slider, with its fields and its functions of floats.
 
 A scene fills five slots: state evolution law, normal stress, fluid, dynamics and loading. Each
 choice is one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule,
@@ -63,7 +63,7 @@ class Part:
                     setattr(cls, name, vars(base)[name])
 
     def numbers(self, scene: Scene) -> Numbers:
-        """What the functions of the part read from the place of its slot on, such as ``p[LAW]``.
+        """Numbers that its functions read from the place of its slot on, such as ``p[LAW]``.
 
         A law may have any number of them, others as many as there are places (see `places`).
         """
@@ -122,12 +122,12 @@ RULES: Mapping[str, Callable[[float], bool]] = {
 
 
 def has_meaning(stated: Field[Any]) -> bool:
-    """Whether a field was made by `number` or `flag`."""
+    """True if a field was made by `number` or `flag`."""
     return "about" in stated.metadata and stated.metadata["rule"] in (*RULES, _FLAG)
 
 
 def is_flag(part: type[Part], name: str) -> bool:
-    """Whether a field of a part holds true or false."""
+    """True if a field of a part holds true or false."""
     return bool(part.__dataclass_fields__[name].metadata["rule"] == _FLAG)
 
 
@@ -142,7 +142,7 @@ _NAMES: dict[type[Part], tuple[str, ...]] = {}
 
 
 def quantities_of(part: type[Part]) -> list[Quantity]:
-    """What the fields of a part mean."""
+    """Quantities that the fields of a part hold."""
     stated = (part.__dataclass_fields__[name] for name in names_of(part))
     return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 

@@ -1,5 +1,5 @@
-"""Where the numbers of a scene stand in the flat tuple ``p`` that the functions of its equations
-read, and how far what they compute may go.
+"""Places of the numbers of a scene in the flat tuple ``p`` that the functions of its equations
+read, and bounds of what they compute.
 
 Those that every scene has come first. Each slot has places of its own behind them: a law reads
 ``p[LAW]``, ``p[LAW + 1]``, ... The law stands last, and may have any number of them.
@@ -41,7 +41,7 @@ def numbers(scene: Scene) -> Numbers:
 
 
 def numbers_of_friction(scene: Scene) -> Numbers:
-    """The same for functions that friction alone decides: no spring, and no load point."""
+    """Numbers for functions that friction alone decides: no spring, and no load point."""
     return _numbers(scene, math.nan, math.nan, math.nan)
 
 

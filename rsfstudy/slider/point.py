@@ -1,4 +1,4 @@
-"""What a slider does at one instant."""
+"""A point of a motion."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Point(NamedTuple):
-    """What the slider does at one instant, whatever the unknowns it was computed with.
+    """The motion at one instant, whatever the unknowns it was computed with.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class Protocol(Loading):
 
     @property
     def lasts(self) -> float:
-        """How long in D_c/V_* the segments last that say so."""
+        """Duration in D_c/V_* of all segments that state one."""
         return math.fsum(s.duration for s in self.history if s.duration < math.inf)
 
 

@@ -24,7 +24,7 @@ Own = type[Part] | Protocol
 
 @dataclass(frozen=True)
 class Slot:
-    """What a scene has one of.
+    """A slot of a scene, which one part fills.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Slot:
 
     @cached_property
     def is_named(self) -> bool:
-        """Whether a field of a scene names the choice; else the value of another calls for it."""
+        """True if a field of a scene names the choice; else the value of another calls for it."""
         return not self.callers
 
 
@@ -111,7 +111,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 
 def _kind(name: str) -> Any:
-    """What a field of a scene holds; None where the part that owns it was not chosen."""
+    """Type of a field of a scene; with None where the part that owns it was not chosen."""
     part = OWNERS[name]
     kind = get_type_hints(part)[name]
     chosen = (
@@ -227,7 +227,7 @@ def fields_with(parts: Iterable[Own]) -> tuple[str, ...]:
 
 
 def quantities_with(parts: Iterable[Own]) -> Iterator[Quantity]:
-    """What the fields mean that parts of the user's own add to those of every scene."""
+    """Quantities of the fields that parts of the user's own add to those of every scene."""
     for kind in map(kind_of, parts):
         slot = slot_of(kind)
         stated = (Quantity(slot.name, "", "", slot.long_name), *quantities_of(kind))
@@ -235,7 +235,7 @@ def quantities_with(parts: Iterable[Own]) -> Iterator[Quantity]:
 
 
 def kinds_with(parts: Iterable[Own]) -> Mapping[str, Any]:
-    """What those fields hold; none, where the part stands for another that owns them."""
+    """Types of those fields; with None, where the part stands for another that owns them."""
     kinds: dict[str, Any] = {**dict.fromkeys(SLOT_NAMES, str), **KINDS}
     classes = tuple(map(kind_of, parts))
     for part in classes:

@@ -184,7 +184,7 @@ class Scene(ShownAsTable):
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __dir__(self) -> list[str]:
-        """What users ask for; a field without meaning in this scene is left out."""
+        """Names that users ask for; a field without meaning in this scene is left out."""
         # what is not stated may follow from other fields
         stated = {name for name, value in self.as_dict().items() if value is not None}
         names = {*super().__dir__(), *stated} - _INNER
@@ -197,7 +197,7 @@ class Scene(ShownAsTable):
 
     @cached_property
     def layout(self) -> Layout:
-        """Where its fields are."""
+        """Places of its fields."""
         return assembly.layout_of(tuple(map(type, self.parts[1:])))
 
     def as_dict(self) -> dict[str, Any]:
@@ -210,7 +210,7 @@ class Scene(ShownAsTable):
         return {name: values[name] for name in self.layout.fields}
 
     def describe(self) -> dict[str, Any]:
-        """The same, and the segments of a loading of the user's own, as `protocol` takes them."""
+        """The fields, and the segments of a loading of the user's own, as `protocol` takes them."""
         stated = self.parts.loading.stated if "loading" in self.layout.named else ()
         return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
 
@@ -246,11 +246,11 @@ class Scene(ShownAsTable):
         return Scene(assembly.with_numbers(self.parts, changes))
 
     def without_mass(self) -> Scene:
-        """The same slider in quasi-static motion, if it has mass."""
+        """This slider in quasi-static motion, if it has mass."""
         return Scene(self.parts._replace(dynamics=QuasiStatic())) if self.has_mass else self
 
     def under(self, segment: loading.Segment) -> Scene:
-        """The same slider, loaded by one segment."""
+        """This slider, loaded by one segment."""
         step = Step(
             load_velocity_ratio=segment.load_velocity,
             displacement_step=segment.displacement,
@@ -260,7 +260,7 @@ class Scene(ShownAsTable):
 
     @property
     def unforced(self) -> Scene:
-        """The same slider under a load point that moves steadily, where its loading goes on
+        """This slider under a load point that moves steadily, where its loading goes on
         changing normal stress: what steady sliding and its stability are asked of.
         """
         if not self.parts.loading.unknowns:
@@ -282,7 +282,7 @@ class Scene(ShownAsTable):
 
     @cached_property
     def made(self) -> dict[tuple[Any, ...], Any]:
-        """What others make of it once and for all."""
+        """Cache of what others make of it once and for all."""
         return {}
 
     @cached_property
@@ -292,7 +292,7 @@ class Scene(ShownAsTable):
 
     @cached_property
     def numbers_of_friction(self) -> Numbers:
-        """The same for functions that friction alone decides."""
+        """Numbers for functions that friction alone decides."""
         return places.numbers_of_friction(self)
 
     @cached_property
@@ -304,22 +304,22 @@ class Scene(ShownAsTable):
 
     @property
     def dynamics(self) -> dynamics.Dynamics:
-        """What balances the spring besides friction."""
+        """The part that balances the spring besides friction."""
         return self.parts.dynamics
 
     @cached_property
     def pressure_source(self) -> fluid.Fluid | loading.Loading:
-        """What has the unknowns of which the last takes from normal stress, if any has."""
+        """The part whose last unknown takes from normal stress, if any has unknowns."""
         return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
 
     @property
     def has_mass(self) -> bool:
-        """Whether mass acts in ruptures."""
+        """True if mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
 
     @cached_property
     def states(self) -> int:
-        """How many states there are: those of the law, and the unknowns of the fluid, or of a
+        """Number of states: those of the law, and the unknowns of the fluid, or of a
         loading that goes on changing normal stress.
         """
         return self.parts.law.states + len(self.pressure_source.unknowns)
@@ -386,12 +386,12 @@ class Scene(ShownAsTable):
 
     @property
     def is_disturbed(self) -> bool:
-        """Whether it does anything but slide on steadily at V_*."""
+        """True if it does anything but slide on steadily at V_*."""
         return self.begins_elsewhere or self.parts.loading.is_a_step
 
     @property
     def begins_elsewhere(self) -> bool:
-        """Whether it begins with other stress or state than those of steady sliding at V_*."""
+        """True if it begins with other stress or state than those of steady sliding at V_*."""
         return bool(self.initial_stress or self.initial_state)
 
     @cached_property

@@ -98,7 +98,7 @@ def critical_stiffnesses(scene: Scene, log_rate: float) -> list[float]:
 
 
 class _Around(NamedTuple):
-    """What balances a spring around steady sliding: friction above(p)/below(p), waves and mass."""
+    """Terms that balance a spring around steady sliding: friction above/below, waves and mass."""
 
     above: Polynomial
     below: Polynomial
@@ -174,7 +174,7 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
 
 
 def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
-    """What a change of each state takes from a ln V, and by how much the last moves the shift."""
+    """Change of a ln V by each state, and by how much the last moves the shift."""
     law, fluid = scene.parts.law.states, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
@@ -211,7 +211,7 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float
 
 
 def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
-    """What the evolution bends over: in ln V, in the shift, and in each state."""
+    """Scales over which the evolution bends: in ln V, in the shift, and in each state."""
     size = _PART * scene.a * scene.parts.law.size_over_a
     # b of several states may be next to nothing where each has a large one
     of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size

@@ -107,7 +107,7 @@ def moved(count: int) -> Function:
 
 
 def of_one(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-    """What a change of the only state takes from a ln(V/V_*)."""
+    """Change of a ln(V/V_*) by the only state, with its sign turned."""
     return changes[0]
 
 

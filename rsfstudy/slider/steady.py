@@ -93,7 +93,7 @@ def _weakest(scene: Scene) -> float:
 
 
 def _root(missing: Callable[[float], float], near: float, lowest: float) -> float | None:
-    """Where a growing function vanishes, above `lowest`; None where it does not."""
+    """Zero of a growing function, above `lowest`; None where there is none."""
     low = near if near > lowest else 0.5 * lowest
     high, stride = low, 1e-3 + abs(low)
     at = missing(low)

@@ -1,4 +1,4 @@
-"""What others call the fields of a scene and its laws, and what to write here instead."""
+"""Synonyms: names that others give to the fields of a scene and its laws."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _LAWS: Mapping[str, str] = {
 
 
 def instead_of_field(name: str) -> str:
-    """What to write instead of a field of this name; empty where nobody knows."""
+    """Remedy for a field of this name; empty where nobody knows."""
     return _FIELDS.get(name, "")
 
 
@@ -67,7 +67,7 @@ def _plain(value: str) -> str:
 
 
 def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
-    """What to write instead of this value of what fills a slot; empty where nobody knows."""
+    """Remedy for this choice in a slot; empty where nobody knows."""
     if not isinstance(value, str):
         return ""
     plain = _plain(value)
@@ -77,7 +77,7 @@ def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def instead_of_unnamed(value: Any, slots: Mapping[str, Iterable[str]]) -> str:
-    """How to name a value that was given to a scene without a name."""
+    """Remedy for a value that was given to a scene without a name."""
     for slot, choices in slots.items():
         found = instead_of_choice(slot, value, choices)
         if found:

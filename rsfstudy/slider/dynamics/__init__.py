@@ -1,4 +1,4 @@
-"""What balances the spring besides friction, one file a case.
+"""Dynamics: the forces that balance the spring besides friction, one file a case.
 
 A case states how slip rate follows from spring stress and state, by functions that take the
 friction of a scene (see `friction.Friction`) and return functions of floats:

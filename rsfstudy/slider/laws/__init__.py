@@ -102,12 +102,12 @@ class LawOfStates(Part):
 
     @property
     def size_over_a(self) -> float:
-        """How far ln V moves the states, over the direct effect: positive, whatever their signs."""
+        """Change of the states by a unit of ln V, over the direct effect; positive."""
         return self.b_over_a
 
     @property
     def feels_stress(self) -> bool:
-        """Whether stress itself changes the state variable."""
+        """True if stress itself changes the state variable."""
         return self.state_effect is not None or self.stress_dependence > 0.0
 
     @property
@@ -161,7 +161,7 @@ class Law(LawOfStates):
 
     @property
     def least_weakening(self) -> float:
-        """What b/a must exceed for steady friction to fall with slip rate at V_*."""
+        """Smallest b/a for steady friction to fall with slip rate at V_*."""
         return 1.0
 
     def check(self, scene: Scene) -> None:
@@ -184,7 +184,7 @@ GIVE_STIFFNESS = "Sliding is then stable at every stiffness, or at none: give st
 
 
 def lacks_threshold(scene: Scene) -> bool:
-    """Whether the spring is given by its ratio to a critical stiffness that there is not: stable or
+    """True if the spring is given by its ratio to a critical stiffness that there is not: stable or
     unstable is then every spring.
     """
     return scene.as_dict()["stiffness"] is None and not 0.0 < scene.critical_stiffness < math.inf

@@ -1,4 +1,4 @@
-"""What the load point does, one file a history.
+"""Loading histories of the load point, one file each.
 
 A history is a sequence of segments. Before the first, the slider slides steadily at V_*.
 """
@@ -72,7 +72,7 @@ class Loading(Part):
 
     @property
     def beginning(self) -> Numbers:
-        """What its unknowns are at first."""
+        """Initial values of its unknowns."""
         return ()
 
     @property
@@ -82,19 +82,19 @@ class Loading(Part):
 
     @property
     def stated(self) -> tuple[Segment, ...]:
-        """The same as the user stated it: the last segment may say how long it lasts."""
+        """The history as it was stated: the last segment may say how long it lasts."""
         return self.segments
 
     @property
     def is_a_step(self) -> bool:
-        """Whether it changes anything about steady sliding at V_*."""
+        """True if it changes anything about steady sliding at V_*."""
         return bool(self.unknowns) or any(
             s.load_velocity != 1.0 or s.displacement or s.normal_stress for s in self.segments
         )
 
     @property
     def imposes(self) -> bool:
-        """Whether it changes normal stress."""
+        """True if it changes normal stress."""
         return bool(self.unknowns) or any(segment.normal_stress for segment in self.segments)
 
     @classmethod

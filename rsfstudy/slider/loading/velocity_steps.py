@@ -20,7 +20,7 @@ _MOST_STEPS = 100_000
 
 @dataclass(frozen=True, kw_only=True)
 class VelocitySteps(Loading):
-    """How many steps, by which ratio, and the load point displacement from one to the next.
+    """Number of steps, their ratio, and the load point displacement from one to the next.
 
     The first is from V_* to `velocity_ratio` V_*, the second back, and so on; the velocity that the
     last leads to goes on for ever.

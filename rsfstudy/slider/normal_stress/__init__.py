@@ -1,4 +1,4 @@
-"""What becomes of normal stress while shear stress changes, one file a case."""
+"""Normal stress while shear stress changes, one file a case."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class NormalStress(Part):
 
     @property
     def follows_friction(self) -> bool:
-        """Whether normal stress changes while slip goes on, and not by the loading alone."""
+        """True if normal stress changes while slip goes on, and not by the loading alone."""
         return bool(self.effects)
 
     @property
