@@ -3,6 +3,7 @@ remedy.
 """
 
 import dataclasses
+import inspect
 import math
 import re
 
@@ -147,6 +148,13 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
     assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
     assert not {"alpha", "phi", "functions", "combination", "_layout", "__init__"} & set(offered)
     assert {"alpha", "phi"} <= set(dir(Scene()))
+
+
+def test_the_signature_of_a_scene_names_its_fields():
+    stated = inspect.signature(Scene).parameters
+    assert tuple(stated) == FIELDS
+    assert stated["law"].default == "slip"
+    assert stated["a"].default == Scene().a
 
 
 @pytest.mark.parametrize(

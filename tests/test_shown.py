@@ -10,7 +10,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim, verdicts
-from rsfstudy.declare.shown import Verdicts
+from rsfstudy.declare.verdicts import Verdicts
 from rsfstudy.markup import symbol, table
 from rsfstudy.measures.critical_step import CriticalStep
 

@@ -175,6 +175,11 @@ def is_list(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
+def plain_values(field: str, value: Any) -> Any:
+    """A value of a field, or a list of them, as `plain` gives it."""
+    return [plain(field, each) for each in value] if is_list(value) else plain(field, value)
+
+
 def plain(field: str, value: Any) -> Any:
     """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
     the user's own by its name.

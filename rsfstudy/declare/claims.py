@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.shown import Verdicts
+from rsfstudy.declare.verdicts import Verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 

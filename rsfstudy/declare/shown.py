@@ -1,16 +1,14 @@
-"""Studies, and the verdicts on their claims, as a notebook shows them."""
+"""A study as a notebook shows it."""
 
 from __future__ import annotations
 
-import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-import pandas as pd
-
+from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.wording import listed
 from rsfstudy.markup import (
     HEADINGS,
-    Markup,
     described,
     folded,
     quantities_table,
@@ -18,35 +16,41 @@ from rsfstudy.markup import (
     table,
     unit,
 )
+from rsfstudy.measures import Measure
+from rsfstudy.quantity import Quantity
 from rsfstudy.slider import registry
+from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import quantity
 
-if TYPE_CHECKING:
-    from rsfstudy.declare.axis import Axis
-    from rsfstudy.declare.study import Study
 
-_SIGNS = {"equals": "", "below": "< ", "above": "> "}
-#: Of a line of a terminal, and of an identifier on it, in characters.
-_WIDTH, _ID = 100, 12
-#: What a printed line tells of a claim.
-_PRINTED = ("id", "claim", "relation", "published", "ours", "tolerance", "verdict", "moved")
+def study_html(
+    caption: str,
+    axes: Sequence[Axis],
+    base: Scene,
+    measure: Measure,
+    known: Mapping[str, Quantity],
+) -> str:
+    """The axes of a study and what it measures; what all cells share is folded away.
 
-
-def study_html(study: Study) -> str:
-    """The axes of a study and what it measures; what all cells share is folded away."""
-    varied = {name for axis in study.axes for name in axis.fields}
-    fixed = {name: v for name, v in study.base.as_dict().items() if name not in varied}
-    known = study.quantities
-    shared = registry.shown(fixed, study.base.own_parts)
-    axes = [described(quantity(a.dimension, known), _along(a)) for a in study.axes]
-    measured = [quantity(name, known) for name in study.measure.variables]
+    Parameters
+    ----------
+    caption : str
+    axes, base, measure
+        Of the study.
+    known : mapping of str to Quantity
+        Quantities that the vocabulary does not have.
+    """
+    varied = {name for axis in axes for name in axis.fields}
+    fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
+    shared = registry.shown(fixed, base.own_parts)
+    along = [described(quantity(a.dimension, known), _along(a)) for a in axes]
+    measured = [quantity(name, known) for name in measure.variables]
     numbers = [(q.name, symbol(q.symbol), unit(q), q.long_name) for q in measured]
-    cells = f"{study.name}: {study.title} ({study.size:,} cells)"
     return (
-        table(HEADINGS, axes, cells)
+        table(HEADINGS, along, caption)
         + folded("what all cells share", quantities_table(shared))
         + folded(
-            f"what {study.measure.name} gives in each",
+            f"what {measure.name} gives in each",
             table([heading for heading in HEADINGS if heading != "value"], numbers),
         )
     )
@@ -56,60 +60,3 @@ def _along(axis: Axis) -> str:
     """The points of an axis, a long list cut short."""
     points: list[Any] = list(axis.labels or (row[axis.dimension] for row in axis.rows))
     return f"{listed(points, ', ')} ({len(axis)})"
-
-
-def _published(claim: dict[Any, Any]) -> str:
-    return f"{_SIGNS[claim['relation']]}{claim['published']:.6g}"
-
-
-def _headed(claim: dict[Any, Any]) -> dict[str, str]:
-    """A claim as a terminal has room for it, by the headings."""
-    return {
-        "id": textwrap.shorten(str(claim["id"]), _ID, placeholder="..."),
-        "claim": " ".join(str(claim["claim"]).split()),
-        "published": _published(claim),
-        "ours": f"{claim['ours']:.6g}",
-        "tolerance": f"{claim['tolerance']:.3g}",
-        "verdict": f"{claim['verdict']}{', moved' * bool(claim['moved'])}",
-    }
-
-
-def _aligned(rows: list[dict[str, str]]) -> str:
-    """Columns side by side under their headings; claims take the room that the others leave."""
-    table = [{name: name for name in rows[0]}, *rows]
-    wide = {name: max(len(row[name]) for row in table) for name in rows[0]}
-    others = sum(width + 2 for name, width in wide.items() if name != "claim")
-    wide["claim"] = min(wide["claim"], _WIDTH - others)
-    for row in table:
-        row["claim"] = textwrap.shorten(row["claim"], wide["claim"], placeholder=" ...")
-    lines = ("  ".join(f"{row[name]:{width}}" for name, width in wide.items()) for row in table)
-    return "\n".join(line.rstrip() for line in lines)
-
-
-class Verdicts(pd.DataFrame):
-    """A table of claims, one row each; what is taken from it is a plain table."""
-
-    @property
-    def _constructor(self) -> type[pd.DataFrame]:
-        return pd.DataFrame
-
-    def __repr__(self) -> str:
-        if self.empty or not set(_PRINTED) <= set(self):
-            return super().__repr__()
-        return _aligned([_headed(row) for row in self.to_dict("records")])
-
-    def _repr_html_(self) -> str:
-        rows = [self._row(row) for row in self.to_dict("records")]
-        headings = ("claim", "", "published", "ours", "tolerance", "verdict")
-        return table(headings, rows)
-
-    @staticmethod
-    def _row(claim: dict[Any, Any]) -> tuple[object, ...]:
-        published = _published(claim)
-        tolerance = f"{claim['tolerance']:.3g}: {claim['reason']}"
-        verdict = claim["verdict"]
-        if claim["moved"]:
-            verdict = Markup(f"<b>{verdict}</b>, and was expected to be: {claim['expected']}")
-        elif claim["because"]:
-            verdict += f", because {claim['because']}"
-        return claim["id"], claim["claim"], published, claim["ours"], tolerance, verdict

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain, select, spread
+from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain_values, select, spread
 from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
@@ -33,7 +33,6 @@ from rsfstudy.slider.registry import (
     Own,
     by_class,
     fields_with,
-    name_of,
     own_named,
     quantities_with,
     without_meaning,
@@ -330,11 +329,11 @@ class Study:
             For a name that is neither an axis nor a field of the scene or of the measure, and for
             values that make no axis.
         """
-        study, given = self, _by_name(overrides)
+        study, given = self, {name: plain_values(name, v) for name, v in overrides.items()}
         # parts of the user's own come first: they bring the fields that others may be
         for name in sorted(given, key=lambda name: not own_named([name], _rows(name, given[name]))):
             study = study._override(name, given[name])
-        return replace(study, overrides={**self.overrides, **_plain_data(given)})
+        return replace(study, overrides={**self.overrides, **given})
 
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
@@ -354,9 +353,9 @@ class Study:
         if is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
         if name in self._of_scene | SLOT_NAMES:
-            changes = by_class({name: plain(name, value)}, self.own_parts)
+            changes = by_class({name: value}, self.own_parts)
             return replace(self, base=self.base.with_(**changes))
-        return replace(self, measure=self.measure.with_(**{name: plain(name, value)}))
+        return replace(self, measure=self.measure.with_(**{name: value}))
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""
@@ -377,28 +376,14 @@ class Study:
         }
 
     def _repr_html_(self) -> str:
-        return study_html(self)
+        caption = f"{self.name}: {self.title} ({self.size:,} cells)"
+        return study_html(caption, self.axes, self.base, self.measure, self.quantities)
 
 
 def _given(measure: Measure) -> str:
     """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.headline, dict(measure.variables), inner, measure.sought))
-
-
-def _plain_data(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: [plain(name, v) for v in value] if is_list(value) else plain(name, value)
-        for name, value in overrides.items()
-    }
-
-
-def _by_name(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Overrides with parts of the user's own by their names."""
-    return {
-        name: [name_of(name, v) for v in value] if is_list(value) else name_of(name, value)
-        for name, value in overrides.items()
-    }
 
 
 def _rows(name: str, value: Any) -> list[Row]:

@@ -131,6 +131,16 @@ def _kind(name: str) -> Any:
 KINDS: Mapping[str, Any] = {slot.name: str for slot in NAMED} | {n: _kind(n) for n in OWNERS}
 
 
+def defaults() -> dict[str, Any]:
+    """The fields of a scene, and what is meant where they are not stated."""
+    choices = {slot.name: slot.default for slot in NAMED}
+    fields = ((name, OWNERS.get(name)) for name in FIELDS)
+    return {
+        name: choices[name] if part is None else part.__dataclass_fields__[name].default
+        for name, part in fields
+    }
+
+
 # ---- parts of a user's own -----------------------------------------------------------------------
 
 #: Classes that were checked.

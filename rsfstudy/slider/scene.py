@@ -8,7 +8,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from inspect import Parameter, Signature
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.markup import ShownAsTable
@@ -148,6 +149,11 @@ class Scene(ShownAsTable):
     """
 
     parts: Parts
+
+    #: What editors complete: the fields of every scene.
+    __signature__: ClassVar[Signature] = Signature(
+        [Parameter(n, Parameter.KEYWORD_ONLY, default=d) for n, d in registry.defaults().items()]
+    )
 
     def __init__(self, parts: Parts | None = None, /, **given: Any) -> None:
         if parts is None:
