@@ -20,6 +20,9 @@ from rsfstudy.slider.parts import Part, has_meaning
 if TYPE_CHECKING:
     from rsfstudy.slider.registry import Slot
 
+#: Names that every scene has beside its fields; `scene` states them.
+RESERVED: set[str] = set()
+
 
 def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, type[Part]]) -> None:
     """Raise InvalidValue for what cannot fill a slot.
@@ -37,7 +40,7 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
     """
     _check_kind(slot, part)
     check_name(slot, part, slots)
-    taken = {*_of_every_scene(), *(slot.name for slot in slots)}
+    taken = RESERVED | {slot.name for slot in slots}
     for stated in fields(part):
         _check_field(slot, part, stated.name, owners)
         if stated.name in taken - set(owners):
@@ -126,13 +129,6 @@ def origin(part: type[Part] | Part) -> tuple[str, str]:
     """Module and name of a definition, which an earlier definition of the part shares."""
     kind = part if isinstance(part, type) else type(part)
     return kind.__module__, kind.__qualname__
-
-
-def _of_every_scene() -> set[str]:
-    from rsfstudy.slider.scene import Scene  # which is made of parts itself
-
-    stated = (getattr(kind, "__annotations__", {}) for kind in Scene.__mro__)
-    return {*dir(Scene), *(name for names in stated for name in names)}
 
 
 def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]) -> None:

@@ -21,6 +21,7 @@ from rsfstudy.slider import (
     laws,
     loading,
     normal_stress,
+    own,
     places,
     registry,
     stability,
@@ -239,9 +240,9 @@ class Scene(ShownAsTable):
         """
         if all(n in self.layout.plain and value is not None for n, value in changes.items()):
             return self.with_numbers(changes)
-        own = assembly.own_parts(self.parts)
-        kept = {**self.as_dict(), **own}
-        for name in registry.without_meaning({**kept, **changes}, own.values()):
+        theirs = assembly.own_parts(self.parts)
+        kept = {**self.as_dict(), **theirs}
+        for name in registry.without_meaning({**kept, **changes}, theirs.values()):
             kept.pop(name, None)
         if any(changes.get(name) is not None for name in SPRING):
             kept |= dict.fromkeys(SPRING)
@@ -421,6 +422,9 @@ class Scene(ShownAsTable):
         """
         slider, law, stress, pores, *_others = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
+
+
+own.RESERVED.update(dir(Scene), Scene.__annotations__)
 
 
 @lru_cache(_KEPT)
