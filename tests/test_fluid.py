@@ -2,7 +2,6 @@
 one friction relation for steady sliding, its stability and motions.
 """
 
-import itertools
 import json
 import math
 import pickle
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 from running import SMALL, run
 from scipy.interpolate import PchipInterpolator
 from test_states import TwoSlipStates
-from test_steady import PLAIN, eigenvalues
+from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
 from rsfstudy.declare.axis import Axis
@@ -34,10 +33,9 @@ from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.recording import READ, STATES, Recording
 from rsfstudy.motion.regimes import check_start
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider import stability, steady
+from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
     between_ruptures,
-    by_displacement,
     by_inertial_time,
     in_rupture,
     rigid,
@@ -116,67 +114,6 @@ def test_limits_of_drainage(law, stress):
         assert slow == pytest.approx(0.0145 - 0.76 * 0.005, rel=1e-5)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("stress", STRESS)
-@pytest.mark.parametrize(
-    ("dynamics", "log_rate"),
-    [({}, -3.0), ({}, 0.0), ({}, 4.0), ({"radiation_damping": 0.003}, 1.0)],
-)
-@pytest.mark.parametrize("drainage", [0.1, 3.0])
-def test_growth_rates_are_those_of_the_assembled_equations(
-    law, stress, dynamics, log_rate, drainage
-):
-    """Their clock is slip and load point displacement: twice as fast as slip. There is one more
-    rate for porosity, and one for pore pressure.
-    """
-    load = math.exp(log_rate)
-    scene = dilatant(0.004, drainage, law=law, load_velocity_ratio=load, **stress, **dynamics)
-    scene = scene.with_(stiffness=0.9 * stability.critical_stiffness(scene, log_rate))
-    found = steady.steady_sliding(scene, log_rate)
-    equations = by_displacement(scene)
-    at = (found.spring, *found.psis)
-    assert np.abs(equations.rates(at)).max() < 1e-13
-    theirs, ours = eigenvalues(equations, at), 0.5 * stability.growth_rates(scene, log_rate)
-    assert len(ours) == len(theirs) == 4
-    assert ours[0].real > 0.0
-    # pore pressure may drain twenty times as fast as states evolve: differences have its digits
-    within = 1e-7 * np.abs(ours).max()
-    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=0, atol=within)
-
-
-@pytest.mark.parametrize("stress", STRESS)
-def test_growth_rates_with_mass_are_those_of_the_full_equations(stress):
-    """In inertial time: w times as much. At T = 1e8 s double precision sees mass in all."""
-    scene = dilatant(inertia=True, period=1e8, stiffness_ratio=0.9, **stress)
-    found = steady.steady_sliding(scene, 0.0)
-    at = (found.spring, 0.0, found.friction, *found.psis[1:])
-    theirs = eigenvalues(by_inertial_time(scene), at)
-    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
-    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("stress", STRESS)
-@pytest.mark.parametrize("dynamics", [{}, {"inertia": True}, {"radiation_damping": 1e-4}])
-def test_small_oscillations_grow_as_linear_theory_says(law, stress, dynamics):
-    """From one maximum of ln V to the next by exp(2 pi Re p/Im p)."""
-    scene = dilatant(law=law, stiffness_ratio=0.95, load_velocity_ratio=1.0 + 1e-7, **stress)
-    scene, meter = scene.with_(**dynamics), Meter(100_000)
-    rates = stability.growth_rates(scene, scene.log_load_rate)
-    turning = next(rate for rate in rates if rate.imag)
-    expected = math.exp(2.0 * math.pi * turning.real / abs(turning.imag))
-    heights = [
-        event.point.log_rate - scene.log_load_rate
-        for event in itertools.islice(
-            follow(scene, Accuracy(1e-11), meter, [maximum("log_rate")]), 8
-        )
-        if event.kind is Kind.MAXIMUM
-    ]
-    assert expected > 1.05
-    # heights of 1e-7 and more are resolved to 1e-12, and grow by their own size faster
-    assert heights[5] / heights[4] == pytest.approx(expected, rel=2e-5)
-
-
 # ---- the relation and the equations --------------------------------------------------------------
 
 
@@ -230,19 +167,6 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
         assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
         point = equations.at((friction, porosity, pressure))
         assert point.coefficient == pytest.approx(coefficient, abs=1e-10)
-
-
-@pytest.mark.parametrize("stress", STRESS)
-@pytest.mark.parametrize("dynamics", [{}, {"radiation_damping": 0.01}])
-def test_slip_rate_grows_as_the_unknowns_change(stress, dynamics):
-    """The growth of ln V that is told is that along the equations, to differences of 1e-4."""
-    scene = dilatant(0.02, load_velocity_ratio=3.0, law="slowness", **stress, **dynamics)
-    equations = between_ruptures(scene, clock=False)
-    state = np.array((0.01, 0.02, -0.01, 0.03))
-    rates, step = np.array(equations.rates(tuple(state))), 1e-5
-    ahead, behind = (equations.at(tuple(state + s * rates)).log_rate for s in (step, -step))
-    told = equations.at(tuple(state)).growth
-    assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-7)
 
 
 @pytest.mark.parametrize("stress", STRESS)
@@ -330,19 +254,6 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
 
 
 # ---- measures ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("stress", STRESS)
-@pytest.mark.parametrize(
-    "dynamics", [{}, {"inertia": True, "period": 1e7}, {"radiation_damping": 1e-3}]
-)
-def test_linear_stability_and_the_assembled_equations_vouch_for_each_other(stress, dynamics):
-    outcome = LinearStability()(dilatant(load_velocity_ratio=1.5, **stress, **dynamics), Accuracy())
-    assert outcome.status is Status.OK
-    values = outcome.values
-    # that of growth comes from differences of the equations, to 1e-8 of their slopes
-    assert values["critical_stiffness_error"] < 1e-7 * values["critical_stiffness"]
-    assert math.isnan(values["critical_stiffness_explicit"])
 
 
 SLOW = {"a": 0.01, "b_over_a": 1.5, "mu_star": 0.6, "stiffness": 0.0025, **CONSTANT}

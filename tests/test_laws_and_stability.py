@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.laws.composite import lambert_w
@@ -169,36 +167,3 @@ def test_steps_up_to_a_rate_at_which_sliding_is_less_stable():
 
 
 # ---- motions -------------------------------------------------------------------------------------
-
-#: Mass that adds a hundredth to growth, and a step that stands out from the errors of the full
-#: equations, which are stiff this slowly.
-HEAVY = {"inertia": True, "period": 3e7, "displacement_step": 1e-4}
-COMBINED = [
-    {"law": "perrin_rice_zheng", "stress_dependence": 0.7},
-    {"law": "family", "law_exponent": 0.4, "radiation_damping": 0.002, **CONSTANT},
-    {"law": "composite", "cutoff_velocity_ratio": 2.0, "stress_dependence": 2.0},
-    {"law": "composite", "cutoff_velocity_ratio": 1.0, **HEAVY},
-    {"law": "cut_off", "cutoff_velocity_ratio": 5.0, "stress_dependence": 0.5, **CONSTANT},
-    {"law": "cut_off", "cutoff_velocity_ratio": 5.0, **HEAVY},
-]
-
-
-@pytest.mark.parametrize("ratio", [0.9, 1.1])
-@pytest.mark.parametrize("fields", COMBINED, ids=str)
-def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
-    """Read off the peaks of a motion set off by 1e-5 D_c, from which it bends away in second
-    order; peaks are told to 1e-11 or so of a unit of ln V, of heights of 1e-5.
-    """
-    small = {"load_velocity_ratio": 1.0, "displacement_step": 1e-5}
-    scene = Scene(stiffness_ratio=ratio, **{**small, **fields})
-    fastest = stability.growth_rates(scene, 0.0)[0]
-    peaks = []
-    for event in follow(scene, Accuracy(1e-9), Meter(10**6), [maximum("log_rate")], clock=True):
-        if event.kind is Kind.MAXIMUM:
-            peaks.append((event.time, event.point.log_rate))
-        if len(peaks) == 4:
-            break
-    (begin, first), (end, last) = peaks[1], peaks[3]
-    grown = math.log(last / first) / (end - begin)
-    assert grown == pytest.approx(fastest.real, abs=2e-4)
-    assert 4.0 * math.pi / (end - begin) == pytest.approx(fastest.imag, rel=1e-3)

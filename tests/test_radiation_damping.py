@@ -16,7 +16,6 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
 from rsfstudy.status import Status
 
@@ -55,33 +54,6 @@ def test_at_zero_strength_it_is_the_effect_absent(law, of):
         for damping in (0.0, 1e-17)
     )
     assert faint == pytest.approx(absent, rel=1e-8)
-
-
-@given(
-    log_damping=st.floats(-25.0, 0.0),
-    log_rate=st.floats(-3.0, 3.0),
-    phi=st.floats(50.0, 85.0),
-    alpha=st.floats(0.0, 1.0),
-    law=st.sampled_from(["slip", "slowness"]),
-)
-def test_critical_stiffness_is_the_threshold_of_growth(log_damping, log_rate, phi, alpha, law):
-    scene = Scene(
-        law=law,
-        load_velocity_ratio=math.exp(log_rate),
-        radiation_damping=math.exp(log_damping),
-        phi=phi,
-        alpha=alpha,
-    )
-    outcome = LinearStability()(scene, Accuracy())
-    if outcome.status is Status.OK:
-        found = outcome.values["critical_stiffness_from_growth"]
-        # the difference of two numbers of the size of the undamped one
-        undamped = closed_forms.critical_stiffness(
-            log_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
-        )
-        assert found == pytest.approx(outcome.values["critical_stiffness"], abs=1e-6 * undamped)
-    else:
-        assert outcome.status is Status.STABLE_AT_ANY_STIFFNESS
 
 
 def test_critical_stiffness_at_the_reference_rate():
@@ -139,15 +111,6 @@ def test_a_second_formulation_in_time_agrees(law, effects):
     spring, x = found[0]
     assert peak.log_rate == pytest.approx(x, abs=1e-7)
     assert peak.spring == pytest.approx(spring, abs=1e-8)
-
-
-def test_growth_is_the_derivative_of_the_slip_rate():
-    system = between_ruptures(Scene(radiation_damping=0.01, load_velocity_ratio=2.0), clock=False)
-    state = np.array([0.03, -0.01])
-    rates = np.array(system.rates(state))
-    ahead, behind = (system.at((state + h * rates).tolist()) for h in (1e-6, -1e-6))
-    growth = (ahead.log_rate - behind.log_rate) / 2e-6
-    assert system.at(state.tolist()).growth == pytest.approx(growth, rel=1e-7)
 
 
 def test_stronger_damping_makes_slower_ruptures():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.slider import closed_forms, laws, stability, steady
-from rsfstudy.slider.equations import by_displacement, by_inertial_time, normal_stress_at
+from rsfstudy.slider.equations import normal_stress_at
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
 WITH_ONE_B = {name: law for name, law in laws.PARTS.items() if issubclass(law, laws.Law)}
@@ -113,64 +113,6 @@ def test_faster_sliding_stabilises():
     scene = Scene()
     for log_rate in (0.5, 2.0, 8.0):
         assert stability.critical_stiffness(scene, log_rate) < scene.critical_stiffness
-
-
-def eigenvalues(equations, state) -> np.ndarray:
-    """Of the assembled equations around a steady state, the fastest growing first."""
-    state, columns = np.array(state), []
-    for unit, scale in zip(np.eye(len(state)), equations.scales, strict=True):
-        step = 1e-5 * scale * unit  # rounding and truncation balance
-        ahead, behind = (equations.rates(tuple((state + s).tolist())) for s in (step, -step))
-        columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
-    found = np.linalg.eigvals(np.array(columns).T)
-    return found[np.argsort(-found.real)]
-
-
-@pytest.mark.parametrize("law", sorted(laws.PARTS))
-@pytest.mark.parametrize(
-    "effects",
-    [
-        {"normal_stress": "constant"},
-        {"alpha": 0.0},
-        {"alpha": 0.56},
-        {"alpha": 0.9},
-        {"radiation_damping": 0.003},
-    ],
-)
-@pytest.mark.parametrize("log_rate", [-3.0, 0.0, 5.0])
-@pytest.mark.parametrize("ratio", [0.7, 1.3])
-def test_growth_rates_are_those_of_the_assembled_equations(law, effects, log_rate, ratio):
-    """Their clock is slip and load point displacement: twice as fast as slip."""
-    scene = Scene(law=law, load_velocity_ratio=math.exp(log_rate), **effects)
-    scene = scene.with_(stiffness_ratio=ratio)
-    found = steady.steady_sliding(scene, log_rate)
-    equations = by_displacement(scene)
-    assert np.abs(equations.rates((found.spring, *found.psis))).max() < 1e-13
-    theirs = eigenvalues(equations, (found.spring, *found.psis))
-    ours = 0.5 * stability.growth_rates(scene, log_rate)
-    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-7)
-
-
-def test_growth_rates_with_mass_are_those_of_the_full_equations():
-    """In inertial time: w times as much. At T = 1e8 s double precision sees mass in all three."""
-    scene = Scene(inertia=True, period=1e8, stiffness_ratio=0.9)
-    found = steady.steady_sliding(scene, 0.0)
-    theirs = eigenvalues(by_inertial_time(scene), (found.spring, 0.0, found.friction))
-    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
-    np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(theirs), rtol=1e-6)
-
-
-@pytest.mark.parametrize("effects", [{}, {"inertia": True}, {"radiation_damping": 0.003}])
-def test_growth_vanishes_at_critical_stiffness(effects):
-    scene = Scene(load_velocity_ratio=2.0, period=1e6, **effects)
-    log_rate = scene.log_load_rate
-    critical = stability.critical_stiffness(scene, log_rate) / scene.critical_stiffness
-    for off, grows in ((-1e-6, True), (1e-6, False)):
-        rates = stability.growth_rates(
-            scene.with_(stiffness_ratio=critical * (1.0 + off)), log_rate
-        )
-        assert bool(rates[0].real > 0.0) is grows
-        assert abs(rates[0].real) < 1e-5
 
 
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])

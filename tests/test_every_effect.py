@@ -1,0 +1,204 @@
+"""The contract of every effect on steady sliding: growth rates are eigenvalues of the assembled
+equations, critical stiffness is where they change sign, small oscillations grow by them, and ln V
+grows as the equations say. Closed forms of single effects stand in files of their own.
+"""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsfstudy import Scene
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.stepping import Meter
+from rsfstudy.slider import laws, stability, steady
+from rsfstudy.slider.equations import (
+    Equations,
+    between_ruptures,
+    by_displacement,
+    by_inertial_time,
+)
+from rsfstudy.status import Status
+
+CONSTANT = {"normal_stress": "constant"}
+STRESSES = [CONSTANT, {"normal_stress": "imposed"}, {"alpha": 0.0}, {"alpha": 0.56}, {"alpha": 0.9}]
+#: Two states of which one strengthens, and of several lengths.
+STRENGTHENING = {"a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
+#: What may act beside a law and normal stress.
+EFFECTS = [
+    {},
+    {"radiation_damping": 1e-4},
+    {"stress_dependence": 0.5},
+    {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.1},
+    {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 3.0},
+    {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.7, "radiation_damping": 1e-4},
+]
+#: Any law, under any normal stress, with each of them that goes with both.
+SCENES = [
+    {"law": law, **stress, **effect}
+    for law, stress, effect in itertools.product(sorted(laws.PARTS), STRESSES, EFFECTS)
+    if not ("stress_dependence" in effect and stress.get("normal_stress") == "imposed")
+]
+SCENES += [{"law": law, **STRENGTHENING} for law in ("two_slip_states", "two_slowness_states")]
+#: Those with mass: periods at which double precision sees it in every rate.
+MASSIVE = [
+    {"inertia": True, "period": 1e8, **stress, **effect}
+    for stress in (CONSTANT, {"alpha": 0.56})
+    for effect in ({}, {"law": "slowness"}, {"law": "composite"}, *EFFECTS[2:4])
+]
+
+
+def scene_of(fields: dict, ratio: float, log_rate: float = 0.0) -> Scene:
+    """A scene whose stiffness is so many times critical at the rate of its load point."""
+    scene = Scene(**{"load_velocity_ratio": math.exp(log_rate), "stiffness": 0.01, **fields})
+    return scene.with_(stiffness=ratio * stability.critical_stiffness(scene, log_rate))
+
+
+def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
+    """Of the assembled equations around a steady state, by central differences."""
+    at, columns = np.array(state), []
+    for unit, scale in zip(np.eye(len(at)), equations.scales, strict=True):
+        step = 1e-5 * scale * unit  # rounding and truncation balance
+        ahead, behind = (equations.rates(tuple((at + s).tolist())) for s in (step, -step))
+        columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
+    return np.sort_complex(np.linalg.eigvals(np.array(columns).T))
+
+
+@pytest.mark.parametrize("fields", SCENES, ids=str)
+@pytest.mark.parametrize(("ratio", "log_rate"), [(0.8, -3.0), (1.2, 0.0), (0.9, 2.0)])
+def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_rate):
+    """Their clock is slip and load point displacement: twice as fast as slip."""
+    scene = scene_of(fields, ratio, log_rate)
+    found = steady.steady_sliding(scene, log_rate)
+    equations, at = by_displacement(scene), (found.spring, *found.psis)
+    assert np.abs(equations.rates(at)).max() < 1e-13
+    ours, theirs = 0.5 * stability.growth_rates(scene, log_rate), eigenvalues(equations, at)
+    assert len(ours) == 1 + scene.states
+    # pore pressure may drain, and one of two states evolve, many times as fast as others:
+    # differences have the digits of the fastest
+    within = 1e-7 * np.abs(ours).max()
+    np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=0, atol=within)
+
+
+@pytest.mark.parametrize("fields", MASSIVE, ids=str)
+def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
+    """In inertial time: w times as much."""
+    scene = Scene(**{"stiffness_ratio": 0.9, **fields})
+    found = steady.steady_sliding(scene, 0.0)
+    at = (found.spring, 0.0, found.friction, *found.psis[1:])
+    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
+    theirs = eigenvalues(by_inertial_time(scene), at)
+    np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
+
+
+@pytest.mark.parametrize("fields", SCENES + [{**f, "period": 1e6} for f in MASSIVE], ids=str)
+def test_critical_stiffness_is_where_growth_begins(fields):
+    """Linearly in what is missing of it; pore pressure that hardly drains makes it slow."""
+    for off, grows in ((-1e-6, True), (1e-6, False)):
+        rates = stability.growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
+        assert bool(rates[0].real > 0.0) is grows
+        assert abs(rates[0].real) < 1e-5
+
+
+@given(
+    law=st.sampled_from(sorted(laws.PARTS)),
+    alpha=st.none() | st.floats(0.0, 1.0),
+    phi=st.floats(50.0, 85.0),
+    log_rate=st.floats(-3.0, 3.0),
+    log_norm=st.none() | st.floats(-6.0, 0.3),
+    log_damping=st.none() | st.floats(-25.0, 0.0),
+    dilatancy=st.none() | st.floats(0.0, 0.01),
+)
+def test_the_measure_finds_the_threshold_of_growth(
+    law, alpha, phi, log_rate, log_norm, log_damping, dilatancy
+):
+    """By differences of the assembled equations, which have nothing of the formulas."""
+    stress = CONSTANT if alpha is None else {"alpha": alpha, "phi": phi}
+    fields = {"law": law, "load_velocity_ratio": math.exp(log_rate), "stiffness": 0.01, **stress}
+    if log_norm is not None:
+        period = 2.0 * math.pi * 10.0**log_norm / (math.exp(log_rate) * 1.17e-8)
+        fields |= {"inertia": True, "period": period}
+    elif log_damping is not None:
+        fields["radiation_damping"] = math.exp(log_damping)
+    if dilatancy is not None:
+        fields |= {"fluid": "dilatant", "dilatancy": dilatancy}
+    outcome = LinearStability()(Scene(**fields), Accuracy())
+    assert outcome.status in (
+        Status.OK,
+        Status.STABLE_AT_ANY_STIFFNESS,
+        Status.UNSTABLE_AT_ANY_STIFFNESS,
+        Status.NO_STEADY_STATE,
+    )
+    if outcome.status is Status.OK:
+        told = outcome.values
+        # what damping takes is the difference of two numbers of the size of the undamped one; and
+        # close to where no stiffness is stable the threshold is ill-conditioned by its own rise
+        undamped = stability.critical_stiffness(Scene(**fields), log_rate, quasi_static=True)
+        slack = 1e-6 * max(undamped, told["critical_stiffness"])
+        slack *= 1.0 + max(0.0, told["rise_by_dynamics"])
+        found = told["critical_stiffness_from_growth"]
+        assert found == pytest.approx(told["critical_stiffness"], abs=slack)
+
+
+@pytest.mark.parametrize("fields", SCENES[::3], ids=str)
+def test_slip_rate_grows_as_the_unknowns_change(fields):
+    """The growth of ln V that is told is that along the equations, away from steady sliding."""
+    scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
+    equations = between_ruptures(scene, clock=False)
+    at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.states])
+    rates, step = np.array(equations.rates(tuple(at))), 1e-5
+    ahead, behind = (equations.at(tuple(at + s * rates)).log_rate for s in (step, -step))
+    # differences err by the square of the step, and by rounding over it
+    told = equations.at(tuple(at)).growth
+    assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"law": "perrin_rice_zheng", "stress_dependence": 0.7},
+        {"law": "family", "law_exponent": 0.4, "radiation_damping": 0.002, **CONSTANT},
+        {"law": "composite", "cutoff_velocity_ratio": 2.0, "stress_dependence": 2.0},
+        {"law": "composite", "cutoff_velocity_ratio": 1.0, "inertia": True, "period": 3e7},
+        {"law": "cut_off", "cutoff_velocity_ratio": 5.0, "stress_dependence": 0.5, **CONSTANT},
+        {"law": "cut_off", "cutoff_velocity_ratio": 5.0, "inertia": True, "period": 3e7},
+        {"law": "slip", "fluid": "dilatant", "dilatancy": 0.005, "drainage": 1.0},
+        {"law": "slowness", "fluid": "dilatant", "inertia": True, **CONSTANT},
+        {"law": "slowness", "fluid": "dilatant", "radiation_damping": 1e-4, "alpha": 0.0},
+        {"law": "two_slip_states"},
+        {"law": "two_slowness_states", "radiation_damping": 1e-4},
+        {"law": "two_slip_states", **STRENGTHENING, **CONSTANT},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("ratio", [0.95, 1.05])
+def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
+    """Read off the peaks of a motion set off by a small step, from which it bends away in second
+    order: their intervals, and by how much they grow or shrink.
+    """
+    # full equations are stiff this slowly: what sets them off must stand out from their errors
+    small = 1e-4 if "period" in fields else 1e-5
+    scene = Scene(stiffness_ratio=ratio, load_velocity_ratio=1.0, displacement_step=small, **fields)
+    rates = stability.growth_rates(scene, 0.0)
+    turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
+    peaks = []
+    for event in follow(scene, Accuracy(1e-9), Meter(10**6), [maximum("log_rate")], clock=True):
+        if event.kind is Kind.MAXIMUM:
+            peaks.append((event.time, event.point.log_rate))
+        if len(peaks) == 8:
+            break
+    (begin, first), (end, last) = peaks[5], peaks[7]
+    period = 0.5 * (end - begin)
+    found = complex(0.5 * math.log(last / first), 2.0 * math.pi) / period
+    expected = complex(turning.real, abs(turning.imag))
+    assert abs(found - expected) < 1e-3 * abs(expected)
+    assert cmath.isfinite(expected)
