@@ -148,7 +148,10 @@ def test_list_and_show():
         (["run", NAME, "--set", "b_over_a=2:3:4:geom"], "write start:stop:count:log, as in"),
         (["run", NAME, "--set", "b_over_a=0:3:4:log"], "has no logarithm of 0 or less"),
         (["run", NAME, "--set", "b_over_a=2,2"], "b_over_a = 2.0: stands twice"),
-        (["run", NAME, "--set", "load_velocity_ratio=3"], "is what the measure looks for"),
+        (
+            ["run", NAME, "--set", "load_velocity_ratio=3"],
+            "solves for load_velocity_ratio; it cannot be an axis",
+        ),
         (["run", NAME, "--set", "b_over_a=two"], "b_over_a = 'two': must be a number"),
         (["run", NAME, "--set", "b_over_a=0.5"], "must exceed 1"),
         (["run", NAME, "--set", "b_ovr_a=2"], "Did you mean 'b_over_a'"),

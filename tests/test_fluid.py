@@ -385,7 +385,7 @@ def test_several_states_and_a_fluid():
         ({"fluid": "wet"}, "fluid = 'wet': is unknown.*dilatant"),
         (
             {"fluid": "dilatant", "dilatancy": 0.1, "drainage": 1e-14, **CONSTANT},
-            "leave no critical stiffness.*Give stiffness",
+            "leaves no critical stiffness.*Give stiffness",
         ),
     ],
 )

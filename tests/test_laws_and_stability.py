@@ -164,6 +164,3 @@ def test_steps_up_to_a_rate_at_which_sliding_is_less_stable():
     steps_ = KINDS["load_velocity_ratio"](scene, 1)
     surveyed = measure._surveyed(steps_, accuracy, Meter(10**6)).values["critical_velocity_ratio"]
     assert found == pytest.approx(surveyed, rel=3e-5)
-
-
-# ---- motions -------------------------------------------------------------------------------------

@@ -148,7 +148,10 @@ def test_fields_that_make_no_protocol(fields, complaint):
         ([{"velocity": "fast"}], "velocity = 'fast': must be"),
         ([{"velocity": 1.0, "duration": 0.0}], "duration = 0.0: must be positive. Leave out"),
         ([{"velocity": 1.0, "duration": math.nan}], "duration = nan: must be positive"),
-        ([{"velocity": 1.0, "duration": 1.0, "distance": 1.0}], "both say how long it lasts"),
+        (
+            [{"velocity": 1.0, "duration": 1.0, "distance": 1.0}],
+            "give duration or distance .here 1.0., not both",
+        ),
         ([{"velocity": 0.0, "distance": 1.0}], "must be positive where a distance is stated"),
         ([{"velocity": 1.0}, {"velocity": 2.0}], "segment 1: duration = inf: never ends. State"),
         ([{"velocity": 1.0, "step": math.inf}], "step = inf: must be a finite number"),

@@ -147,7 +147,10 @@ def test_points_keep_their_labels_where_they_keep_their_values():
             {"reductions": [ProportionalFit(name="z", of="critical_displacement", on="x")]},
             "critical_displacement'.*is not measured.*Did you mean",
         ),
-        ({"axes": [Axis("load_velocity_ratio", [2.0])]}, "is what the measure looks for"),
+        (
+            {"axes": [Axis("load_velocity_ratio", [2.0])]},
+            "solves for load_velocity_ratio; it cannot be an axis",
+        ),
     ],
 )
 def test_studies_put_together_wrongly_are_refused_at_once(fields, message):
@@ -157,7 +160,7 @@ def test_studies_put_together_wrongly_are_refused_at_once(fields, message):
 
 
 def test_what_the_measure_looks_for_cannot_be_set():
-    with pytest.raises(InvalidValue, match="is what the measure looks for"):
+    with pytest.raises(InvalidValue, match="solves for load_velocity_ratio; it cannot be an axis"):
         study(Axis("b_over_a", [2.0])).with_(load_velocity_ratio=3.0)
 
 

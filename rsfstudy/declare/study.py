@@ -195,7 +195,8 @@ class Study:
     def _check_sought(self, fields: Sequence[str]) -> None:
         for name in fields:
             if name in self.measure.sought:
-                raise InvalidValue(name, "...", "is what the measure looks for, and has no effect")
+                rule = f"{self.measure.name} solves for {name}; it cannot be an axis or be set"
+                raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
     # ---- parts of the user's own ------------------------------------------------------------
 

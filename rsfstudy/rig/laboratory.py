@@ -94,8 +94,8 @@ class Laboratory:
                     text = f"{name} is {value:g} {units}: unusual for a rig. Is the unit right?"
                     warnings.warn(text, UserWarning, stacklevel=3)
         if self.mass is not None and self.period is not None:
-            rule = f"and period = {self.period:g} s both state inertia"
-            raise InvalidValue("mass", self.mass, rule, remedy="State one of them.")
+            rule = f"give mass or period (here {self.period:g} s), not both"
+            raise InvalidValue("mass", self.mass, rule)
         if self.mass is not None and self.stiffness is None:
             remedy = "State the stiffness too, or the period."
             raise InvalidValue("mass", self.mass, "needs a stiffness to oscillate", remedy=remedy)

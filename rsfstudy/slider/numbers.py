@@ -76,6 +76,6 @@ def with_spring(values: dict[str, Any]) -> dict[str, Any]:
     """The numbers of a slider with one field for its spring."""
     given = [name for name in SPRING if name in values]
     if len(given) == 2:
-        rule = f"and stiffness_ratio = {values['stiffness_ratio']:g} both set the spring"
-        raise InvalidValue("stiffness", values["stiffness"], rule, remedy="Give one of them.")
+        rule = f"give stiffness or stiffness_ratio (here {values['stiffness_ratio']:g}), not both"
+        raise InvalidValue("stiffness", values["stiffness"], rule)
     return values if given else {**values, "stiffness_ratio": 1.0}

@@ -123,8 +123,8 @@ def _duration(stated: Mapping[str, Any]) -> Any:
         return stated.get("duration", math.inf)
     distance, velocity = stated["distance"], stated["velocity"]
     if "duration" in stated:
-        rule = f"and distance = {distance!r} both say how long it lasts"
-        raise InvalidValue("duration", stated["duration"], rule, remedy="State one of them.")
+        rule = f"give duration or distance (here {distance!r}), not both"
+        raise InvalidValue("duration", stated["duration"], rule)
     _check("distance", distance, "must be positive and finite", positive=True)
     _check("velocity", velocity, "must be positive where a distance is stated", positive=True)
     return distance / velocity

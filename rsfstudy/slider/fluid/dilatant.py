@@ -102,7 +102,7 @@ class Dilatant(Fluid):
             raise InvalidValue(
                 "drainage",
                 self.drainage,
-                f"and dilatancy = {self.dilatancy:g} leave no critical stiffness",
+                f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}",
                 remedy="Give stiffness itself, or raise drainage.",
             )
 

@@ -87,7 +87,7 @@ class TwoStates(LawOfStates):
         """
         super().check(scene)
         if not self.size_over_a:
-            rule = "and b1_over_a are both 0: no state has an effect"
+            rule = "must not be 0 where b1_over_a is: no state has an effect"
             raise InvalidValue("b2_over_a", self.b2_over_a, rule, remedy="Give one of them.")
         if lacks_threshold(scene):
             rule = (
