@@ -6,7 +6,7 @@ import collections
 import json
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Never
 
 import numpy as np
@@ -54,6 +54,7 @@ def simulate(
     scene: Scene,
     *nameless: Never,
     duration: float | None = None,
+    times: Sequence[float] | np.ndarray | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
     engine: Any = SCIPY,
@@ -67,6 +68,9 @@ def simulate(
     duration : float, optional
         Time to follow it for, in D_c/V_*. By default 50; of a protocol, all that it states, and 20
         D_c of the load point beyond where it does not say how long its last segment lasts.
+    times : sequence of float, optional
+        Times in D_c/V_* at which to tell what the slider does, to the accuracy of the motion. By
+        default all of it is told, several times within each step.
     rtol : float
         Accuracy of the motion.
     budget : int
@@ -94,7 +98,8 @@ def simulate(
     Raises
     ------
     InvalidValue
-        For a duration that is not positive and finite, or is given without its name.
+        For a duration that is not positive and finite, or is given without its name; and for times
+        that do not increase, or beside a duration.
 
     Warns
     -----
@@ -108,6 +113,9 @@ def simulate(
         remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
         raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     check_scene(scene)
+    at = _increasing(times, duration)
+    if at is not None:
+        duration = float(at[-1])
     duration = _as_stated(scene) if duration is None else duration
     if not _is_positive(duration):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
@@ -117,7 +125,7 @@ def simulate(
     if not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
     meter = Meter(budget, engine=accuracy.engine)
-    recording = Recording(list(_REGIMES))
+    recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
     watches = [rise("log_rate", limit)] if limit < math.inf else []
     moving = follow(scene, accuracy, meter, watches, recording=recording, until=duration)
@@ -128,7 +136,8 @@ def simulate(
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
             message += more_work(budget)
-    seen, fluid = strictly_later(recording.seen(scene)), scene.parts.fluid.unknowns
+    seen, fluid = recording.seen(scene), scene.parts.fluid.unknowns
+    seen = strictly_later(seen) if at is None else seen
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
@@ -203,6 +212,22 @@ def _as_stated(scene: Scene) -> float:
     if len(loading.segments) == 1:
         return _USUAL
     return stated + (_BEYOND / scene.load_velocity if scene.load_velocity else _USUAL)
+
+
+def _increasing(times: Any, duration: float | None) -> np.ndarray | None:
+    """Times that were asked for, checked."""
+    if times is None:
+        return None
+    if duration is not None:
+        raise InvalidValue("duration", duration, "give duration or times, not both")
+    try:
+        at = np.asarray(times, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidValue("times", times, "must be numbers, in D_c/V_*") from error
+    right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= 0.0 and at[-1] > 0.0
+    if not right or not (np.diff(at) > 0.0).all():
+        raise InvalidValue("times", times, "must increase from 0 or later, and be finite")
+    return at
 
 
 def _is_positive(value: object) -> bool:
