@@ -10,6 +10,7 @@ from conftest import cot_phi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import rsfstudy
 from rsfstudy import Scene
@@ -22,6 +23,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.regimes import error_of_slow_manifold
+from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import between_ruptures, log_rate_at
 from rsfstudy.status import Status
@@ -564,6 +566,37 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     point = system.at(start)
     assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
+
+
+@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_the_touching_point_is_the_same_by_all_engines(law, normal_stress):
+    """The engine that compiles compiles what the search evaluates; sums may be rounded together
+    there, which the state, a difference of numbers below ten, shows.
+    """
+    for load in (1e-3, 1.5, 40.0):
+        scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
+        plain, compiled = touching_point(scene), touching_point(scene, COMPILED)
+        assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
+
+
+def test_a_root_is_that_of_the_same_method_elsewhere():
+    """Bit for bit, in as many evaluations."""
+    asked = list[float]()
+
+    def function(x, given):
+        asked.append(x)
+        return given * math.atan(x - 0.3) + x**3
+
+    root = root_of(function)
+    for low, high, finest, relative in ((-1.0, 2.0, 1e-15, 1e-14), (-9.0, 0.7, 1e-6, 1e-9)):
+        expected, how = brentq(
+            lambda x: function(x, 2.0), low, high, xtol=finest, rtol=relative, full_output=True
+        )
+        asked.clear()
+        ends = function(low, 2.0), function(high, 2.0)
+        assert root(low, high, *ends, finest, relative, 2.0) == expected
+        assert len(asked) == how.function_calls
 
 
 @pytest.mark.parametrize("factor", [0.4, 3.0])

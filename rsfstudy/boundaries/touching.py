@@ -13,14 +13,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-
-from scipy.optimize import brentq
+from functools import cache
 
 from rsfstudy.motion.course import along
+from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
 from rsfstudy.motion.regimes import on_slow_manifold
+from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.stepping import Halt, Meter
-from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
+from rsfstudy.slider.equations import between_ruptures
+from rsfstudy.slider.friction import Friction
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import LOG_LOAD_RATE, STIFFNESS, A, B
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
@@ -32,32 +36,51 @@ _SLOWEST = -230.0  # ln(V/V_*): 10^-100
 _ABOVE = 1e-6
 
 
-def touching_point(scene: Scene) -> tuple[float, float] | None:
+def touching_point(scene: Scene, engine: str = SCIPY) -> tuple[float, float] | None:
     """Spring stress and state (f, Psi) at which ln V rests at the instability norm; None where it
     never can, or where there are several states and the path is none in a plane.
-
-    There, strength'(f) K (V_0/V - 1) equals the evolution of the state per unit slip.
     """
     if scene.states > 1:
         return None
-    relation, evolution = relation_of(scene), evolution_of(scene)
-    a, x = scene.a, scene.log_norm_rate
-    pull = scene.stiffness * math.expm1(scene.log_load_rate - x)
+    x, weakest = scene.log_norm_rate, scene.parts.normal_stress.weakest(scene)
+    given = x, (1.0 - 1e-6) * weakest, scene.numbers
+    g, psi = of_floats(_tangency(scene.functions.friction), engine, *given)(*given)
+    return None if math.isnan(g) else (g + scene.dynamics.radiated(x), psi)
 
-    def acceleration(friction: float) -> float:
-        value, slope, shift, _shift_slope = relation(friction)
-        return slope * pull - evolution(x, value - shift - a * x)
 
-    reach = 2.0 * scene.b * abs(x) + scene.stiffness * max(1.0, relation(0.0)[1])
-    weakest = (1.0 - 1e-6) * scene.parts.normal_stress.weakest(scene)
-    lowest = max(-reach, weakest)
-    if acceleration(lowest) >= 0.0 and math.isfinite(weakest):
-        # where normal stress all but follows shear stress, the law asks for more than its own fall
-        lowest = weakest
-    if acceleration(lowest) >= 0.0 or acceleration(reach) <= 0.0:
-        return None
-    friction = float(brentq(acceleration, lowest, reach, xtol=1e-18, rtol=1e-14))
-    return friction + scene.dynamics.radiated(x), relation(friction)[0] - a * x
+@cache
+def _tangency(made: Friction) -> Function:
+    """``(x, weakest, p) -> (g, Psi)``: frictional stress above the weakest, and the state, where
+    ln(V/V_*) = x is stationary; NaN where it never is.
+
+    There, strength'(g) K (V_0/V - 1) equals the evolution of the state per unit slip.
+    """
+    strength, evolutions = made.strength, made.evolutions
+
+    def acceleration(g: float, at: tuple[float, Numbers]) -> float:
+        x, p = at
+        value, slope, shift, _shift_slope = strength(g, (0.0,), p)
+        pull = p[STIFFNESS] * math.expm1(p[LOG_LOAD_RATE] - x)
+        (change,) = evolutions(x, (value - shift - p[A] * x,), 0.0, 1.0, p)
+        return float(slope * pull - change)
+
+    root = root_of(acceleration)
+
+    def tangency(x: float, weakest: float, p: Numbers) -> tuple[float, float]:
+        at = x, p
+        highest = 2.0 * p[B] * abs(x) + p[STIFFNESS] * max(1.0, strength(0.0, (0.0,), p)[1])
+        lowest = max(-highest, weakest)
+        if acceleration(lowest, at) >= 0.0 and math.isfinite(weakest):
+            # where normal stress all but follows shear stress, the law asks for more than its own
+            # fall
+            lowest = weakest
+        at_lowest, at_highest = acceleration(lowest, at), acceleration(highest, at)
+        if not at_lowest < 0.0 < at_highest:
+            return math.nan, math.nan
+        g = root(lowest, highest, at_lowest, at_highest, 1e-18, 1e-14, at)
+        return g, strength(g, (0.0,), p)[0] - p[A] * x
+
+    return tangency
 
 
 def start_of_path(
@@ -101,7 +124,7 @@ def _path(
     """The path from where it touches the norm, as far as there is one; by a method of order eight,
     which gets no more than what is left.
     """
-    start = touching_point(scene)
+    start = touching_point(scene, meter.engine)
     if start is None:
         return
     enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))

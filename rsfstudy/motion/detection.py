@@ -37,6 +37,7 @@ from rsfstudy.motion.layout import (
     WAITS,
     WATCHED,
 )
+from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.steppers import unknowns_at
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
 from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, B
@@ -47,7 +48,6 @@ from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, B
 EXCESS, PASSED, MARGIN = -1.0, -2.0, -3.0
 #: Where something happens between two points.
 NOWHERE, BEFORE, AFTER = range(3)
-_MOST_ITERATIONS = 100
 
 
 def quantity(watch, columns, p):
@@ -93,8 +93,9 @@ def happens(watch, before, after, direction):
     return before > 0.0 >= after
 
 
-def reading(what, clock, motion, space, limits):
+def reading(clock, given):
     """The quantity of a watch, `EXCESS`, `PASSED` or `MARGIN`, at a clock within the step."""
+    what, motion, space, limits = given
     if what == PASSED:
         unknowns_at(motion, space, clock)
         return motion.started + elapsed(motion, space, space.within, limits) - motion.target
@@ -106,48 +107,17 @@ def reading(what, clock, motion, space, limits):
     return quantity(watch_of(space, int(what)), space.between, space.p)
 
 
+_root = root_of(reading)
+
+
 def located(what, at_begin, at_end, motion, space, limits):
-    """Clock within the step at which a reading, given at both ends, changes sign: Brent's method,
-    to 1e-13 of the step.
+    """Clock within the step at which a reading, given at both ends, changes sign, to 1e-13 of the
+    step.
     """
     width = abs(motion.end - motion.clock)
     finest, relative = (1e-15 * width, 1e-15) if what == PASSED else (1e-13 * width, 1e-14)
-    latest, best, other = motion.clock, motion.end, motion.clock
-    at_latest, at_best, at_other = at_begin, at_end, at_begin
-    move = earlier = best - latest
-    for _ in range(_MOST_ITERATIONS):
-        if at_latest != 0.0 and at_best != 0.0 and (at_latest < 0.0) != (at_best < 0.0):
-            other, at_other = latest, at_latest
-            move = earlier = best - latest
-        if abs(at_other) < abs(at_best):
-            latest, best, other = best, other, best
-            at_latest, at_best, at_other = at_best, at_other, at_best
-        enough = 0.5 * (finest + relative * abs(best))
-        half = 0.5 * (other - best)
-        if at_best == 0.0 or abs(half) < enough:
-            return best
-        tried = half
-        if abs(earlier) > enough and abs(at_best) < abs(at_latest):
-            tried = guess(latest, best, other, at_latest, at_best, at_other)
-            if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
-                tried = move = half
-        else:
-            move = half
-        earlier, move = move, tried
-        latest, at_latest = best, at_best
-        best += move if abs(move) > enough else math.copysign(enough, half)
-        at_best = reading(what, best, motion, space, limits)
-    return best
-
-
-def guess(latest, best, other, at_latest, at_best, at_other):
-    """How far from the best point the root is: by a line, or by inverse quadratic interpolation."""
-    if latest == other:
-        return -at_best * (best - latest) / (at_best - at_latest)
-    to_latest = (at_latest - at_best) / (latest - best)
-    to_other = (at_other - at_best) / (other - best)
-    numerator = at_other * to_other - at_latest * to_latest
-    return -at_best * numerator / (to_other * to_latest * (at_other - at_latest))
+    given = what, motion, space, limits
+    return _root(motion.clock, motion.end, at_begin, at_end, finest, relative, given)
 
 
 def add_event(motion, events, code, clock, passed, columns, p):

@@ -13,6 +13,7 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
+from rsfstudy.slider.parts import Numbers
 
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
 ENGINES = (SCIPY, PYTHON, COMPILED)
@@ -149,6 +150,13 @@ def compiled_engine() -> Any:
         rule = f"needs Numba, which cannot be imported ({error})"
         remedy = "Install it: pip install 'rsfstudy[fast]'."
         raise InvalidValue("engine", COMPILED, rule, remedy=remedy) from error
+
+
+def of_floats(function: Callable[..., Any], name: str, *arguments: float | Numbers) -> Any:
+    """A function of floats and of tuples of floats as an engine calls it: compiled, for arguments
+    of this form, where its loop is.
+    """
+    return compiled_engine().of_floats(function, *arguments) if name == COMPILED else function
 
 
 def versions(name: str) -> dict[str, str]:

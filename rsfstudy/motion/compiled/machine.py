@@ -17,7 +17,7 @@ from rsfstudy.motion.compiled.refusal import check_raises_nothing, refused
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.loop import advance
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, without_mass
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene import Scene
 
 _ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
@@ -106,6 +106,27 @@ def compiled_loop() -> Any:
     tables = _ARRAY, _ARRAY, _TABLE, _TABLE, types.int64
     signature = types.int64(memory, _ARRAY, _ARRAY, _ARRAY, _PLAN, *tables)
     return called_from_python(advance, signature)
+
+
+def of_floats(function: Function, *arguments: float | Numbers) -> Any:
+    """A function of floats and of tuples of floats, compiled for arguments of this form.
+
+    Raises
+    ------
+    InvalidValue
+        Where a function of a part cannot be compiled, or raises.
+    """
+    return _of_floats(function, *(len(x) if isinstance(x, tuple) else 0 for x in arguments))
+
+
+@cache
+def _of_floats(function: Function, *lengths: int) -> Any:
+    check_raises_nothing(function)
+    floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in lengths)
+    try:
+        return called_from_python(function, tuple(floats))
+    except NumbaError as error:
+        raise refused(error) from error
 
 
 def addresses(equations: Equations) -> tuple[int, ...]:

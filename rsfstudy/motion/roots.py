@@ -1,0 +1,63 @@
+"""Roots of functions, in plain Python of a kind that Numba compiles."""
+
+from __future__ import annotations
+
+import math
+
+from rsfstudy.slider.parts import Function
+
+_MOST_ITERATIONS = 100
+
+
+def root_of(function: Function) -> Function:
+    """``(low, high, at_low, at_high, finest, relative, given)``: where a function of a number and
+    of what is `given` changes sign, by Brent's method, from its values at two numbers.
+
+    It is found to `finest` and, relative to itself, to `relative`.
+
+    References
+    ----------
+    Brent (1973), Algorithms for Minimization Without Derivatives, chapter 4.
+    """
+
+    def root(low, high, at_low, at_high, finest, relative, given):  # type: ignore[no-untyped-def]
+        latest, best, other = low, high, low
+        at_latest, at_best, at_other = at_low, at_high, at_low
+        move = earlier = best - latest
+        for _ in range(_MOST_ITERATIONS):
+            if at_latest != 0.0 and at_best != 0.0 and (at_latest < 0.0) != (at_best < 0.0):
+                other, at_other = latest, at_latest
+                move = earlier = best - latest
+            if abs(at_other) < abs(at_best):
+                latest, best, other = best, other, best
+                at_latest, at_best, at_other = at_best, at_other, at_best
+            enough = 0.5 * (finest + relative * abs(best))
+            half = 0.5 * (other - best)
+            if at_best == 0.0 or abs(half) < enough:
+                return best
+            tried = half
+            if abs(earlier) > enough and abs(at_best) < abs(at_latest):
+                tried = guess(latest, best, other, at_latest, at_best, at_other)
+                if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
+                    tried = move = half
+            else:
+                move = half
+            earlier, move = move, tried
+            latest, at_latest = best, at_best
+            best += move if abs(move) > enough else math.copysign(enough, half)
+            at_best = function(best, given)
+        return best
+
+    return root
+
+
+def guess(
+    latest: float, best: float, other: float, at_latest: float, at_best: float, at_other: float
+) -> float:
+    """How far from the best point the root is: by a line, or by inverse quadratic interpolation."""
+    if latest == other:
+        return -at_best * (best - latest) / (at_best - at_latest)
+    to_latest = (at_latest - at_best) / (latest - best)
+    to_other = (at_other - at_best) / (other - best)
+    numerator = at_other * to_other - at_latest * to_latest
+    return -at_best * numerator / (to_other * to_latest * (at_other - at_latest))
