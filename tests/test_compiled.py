@@ -478,21 +478,26 @@ def compiled_programs(function=doubled) -> int:
 
 
 def test_other_processes_find_equations_again(tmp_path):
-    """Closures too, by which Numba's own cache would find none."""
+    """Closures too, by which Numba's own cache would find none: it would write them anew."""
     asks = (
         "from rsfstudy import Scene\n"
+        "from rsfstudy.boundaries.touching import touching_point\n"
         "from rsfstudy.motion.compiled.machine import addresses\n"
         "from rsfstudy.motion.engines import compiling\n"
         "from rsfstudy.slider.equations import between_ruptures\n"
-        "addresses(between_ruptures(Scene(normal_stress='constant'), clock=False))\n"
+        "scene = Scene(normal_stress='constant')\n"
+        "addresses(between_ruptures(scene, clock=False))\n"
+        "touching_point(scene, 'compiled')\n"
         "print(compiling.programs)\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    told = [
-        subprocess.check_output([sys.executable, "-c", asks], env=environment, text=True)
-        for _ in range(2)
-    ]
-    assert [int(text) for text in told] == [1, 0]
+    programs, written = list[int](), list[set[str]]()
+    for _ in range(2):
+        said = subprocess.check_output([sys.executable, "-c", asks], env=environment, text=True)
+        programs.append(int(said))
+        written.append({str(file) for file in tmp_path.rglob("*.nb?")})
+    assert programs == [2, 0]
+    assert written[0] == written[1]
 
 
 def test_what_is_compiled_is_found_again(empty_cache):

@@ -131,7 +131,10 @@ def called_from_python(function: Callable[..., Any], signature: Any) -> Any:
     """A compiled function."""
 
     def compile_for(entry: str) -> Any:
-        dispatcher = numba.njit(_reaching(function, entry), cache=bool(entry), **_OPTIONS)
+        copy = _reaching(function, entry)
+        dispatcher = numba.njit(copy, **_OPTIONS)
+        if entry:
+            dispatcher._cache = _ByContent(copy)
         dispatcher.compile(signature)
         return dispatcher
 
