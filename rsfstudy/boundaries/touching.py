@@ -109,8 +109,8 @@ def start_of_path(
     Point or None
         None where the path touches the norm from above or never comes by.
     """
-    above = rise("log_rate", scene.log_norm_rate + _ABOVE, ends=True)
-    lost = fall("log_rate", _SLOWEST, ends=True)
+    above = rise("log_rate", scene.log_norm_rate + _ABOVE, ends=True, waits=True)
+    lost = fall("log_rate", _SLOWEST, ends=True, waits=True)
     watches = (above, lost, rise(*crossing), fall(*crossing))
     for event in _path(scene, tolerance, meter, watches, backward=True):
         if event.watch in watches[2:] and accepts(event.point):
@@ -164,7 +164,8 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
 
     None where the motion does not come back.
     """
-    fallen, watches = False, (maximum("log_rate"), fall("log_rate", scene.log_load_rate))
+    fallen = False
+    watches = maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
     for event in _path(scene, tolerance, meter, watches, backward=False):
         if fallen and event.kind is Kind.MAXIMUM:
             return event.point.log_rate - scene.log_norm_rate
@@ -178,8 +179,8 @@ def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
     """
     if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
         return False
-    beyond = rise("log_rate", scene.log_norm_rate + _ABOVE)
-    fallen, watches = False, (beyond, maximum("log_rate"), fall("log_rate", scene.log_load_rate))
+    fallen, beyond = False, rise("log_rate", scene.log_norm_rate + _ABOVE)
+    watches = beyond, maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
     for event in _path(scene, tolerance, meter, watches, backward=False):
         if fallen and event.kind in (Kind.RISE, Kind.MAXIMUM):
             # a step may pass the norm and come back
