@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import wraps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
@@ -34,8 +33,7 @@ def stride(log_rate: float, normal_stress: float, log_load_rate: float) -> float
     return min(LONGEST_STRIDE * stationary * max(1.0, normal_stress), LONGEST_STEP)
 
 
-@dataclass(frozen=True)
-class Equations:
+class Equations(NamedTuple):
     """A system of ordinary differential equations in its own clock, on which it does not depend.
 
     Attributes
@@ -158,13 +156,13 @@ def by_displacement(scene: Scene) -> Equations:
     are linear in departures farther from steady sliding than those along the path.
     """
     along = between_ruptures(scene, clock=False)
-    return replace(along, rate=scene.functions.by_displacement)
+    return along._replace(rate=scene.functions.by_displacement)
 
 
 def by_inertial_time(scene: Scene) -> Equations:
     """The full equations in inertial time T/(2 pi)."""
     along = in_rupture(scene)
-    return replace(along, rate=_full(scene).against_time)
+    return along._replace(rate=_full(scene).against_time)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:

@@ -26,11 +26,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import zip_longest
+from operator import mul
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.equations import evolutions_of, relation_of, steady_states_of
+from rsfstudy.slider.equations import relation_of, steady_states_of
 from rsfstudy.slider.steady import Steady, steady_sliding
 
 if TYPE_CHECKING:
@@ -184,14 +186,15 @@ def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
 
 
 def _dot(first: Sequence[float], second: Sequence[float]) -> float:
-    return sum(x * y for x, y in zip(first, second, strict=True))
+    product: float = sum(map(mul, first, second))
+    return product
 
 
 def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:
     """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
     ln V, to the shift, and to each state (columns).
     """
-    evolutions = evolutions_of(scene)
+    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
     shift = relation_of(scene)(steady.friction)[2]
     at, columns = [steady.log_rate, shift, *steady.psis], []
     for place, (value, scale) in enumerate(zip(at, _scales(scene, steady, shift), strict=True)):
@@ -199,9 +202,9 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float
         slopes = [0.0] * len(steady.psis)
         for number, weight in _WEIGHTS:
             at[place] = value + number * step
-            ahead = evolutions(at[0], tuple(at[2:]), at[1])
+            ahead = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
             at[place] = value - number * step
-            behind = evolutions(at[0], tuple(at[2:]), at[1])
+            behind = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
             for state, (more, less) in enumerate(zip(ahead, behind, strict=True)):
                 slopes[state] += weight * (more - less) / step
         at[place] = value
@@ -316,13 +319,11 @@ def _product(first: Polynomial, second: Polynomial) -> Polynomial:
 
 
 def _sum(first: Polynomial, second: Polynomial) -> Polynomial:
-    longer = max(len(first), len(second))
-    padded = ([*p, *[0.0] * (longer - len(p))] for p in (first, second))
-    return [x + y for x, y in zip(*padded, strict=True)]
+    return [x + y for x, y in zip_longest(first, second, fillvalue=0.0)]
 
 
 def _value(polynomial: Polynomial, at: float) -> float:
-    return math.fsum(x * at**n for n, x in enumerate(polynomial))
+    return math.fsum([x * at**n for n, x in enumerate(polynomial)])
 
 
 def _positive_roots(polynomial: Polynomial) -> list[float]:

@@ -49,7 +49,17 @@ class Steady:
 
 
 def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
-    """Steady sliding of a scene at ln(V/V_*); None where no stress is as weak or as strong."""
+    """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
+    strong.
+    """
+    key = "steady", log_rate
+    if key not in scene.made:
+        scene.made[key] = _found(scene, log_rate)
+    known: Steady | None = scene.made[key]
+    return known
+
+
+def _found(scene: Scene, log_rate: float) -> Steady | None:
     friction = stress_at(scene, steady_excess(scene, log_rate))
     if friction is None:
         return None

@@ -35,7 +35,7 @@ class Compiled:
         return CompiledState(initial, called_with)
 
     def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
-        return _table(*(addresses(system) for system in systems))
+        return _table(*map(addresses, systems))
 
     def passed(self, array: np.ndarray) -> np.ndarray:
         return array
@@ -116,7 +116,7 @@ def of_floats(function: Function, *arguments: float | Numbers) -> Any:
     InvalidValue
         Where a function of a part cannot be compiled, or raises.
     """
-    return _of_floats(function, *(len(x) if isinstance(x, tuple) else 0 for x in arguments))
+    return _of_floats(function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments])
 
 
 @cache
@@ -137,7 +137,7 @@ def addresses(equations: Equations) -> tuple[int, ...]:
     InvalidValue
         Where a function of a part cannot be compiled, or raises.
     """
-    return _addresses(tuple(function for function in filling(equations) if function), equations)
+    return _addresses(tuple(filter(None, filling(equations))), equations)
 
 
 _ADDRESSES: dict[tuple[Any, ...], tuple[int, ...]] = {}

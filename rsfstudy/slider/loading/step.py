@@ -48,5 +48,5 @@ class Step(Loading):
     @property
     def segments(self) -> tuple[Segment, ...]:
         """The step, and what follows it."""
-        step = Segment(self.load_velocity, self.displacement_step)
-        return (step._replace(normal_stress=self.normal_stress_step),)
+        moved, pressed = self.displacement_step, self.normal_stress_step
+        return (Segment(self.load_velocity, moved, normal_stress=pressed),)
