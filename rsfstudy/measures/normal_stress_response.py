@@ -116,13 +116,13 @@ class _Record(NamedTuple):
     @property
     def drift(self) -> float:
         """What the trend would have made of the response, over that."""
-        amplitude = 2.0 * abs(_harmonics(self.spring)[self.periods]) / len(self.spring)
+        amplitude = 2.0 * abs(np.fft.rfft(self.spring)[self.periods]) / len(self.spring)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
         """Spring stress at other periods than that of forcing, over that at it."""
-        harmonics = _harmonics(self.spring)
+        harmonics = np.fft.rfft(self.spring)
         at = harmonics[self.periods]
         return np.asarray(np.delete(harmonics, [0, self.periods]) / at)
 
@@ -144,7 +144,7 @@ class _Record(NamedTuple):
         return self._from_every(1)
 
     def _from_every(self, stride: int) -> complex:
-        spring, imposed = (_harmonics(x[::stride]) for x in (self.spring, self.imposed))
+        spring, imposed = (np.fft.rfft(x[::stride]) for x in (self.spring, self.imposed))
         return complex(spring[self.periods] / imposed[self.periods])
 
     def is_as(self, other: _Record) -> bool:
@@ -335,10 +335,6 @@ class NormalStressResponse(Reading):
         trend = springs[-1] - springs[0]
         spring = np.array(springs[:-1]) - trend * np.arange(instants) / instants
         return _Record(events, spring, -np.array(reliefs[:-1]), trend, way.periods)
-
-
-def _harmonics(values: np.ndarray) -> np.ndarray:
-    return np.fft.rfft(values)
 
 
 def _degrees(response: complex) -> float:
