@@ -22,10 +22,11 @@ from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.regimes import error_of_slow_manifold
+from rsfstudy.motion.regimes import error_of_slow_manifold, on_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import between_ruptures, log_rate_at
+from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -570,7 +571,7 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
 
 @pytest.mark.parametrize("normal_stress", ["constant", "variable"])
 @pytest.mark.parametrize("law", ["slip", "slowness"])
-def test_the_touching_point_is_the_same_by_all_engines(law, normal_stress):
+def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_stress):
     """The engine that compiles compiles what the search evaluates; sums may be rounded together
     there, which the state, a difference of numbers below ten, shows.
     """
@@ -578,6 +579,9 @@ def test_the_touching_point_is_the_same_by_all_engines(law, normal_stress):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
         plain, compiled = touching_point(scene), touching_point(scene, COMPILED)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
+        at = [on_slow_manifold(scene, 0.01, (-0.02,), engine) for engine in (SCIPY, COMPILED)]
+        assert all(isinstance(point, Point) for point in at)
+        assert np.hstack(at[1]) == pytest.approx(np.hstack(at[0]), rel=1e-11, abs=1e-14)
 
 
 def test_a_root_is_that_of_the_same_method_elsewhere():

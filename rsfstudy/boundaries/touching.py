@@ -145,7 +145,8 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
 
     None where the path never passes that slip rate as the motion of this scene would.
     """
-    begin = on_slow_manifold(scene, scene.spring_stress_step, (0.0,) * scene.states)
+    psis = (0.0,) * scene.states
+    begin = on_slow_manifold(scene, scene.spring_stress_step, psis, meter.engine)
     if begin.growth == 0.0:
         return None
     start = start_of_path(

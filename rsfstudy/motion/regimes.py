@@ -4,12 +4,14 @@ it does.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 from scipy.optimize import newton
 
 from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.stepping import Halt
 from rsfstudy.slider import steady
@@ -21,7 +23,7 @@ from rsfstudy.slider.equations import (
     steady_states_of,
 )
 from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -103,9 +105,23 @@ def at_rate(scene: Scene, point: Point, log_rate: float) -> Point:
     return point._replace(log_rate=log_rate, friction=friction)
 
 
-def on_slow_manifold(scene: Scene, spring: float, psis: Numbers) -> Point:
+def on_slow_manifold(scene: Scene, spring: float, psis: Numbers, engine: str = SCIPY) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
-    return between_ruptures(scene, clock=False).at((spring, *psis))
+    slow = between_ruptures(scene, clock=False)
+    given = (spring, *psis), slow.p
+    now: Point = of_floats(_point_of(slow.rate, slow.point), engine, *given)(*given)
+    return now
+
+
+@cache
+def _point_of(rate: Function, point: Function) -> Function:
+    """``(state, p) -> Point``."""
+
+    def at(state: Numbers, p: Numbers) -> Point:
+        now: Point = point(state, rate(state, p), p)
+        return now
+
+    return at
 
 
 def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
