@@ -76,8 +76,8 @@ class Machine(Protocol):
     def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
         """The table of functions of the regimes."""
 
-    def passed(self, array: np.ndarray) -> Any:
-        """An array as the loop takes it."""
+    def passed(self, *arrays: np.ndarray) -> Sequence[Any]:
+        """Arrays as the loop takes them."""
 
     def numbers(self, p: Numbers) -> Any:
         """The numbers of a scene as the loop takes them."""
@@ -102,8 +102,8 @@ class Plain:
         rows[layout.FAST, -1] = rows[layout.SLOW, -1]
         return rows
 
-    def passed(self, array: np.ndarray) -> memoryview:
-        return memoryview(array)  # type: ignore[arg-type]
+    def passed(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+        return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
     def numbers(self, p: Numbers) -> Numbers:
         return p
@@ -243,7 +243,7 @@ def _plan(
     scales = np.array([scale for system in systems for scale in system.scales])
     limits = _NO_MASS if both is None else tuple(both.limits)
     table, p = machine.table(systems), machine.numbers(slow.p)
-    called = machine.passed(scales), table, limits, p
+    called = *machine.passed(scales), table, limits, p
     return _Plan(machine, machine.initial(tuple(fields.items())), called, systems)
 
 
@@ -279,8 +279,8 @@ def _events(
     called_with = *times, meter.budget - meter.spent, keeper.records
     state = machine.state(plan.initial, called_with)
     block = np.empty(workspace.size(len(y) // 2, states, len(watches)))
-    arrays = map(machine.passed, (y, last, block))
-    tables = map(machine.passed, (asked.copy(), keeper.samples, events, keeper.rows))
+    arrays = machine.passed(y, last, block)
+    tables = machine.passed(asked.copy(), keeper.samples, events, keeper.rows)
     arguments = *arrays, plan.called, *tables, stepper
     run, end, account = machine.advance(), layout.HANDS_OVER, _Account(meter, regimes)
     while end == layout.HANDS_OVER:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -37,8 +38,8 @@ class Compiled:
     def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
         return _table(*map(addresses, systems))
 
-    def passed(self, array: np.ndarray) -> np.ndarray:
-        return array
+    def passed(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
+        return arrays
 
     def numbers(self, p: Numbers) -> np.ndarray:
         return np.array(p)
