@@ -18,9 +18,9 @@ from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.events import rise
+from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
-from rsfstudy.motion.stepping import Halt, Meter, more_work
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.protocol import Protocol

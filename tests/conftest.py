@@ -18,7 +18,7 @@ from rsfstudy.compute import clusters, workers
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, Watch, settling
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True

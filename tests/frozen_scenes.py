@@ -22,7 +22,11 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, Watch, fall, maximum, minimum, rise, settling
 from rsfstudy.motion.recording import OBSERVED, Recording
-from rsfstudy.motion.stepping import Meter
+
+try:
+    from rsfstudy.motion.meter import Meter
+except ImportError:  # in a tree of before
+    from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import between_ruptures, rigid
 
 #: Rows of a motion that are kept, and what those without end may cost.

@@ -18,7 +18,11 @@ import rsfstudy
 from rsfstudy import Axis, Scene, simulate
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.events import Kind
-from rsfstudy.motion.stepping import Halt
+
+try:
+    from rsfstudy.motion.meter import Halt
+except ImportError:  # in a tree of before
+    from rsfstudy.motion.stepping import Halt
 from rsfstudy.slider.point import Point
 
 #: Numbers of a point that are no states.

@@ -23,9 +23,9 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import WorkPrecision
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.reduce import Cheapest, reduced
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.status import Status

@@ -14,8 +14,8 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Event, Kind, maximum
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import READ, STATES, Recording
-from rsfstudy.motion.stepping import Meter
 
 RTOL = 1e-6
 #: A load point that starts, rests, is displaced as it goes on, and changes its velocity.

@@ -34,8 +34,8 @@ from rsfstudy.motion.compiled import building, machine
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY, compiling
 from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import READ, Recording
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.equations import between_ruptures, rigid
 from rsfstudy.slider.laws import Law

@@ -18,8 +18,8 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.engines import PYTHON, SCIPY
 from rsfstudy.motion.events import Kind, maximum, minimum
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import starting
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,

@@ -15,7 +15,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import Kind, maximum, rise
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT, FALL = "load_velocity_ratio", "displacement_step", "normal_stress_step"

@@ -16,7 +16,7 @@ from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 HEADLINES = (

@@ -19,8 +19,8 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import Kind, rise
 from rsfstudy.motion.handover import GOES_ON, margin, termination_of
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import starting
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)

@@ -18,7 +18,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import fall, maximum, minimum, rise
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 
 A, B, MU = 0.01, 0.018, 0.7
 #: Levels of ln V that are crossed, before and after the step of the load point.

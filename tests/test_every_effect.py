@@ -19,7 +19,7 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import laws, stability, steady
 from rsfstudy.slider.equations import (
     Equations,

@@ -30,9 +30,9 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY
 from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import READ, STATES, Recording
 from rsfstudy.motion.regimes import check_start
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
     between_ruptures,

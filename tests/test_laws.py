@@ -15,8 +15,8 @@ from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import READ, Recording
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider import laws, steady
 from rsfstudy.slider.equations import evolution_of, evolutions_of, rigid, steady_states_of
 from rsfstudy.slider.laws.composite import lambert_w

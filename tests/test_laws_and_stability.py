@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.status import Status

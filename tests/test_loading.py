@@ -14,7 +14,7 @@ from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number

@@ -20,7 +20,7 @@ from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import closed_forms, stability, steady
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.status import Status

@@ -15,8 +15,8 @@ from rsfstudy.boundaries.swing import swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.regimes import starting
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.point import Point
 
 CASES = {

@@ -25,7 +25,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.protocol import Protocol
 from rsfstudy.status import Status
 

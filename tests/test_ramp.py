@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import Kind, maximum, settling
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 

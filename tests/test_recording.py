@@ -9,8 +9,8 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path, up_to
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.status import Status
 
 #: What values may be off by, in the accuracy asked for, times what weighs as much as 1 in ln V.

@@ -20,10 +20,10 @@ from rsfstudy.motion.columns import filling, unpacking
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.engines import PYTHON, SCIPY
 from rsfstudy.motion.loop import move_on
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.steppers import Stepper, unrolled
 from rsfstudy.motion.steppers.order_eight import OrderEight
 from rsfstudy.motion.steppers.scipy import METHODS, SciPyStepper
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.motion.workspace import Workspace, size, workspace
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, rigid
 from rsfstudy.status import Status

@@ -12,7 +12,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import Kind, maximum, settling
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 #: Waves carry away all that the spring gives: to follow V up to V_0 takes 4,000,000 right-hand

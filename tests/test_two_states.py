@@ -19,7 +19,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import laws, stability
 from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
 from rsfstudy.slider.parts import number

@@ -13,7 +13,7 @@ import numpy as np
 from rsfstudy.boundaries.cycles import LN10, NUMBERS, Cycle, cycles, more_events, orbit_of
 from rsfstudy.boundaries.return_map import Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 

@@ -14,8 +14,8 @@ from rsfstudy.boundaries.sought import Steps
 from rsfstudy.boundaries.swing import stability_margin
 from rsfstudy.boundaries.touching import goes_beyond
 from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.meter import TIGHTEST, Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold
-from rsfstudy.motion.stepping import TIGHTEST, Meter
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _BY_CHANCE = 0.004

@@ -18,8 +18,8 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording, row, up_to
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene

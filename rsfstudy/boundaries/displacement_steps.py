@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from rsfstudy.boundaries.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
 from rsfstudy.boundaries.touching import displacement_on_path
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene

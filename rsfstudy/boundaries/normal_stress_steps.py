@@ -10,8 +10,8 @@ from rsfstudy.boundaries.shooting import LOOSE, ShotSteps
 from rsfstudy.boundaries.sought import RISE_OF_MASS, SMALLEST_STEP, UNSEEN, falls_behind
 from rsfstudy.boundaries.swing import orbits_may_close, stability_margin, swing
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import on_slow_manifold
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.closed_forms import effective_friction
 from rsfstudy.slider.equations import steady_states_of

@@ -11,7 +11,7 @@ import numpy as np
 from rsfstudy.boundaries.cycles import Cycle, cycles
 from rsfstudy.boundaries.return_map import Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.scene import Scene
 
 #: Most events of a period that is looked for.

@@ -9,7 +9,7 @@ import numpy as np
 from rsfstudy.boundaries.shooting import LOOSE, ShotSteps
 from rsfstudy.boundaries.swing import swing
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.scene import Scene
 

@@ -23,9 +23,9 @@ import numpy as np
 from rsfstudy.boundaries.cycles import NUMBERS, Cycle, cycles, orbit_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import without_mass
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene

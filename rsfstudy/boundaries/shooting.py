@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.boundaries.sought import Steps
 from rsfstudy.boundaries.touching import cycle_misfit, rate_step_misfit
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.scene import Scene
 
 #: Local tolerance of the first root.

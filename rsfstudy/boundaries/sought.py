@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from rsfstudy.boundaries.swing import settles
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene
 

@@ -12,8 +12,8 @@ from rsfstudy.boundaries.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
 from rsfstudy.slider.parts import Numbers

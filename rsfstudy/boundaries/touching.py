@@ -18,9 +18,9 @@ from functools import cache
 from rsfstudy.motion.course import along
 from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.roots import root_of
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.slider.friction import Friction
 from rsfstudy.slider.parts import Function, Numbers

@@ -26,7 +26,7 @@ from rsfstudy.motion.accuracy import (
     Accuracy,
     relative_work,
 )
-from rsfstudy.motion.stepping import Halt, Meter, more_work
+from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.quantity import Output, Quantity, is_name
 from rsfstudy.slider.registry import FIELDS
 from rsfstudy.slider.scene import Scene

@@ -27,7 +27,7 @@ from rsfstudy.measures.limit_cycle import (
     without_period,
 )
 from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene

@@ -13,7 +13,7 @@ from typing import ClassVar
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Halt, Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.scene import Scene

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._problem import ERRORS, Problem, posed_by
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status

@@ -16,9 +16,9 @@ from rsfstudy.measures._recorded import recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
 from rsfstudy.motion.recording import READ, Recording, along_path
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene

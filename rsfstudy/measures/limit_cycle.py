@@ -31,8 +31,8 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._recorded import recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, error_between
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import OBSERVED, along_path
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene

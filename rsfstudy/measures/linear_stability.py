@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider import closed_forms
 from rsfstudy.slider.equations import (

@@ -17,7 +17,7 @@ from rsfstudy.measures._recorded import recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading.oscillation import Oscillation
 from rsfstudy.slider.point import Point

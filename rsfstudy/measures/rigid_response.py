@@ -17,8 +17,8 @@ from rsfstudy.measures._reading import errors_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import READ, Recording
-from rsfstudy.motion.stepping import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.equations import rigid, steady_states_of
 from rsfstudy.slider.scene import Scene

@@ -16,8 +16,8 @@ from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status

@@ -9,7 +9,7 @@ from rsfstudy.boundaries.swing import neutral, swing
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status

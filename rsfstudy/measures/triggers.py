@@ -19,7 +19,7 @@ from rsfstudy.boundaries.swing import settles
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.closed_forms import effective_friction
 from rsfstudy.slider.scene import Scene

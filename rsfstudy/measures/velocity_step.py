@@ -17,9 +17,9 @@ from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.readings import friction_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess

@@ -16,8 +16,8 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._problem import ERRORS, Problem, posed_by
 from rsfstudy.motion.accuracy import LOOSEST_RTOL, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status

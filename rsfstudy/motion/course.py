@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, Kind, Watch
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import jumped, starting
 from rsfstudy.motion.running import happening, path, segment
-from rsfstudy.motion.stepping import Meter
 from rsfstudy.slider.equations import Equations
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.point import Point

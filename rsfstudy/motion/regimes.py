@@ -13,7 +13,7 @@ from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.handover import Limits
-from rsfstudy.motion.stepping import Halt
+from rsfstudy.motion.meter import Halt
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
     Equations,

@@ -18,10 +18,10 @@ from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.loop import advance
+from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, Recording
 from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
-from rsfstudy.motion.stepping import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.slider.equations import Equations, without_mass
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.point import Point

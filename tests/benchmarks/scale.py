@@ -29,7 +29,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute import runner
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import BDF, DOP853, LSODA, RK23, RK45, OdeSolution, OdeSolver, Radau
 
+from rsfstudy.motion.meter import Halt
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
-from rsfstudy.motion.stepping import Halt
 from rsfstudy.motion.workspace import spend
 from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.parts import Numbers

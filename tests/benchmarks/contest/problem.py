@@ -23,7 +23,7 @@ from rsfstudy.boundaries.cycles import _asked, cycles
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, rise, settling
-from rsfstudy.motion.stepping import Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
 from rsfstudy.slider.equations import IN_RUPTURE, between_ruptures
 from rsfstudy.slider.point import Point
