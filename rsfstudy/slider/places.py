@@ -37,20 +37,18 @@ SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
 
 def numbers(scene: Scene) -> Numbers:
     """The numbers of a scene, each in its place."""
-    return _numbers(scene, scene.stiffness, scene.load_velocity, scene.log_load_rate)
+    p = scene.numbers_of_friction
+    of_load = scene.stiffness, scene.load_velocity, scene.log_load_rate
+    return (*p[:STIFFNESS], *of_load, *p[STRESS_DEPENDENCE:])
 
 
 def numbers_of_friction(scene: Scene) -> Numbers:
-    """Numbers for functions that friction alone decides: no spring, and no load point."""
-    return _numbers(scene, math.nan, math.nan, math.nan)
-
-
-def _numbers(scene: Scene, stiffness: float, load_velocity: float, log_load_rate: float) -> Numbers:
+    """Numbers for functions that friction alone decides: NaN for spring and load point."""
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
     size = scene.b if law.states == 1 else slider.a * law.size_over_a
-    of_load = load_velocity, log_load_rate
+    of_load = math.nan, math.nan, math.nan
     of_stress = law.stress_dependence, scene.imposed_normal_stress
-    common = slider.a, size, slider.mu_star, stiffness, *of_load, *of_stress
+    common = slider.a, size, slider.mu_star, *of_load, *of_stress
     own = (
         *_filled_up(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
         *_filled_up(scene.pressure_source, scene, DYNAMICS - FLUID),

@@ -277,13 +277,17 @@ class Scene(ShownAsTable):
     @property
     def segments(self) -> tuple[tuple[Scene, float], ...]:
         """The scene as each segment of its loading has it, and for how long, in D_c/V_*."""
-        history = self.parts.loading.segments
+        history = self._history
         if len(history) == 1:
             return ((self, history[0].duration),)
         acting = [self.under(segment) for segment in history]
         if self.parts.loading.unknowns:
             acting[0] = self
         return tuple((scene, s.duration) for scene, s in zip(acting, history, strict=True))
+
+    @cached_property
+    def _history(self) -> tuple[loading.Segment, ...]:
+        return self.parts.loading.segments
 
     # ---- its equations --------------------------------------------------------------------------
 
@@ -374,7 +378,7 @@ class Scene(ShownAsTable):
     @cached_property
     def load_velocity(self) -> float:
         """V_0/V_* after the last step."""
-        return self.parts.loading.segments[-1].load_velocity
+        return self._history[-1].load_velocity
 
     @cached_property
     def log_load_rate(self) -> float:
@@ -384,12 +388,12 @@ class Scene(ShownAsTable):
     @cached_property
     def imposed_normal_stress(self) -> float:
         """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
-        return self.parts.loading.segments[-1].normal_stress
+        return self._history[-1].normal_stress
 
     @property
     def spring_stress_step(self) -> float:
         """Change of spring stress over sigma_* by the first displacement step, K d."""
-        return self.stiffness * self.parts.loading.segments[0].displacement
+        return self.stiffness * self._history[0].displacement
 
     @property
     def is_disturbed(self) -> bool:
