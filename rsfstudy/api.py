@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
-from rsfstudy.compute import own_code, provenance, runner
+from rsfstudy.compute import code_digest, provenance, runner
 from rsfstudy.compute.cells import Task, sendable, serial
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
@@ -162,7 +162,7 @@ def prepared(
         code=provenance.code(study.accuracy.engine),
         parts=tuple(study.own_parts.values()),
         steppers=own_stepper(study.accuracy.engine),
-        own_code=own_code.digest(*study.own_classes),
+        own_code=code_digest.of_classes(*study.own_classes),
     )
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent

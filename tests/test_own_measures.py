@@ -3,10 +3,6 @@ and an outcome that cannot be is a failed cell, with its message.
 """
 
 import re
-import sys
-import threading
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -377,61 +373,3 @@ def test_an_endless_message_is_cut(tmp_path):
     assert message.startswith("begin a")
     assert message.endswith("a end")
     assert len(message) < 2100
-
-
-# ---- what a cell raises beside itself -----------------------------------------------------------
-
-
-def raises():
-    raise ZeroDivisionError("in a thread")
-
-
-class Dying:
-    def __del__(self):
-        raise KeyError("in a destructor")
-
-
-@dataclass(frozen=True)
-class Threaded(Measure):
-    """Starts a thread that raises, and drops what cannot be dropped."""
-
-    name: ClassVar[str] = "threaded"
-    headline: ClassVar[str] = "total"
-    variables: ClassVar = {"total": ()}
-    typical_work: ClassVar[int] = 1
-
-    def find(self, scene, accuracy, meter):
-        for target in (raises, sys.exit):  # which ends a thread without a word
-            thread = threading.Thread(target=target)
-            thread.start()
-            thread.join()
-        Dying()
-        return Outcome(Status.OK, {"total": scene.b_over_a}, "found")
-
-
-HEARD = (
-    "found; a thread raised ZeroDivisionError: in a thread; "
-    "a destructor raised KeyError: 'in a destructor'"
-)
-
-
-def test_what_threads_and_destructors_raise_is_told_by_their_cell(cluster, capfd):
-    """And not by the terminal, over the progress bar; here and on workers."""
-    hooks = threading.excepthook, sys.unraisablehook
-    for where in ({"workers": 0}, {"client": cluster}):
-        dataset = run(study(Threaded()), **where)
-        assert dataset["message"].values.tolist() == [HEARD] * 2
-        assert dataset["status"].values.tolist() == [0, 0]
-    assert "Traceback" not in "".join(capfd.readouterr())
-    assert (threading.excepthook, sys.unraisablehook) == hooks
-
-
-def test_a_cell_that_runs_a_study_hears_what_is_its_own():
-    class Outer(Own):
-        def find(self, scene, accuracy, meter):
-            inner = run(study(Threaded())).message.values[0]
-            Dying()
-            return Outcome(Status.OK, {"total": 1.0}, f"[{inner}]")
-
-    (message, _other) = run(study(Outer())).message.values
-    assert message == f"[{HEARD}]; a destructor raised KeyError: 'in a destructor'"

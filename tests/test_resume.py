@@ -105,20 +105,17 @@ def goes_on(output, already):
 
 def test_the_driver_is_killed(held):
     """kill -9: what a worker has finished is kept before its batch is done, and the processes it
-    leaves behind end by themselves; what they say then is not said on the terminal, nor kept longer
-    than until the next run.
+    leaves behind end by themselves.
     """
     run = held()  # the cells after the first of each batch wait, and the first is kept meanwhile
     left = list(children(run.process).values())
     run.process.kill()
-    _code, _out, said = ended(run.process)
-    assert said == ""
+    ended(run.process)
     already = cells_in(run.journal)
     assert 0 < already <= 2
     assert not (run.output / "faulty.nc").exists()
     _gone, alive = psutil.wait_procs(left, timeout=HANGS)
     assert not alive
-    assert "leaked semaphore" in (run.output / "faulty.workers.log").read_text()
     goes_on(run.output, already)
 
 
@@ -132,16 +129,6 @@ def test_a_worker_is_killed(held):
     assert "warning: a worker ended: the cells it held (" in said
     assert len(said.splitlines()) == 1, said
     same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
-
-
-def test_the_resource_tracker_is_killed(held):
-    """What the one that takes its place has to say is not said on the terminal."""
-    run = held("--workers", "1")
-    found = children(run.process)
-    next(c for words, c in found.items() if "resource_tracker" in words).kill()
-    run.let_through()
-    code, _out, said = ended(run.process)
-    assert (code, said) == (0, "")
 
 
 @pytest.mark.parametrize(

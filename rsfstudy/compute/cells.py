@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 import cloudpickle
 
-from rsfstudy.compute import own_code, provenance
-from rsfstudy.compute.overheard import Overhearing
+from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare.cell import Cell, Rows
 from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError, brief
@@ -165,7 +164,7 @@ def _received(sent: bytes) -> Task:
                 "mix. Give the workers the same versions"
             )
     used = type(task.measure), *task.parts, *task.steppers
-    if own_code.digest(*used) != task.own_code:
+    if code_digest.of_classes(*used) != task.own_code:
         names = " or ".join(one.__name__ if isinstance(one, type) else one.name for one in used)
         raise RunError(
             f"a worker has another {names}, or other code it draws on, than "
@@ -225,24 +224,23 @@ def computed(
     an outcome too.
     """
     begin = time.perf_counter() - compiling.seconds
-    with Overhearing() as heard:
-        try:
-            outcome = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
-        except let_through:
-            raise
-        except BaseException as error:  # a cell may raise SystemExit or CancelledError too
-            # not str(error), which may raise as well
-            text = traceback.format_exception_only(error)[-1].strip()
-            outcome = Outcome(Status.CELL_RAISED, message=text)
-    if outcome.message or heard:
-        outcome = replace(outcome, message=_message([outcome.message, *heard]))
+    try:
+        outcome = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
+    except let_through:
+        raise
+    except BaseException as error:  # a cell may raise SystemExit or CancelledError too
+        # not str(error), which may raise as well
+        text = traceback.format_exception_only(error)[-1].strip()
+        outcome = Outcome(Status.CELL_RAISED, message=text)
+    if outcome.message:
+        outcome = replace(outcome, message=_storable(outcome.message))
     return outcome, time.perf_counter() - compiling.seconds - begin
 
 
-def _message(said: Iterable[str]) -> str:
-    """What is said of a cell, as a file can hold it."""
-    message = brief("; ".join(filter(None, said)), _LONGEST_MESSAGE)
-    return message.encode(errors="backslashreplace").decode().replace("\0", "\\0")
+def _storable(message: str) -> str:
+    """A message as a file can hold it."""
+    text = brief(message, _LONGEST_MESSAGE).encode(errors="backslashreplace").decode()
+    return text.replace("\0", "\\0")
 
 
 class _Limits:

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -108,7 +109,8 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         ),
     }
     with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
-        worker_log.start_tracker(log)  # before `_interrupts_held`, because it unblocks signals
+        with _interrupts_held():  # by itself, because it unblocks signals
+            resource_tracker.ensure_running()
         started = stack.enter_context(contextlib.ExitStack())
         started.enter_context(_interrupts_held())
         try:
@@ -127,7 +129,6 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         stack.enter_context(cluster)
         started.close()
         client = stack.enter_context(Client(cluster))
-        stack.callback(worker_log.start_tracker, log)  # in case the tracker was killed
         yield client
 
 

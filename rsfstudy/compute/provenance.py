@@ -5,7 +5,6 @@ and how: machine, time, command.
 from __future__ import annotations
 
 import functools
-import hashlib
 import os
 import platform
 import subprocess
@@ -15,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.compute import own_code
+from rsfstudy.compute import code_digest
 from rsfstudy.motion.engines import SCIPY, versions
 
 if TYPE_CHECKING:
@@ -26,25 +25,22 @@ _PACKAGE = Path(__file__).parent.parent
 _PHYSICS = ("slider", "motion", "boundaries", "measures")
 
 
-def physics_digest() -> str:
-    """Digest of the source of everything that decides the number of a cell."""
-    digest = hashlib.sha256()
-    for part in _PHYSICS:
-        for file in sorted((_PACKAGE / part).rglob("*.py")):
-            digest.update(file.relative_to(_PACKAGE).as_posix().encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
+def sources(package: Path) -> dict[str, bytes]:
+    """Source of everything that decides the number of a cell, by the path in the package."""
+    files = [file for part in _PHYSICS for file in sorted((package / part).rglob("*.py"))]
+    return {file.relative_to(package).as_posix(): file.read_bytes() for file in files}
 
 
-#: Taken at import, because later changes to the files do not change the code that runs.
-_PHYSICS_AS_IMPORTED = physics_digest()
+#: Read at import, because later changes to the files do not change the code that runs.
+_SOURCES = sources(_PACKAGE)
 
 
 @functools.cache
 def code(engine: str = SCIPY) -> dict[str, str]:
     """Versions of everything that decides the numbers of a cell in every study, by an engine."""
     return {
-        "physics": _PHYSICS_AS_IMPORTED,
+        "physics": code_digest.of_sources(_SOURCES),
+        "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # whose code is digested
         "numpy": version("numpy"),
         "scipy": version("scipy"),
         **versions(engine),
@@ -57,7 +53,7 @@ def fingerprint(study: Study) -> dict[str, Any]:
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
-        "own_code": own_code.digest(*study.own_classes),
+        "own_code": code_digest.of_classes(*study.own_classes),
         "rtol": study.accuracy.rtol,
         "budget": study.accuracy.budget,
         "methods": [list(pair) for pair in study.accuracy.methods],

@@ -1,5 +1,5 @@
 """A file for the last words of worker processes and of the libraries below them: stacks of threads,
-tracebacks of Dask, objects that multiprocessing finds left behind.
+tracebacks of Dask.
 """
 
 from __future__ import annotations
@@ -7,13 +7,10 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import signal
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -71,23 +68,6 @@ def _logged(log: Path) -> Iterator[None]:
         handler.close()
 
 
-def start_tracker(log: Path) -> None:
-    """Start multiprocessing's resource tracker if it does not run; its errors go to `log`."""
-    terminal = os.dup(_ERRORS) if _has_errors() else None
-    # by itself it ignores the other signals that end the run, and not the end of a terminal
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
-    try:
-        _redirect(log)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an earlier one may have been killed
-            resource_tracker.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        if terminal is not None:
-            os.dup2(terminal, _ERRORS)
-            os.close(terminal)
-
-
 @dataclass(frozen=True)
 class WritesTo(WorkerPlugin):
     """A Dask worker whose process writes errors to a file.
@@ -101,19 +81,9 @@ class WritesTo(WorkerPlugin):
 
     def setup(self, worker: Any) -> None:
         """Called by Dask when the worker starts."""
-        _redirect(self.log)
-
-
-def _redirect(log: Path) -> None:
-    """Send the standard error of this process to the file, if both can be opened."""
-    if not _has_errors():
-        return
-    with contextlib.suppress(OSError):
-        file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        os.dup2(file, _ERRORS)
-        os.close(file)
-
-
-def _has_errors() -> bool:
-    """Whether standard error is open; if not, its number may belong to another file by now."""
-    return sys.__stderr__ is not None
+        if sys.__stderr__ is None:  # the number of a closed one may belong to another file by now
+            return
+        with contextlib.suppress(OSError):
+            file = os.open(self.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+            os.dup2(file, _ERRORS)
+            os.close(file)

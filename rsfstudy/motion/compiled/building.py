@@ -3,8 +3,8 @@
 The functions are those of plain Python, but for a few (`calls.IN_PLACE`). They are copied, each
 function that they name or close over standing for its compiled copy, and compiled as one. What is
 compiled lies in a folder of its own, named by a digest of all that decides it, which is written
-aside, renamed when complete, and never changed; what does not hold its own digest is thrown away.
-What lies there is run: where others could write to it, nothing is read or kept.
+aside, renamed when complete, and never changed. What lies there is run: where others could write to
+it, nothing is read or kept.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import contextlib
 import dis
 import functools
 import hashlib
-import json
 import logging
 import os
 import shutil
@@ -38,7 +37,7 @@ from numba.core.sigutils import normalize_signature
 from rsfstudy.motion.compiled.calls import IN_PLACE
 from rsfstudy.motion.engines import compiling
 
-_ENTRY, _DIGESTS = "motion.py", "digests.json"
+_ENTRY = "motion.py"
 #: Modules that are as their version, or that of Python, says.
 _KNOWN_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
 #: Quotients by the numbers of a scene may be products with reciprocals, found once a step; and
@@ -174,7 +173,7 @@ def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
     """What is compiled, from the folder of that name where it is there and whole."""
     folder = _place(name)
     if folder is not None:
-        if _whole(folder):
+        if folder.exists():
             with contextlib.suppress(Exception):  # whatever a cache can be damaged by
                 return compile_for(str(folder / _ENTRY))
         shutil.rmtree(folder, ignore_errors=True)
@@ -231,7 +230,6 @@ def _compiled_aside(folder: Path, compile_for: Callable[[str], Any]) -> Any:
         entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
         os.utime(entry, (0, 0))  # Numba looks at its age
         ready = compile_for(str(entry))
-        _seal(aside)
         with contextlib.suppress(OSError):  # somebody else was faster
             os.rename(aside, folder)
         return ready
@@ -286,25 +284,3 @@ def _jitted(function: Any) -> Any:
 def _compiled_inside(function: Any) -> Any:
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_reaching(function), **_OPTIONS, **inner)
-
-
-def _seal(folder: Path) -> None:
-    """Write down the digests of all files."""
-    (folder / _DIGESTS).write_text(json.dumps(_digests(folder)))
-
-
-def _whole(folder: Path) -> bool:
-    """Whether a folder holds what was written, and nothing else."""
-    try:
-        return bool(json.loads((folder / _DIGESTS).read_text()) == _digests(folder))
-    except (OSError, ValueError, RecursionError):
-        return False
-
-
-def _digests(folder: Path) -> dict[str, str]:
-    """Digest of each file, but for Numba's trials whether it could write, whose names have no dot,
-    and for what is written of them.
-    """
-    files = {str(file.relative_to(folder)): file for file in folder.rglob("*.*") if file.is_file()}
-    files.pop(_DIGESTS, None)
-    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}

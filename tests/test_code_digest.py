@@ -1,15 +1,16 @@
-"""The digest of a user's own measure: the same for the same code wherever it runs, another as soon
-as anything it draws on is another, and its cells are not mixed.
+"""The digest of the physics, and that of a user's own measure: the same for the same code wherever
+it runs, another as soon as anything it draws on is another, and cells are not mixed.
 """
 
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import pytest
 
 import rsfstudy
-from rsfstudy.compute import own_code
+from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
@@ -87,6 +88,9 @@ study = Study(
 """
 
 
+FOUND = 'find(self, scene, accuracy, meter):\n        """A remark."""'
+
+
 def study_in(place, *, helper=HELPER, measure=MEASURE):
     place.mkdir(exist_ok=True)
     (place / "helper.py").write_text(helper)
@@ -95,11 +99,11 @@ def study_in(place, *, helper=HELPER, measure=MEASURE):
 
 
 def digest(study):
-    return own_code.digest(type(study.measure))
+    return code_digest.of_classes(type(study.measure))
 
 
 def test_a_measure_of_rsfstudy_has_its_version():
-    assert own_code.digest(CriticalStep) == "none"
+    assert code_digest.of_classes(CriticalStep) == "none"
 
 
 @pytest.mark.parametrize(
@@ -136,6 +140,8 @@ def test_whatever_a_measure_draws_on_changes_its_digest(part, old, new, tmp_path
         ("helper", "    return 1\n", "    return 2\n"),
         ("measure", "[2.0, 3.0]", "[2.0, 2.5, 3.0]"),
         ("measure", "SCALE = 1.0", "# a remark\n\nSCALE = 1.0"),
+        ("measure", "find(self, scene, accuracy, meter):", FOUND),
+        ("measure", "class Own(Measure):", 'class Own(Measure):\n    """A remark."""\n'),
     ],
 )
 def test_what_it_does_not_draw_on_does_not(part, old, new, tmp_path):
@@ -149,7 +155,7 @@ def test_it_is_the_same_in_other_processes(tmp_path):
     """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
-    ask = "\nfrom rsfstudy.compute import own_code\nprint(own_code.digest(Own))"
+    ask = "\nfrom rsfstudy.compute import code_digest\nprint(code_digest.of_classes(Own))"
     script.write_text(MEASURE + ask)
     for seed, words in (("1", [str(script)]), ("2", ["-c", MEASURE + ask])):
         said = subprocess.run(
@@ -212,3 +218,54 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
     monkeypatch.setattr(shared_by_both, "FACTOR", 100.0)
     with pytest.raises(RunError, match="a worker has another Own, or other code"):
         rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
+
+
+LAW = """
+def rate(x):
+    \"\"\"The rate.\"\"\"
+    return 2.0 * x  # twice
+
+
+class Law:
+    \"\"\"A law.\"\"\"
+
+    def slope(self, x, scale=1.0):
+        assert x
+        return [scale for _ in range(2)]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("The rate.", "What it gives.", True),
+        ("A law.", "A law\n\n    of rocks.", True),
+        ('    """The rate."""\n', "", True),
+        ("  # twice", "", True),
+        ("\n\n\nclass", "\n\n# of rocks\n\n\n\nclass", True),
+        ("2.0 * x", "2.0 / x", False),
+        ("2.0 * x", "(2.0 + 2e-16) * x", True),  # the same float
+        ("2.0 * x", "(2.0 + 5e-16) * x", False),
+        ("scale=1.0", "scale=-1.0", False),
+        ("range(2)", "range(3)", False),
+    ],
+)
+def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
+    """A file of it is copied, edited and digested."""
+    for name, text in (("before", LAW), ("after", LAW.replace(old, new))):
+        (tmp_path / name / "slider").mkdir(parents=True)
+        (tmp_path / name / "slider" / "law.py").write_text(text)
+    assert old in LAW
+    before, after = (
+        code_digest.of_sources(provenance.sources(tmp_path / name)) for name in ("before", "after")
+    )
+    assert (before == after) is same
+
+
+def test_the_digest_of_the_physics_is_that_of_its_files():
+    package = Path(rsfstudy.__file__).parent
+    files = provenance.sources(package)
+    assert {"slider/friction.py", "motion/loop.py", "measures/__init__.py"} <= set(files)
+    moved = {**files, "slider/moved.py": files["slider/friction.py"]}
+    digests = [code_digest.of_sources(each) for each in (files, moved)]
+    assert digests[0] == provenance.code()["physics"] != digests[1]

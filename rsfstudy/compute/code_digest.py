@@ -1,16 +1,19 @@
-"""A digest of the code of a user's own measure and parts, with all the code and constants they use.
+"""Digests of code: of the physics, from its sources, and of a user's own measure, parts and
+stepper, from the objects in memory, because their files may have changed since they were imported.
 
-It is taken from the objects in memory, because files may have changed since they were imported. The
-search starts at the classes and follows every name that a function uses, so that the same code has
-the same digest in a study file, a script, a notebook or a worker, and any change of a function, a
-constant or a helper changes it. Modules that a function imports when it runs are not followed. The
-search ends at Python, installed packages and rsfstudy itself, which have versions.
+Both are of compiled code, so that remarks, docstrings and the places of lines do not count. Of a
+user's own classes the search follows every name that a function uses: the same code has the same
+digest in a study file, a script, a notebook or a worker, and any change of a function, a constant
+or a helper changes it. Modules that a function imports when it runs are not followed. The search
+ends at Python, installed packages and rsfstudy itself, which have versions.
 """
 
 from __future__ import annotations
 
+import ast
 import functools
 import hashlib
+import inspect
 import pickle
 import site
 import sys
@@ -43,17 +46,41 @@ _MADE = {
 _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 
 
-def digest(*used: object) -> str:
+def of_sources(sources: Mapping[str, bytes]) -> str:
+    """Digest of the code in files, given by their names."""
+    compiled = []
+    for name, text in sources.items():
+        tree = ast.parse(text)
+        _remove_docstrings(tree)
+        compiled.append(compile(tree, name, "exec"))
+    return _digest(_Walk().parts((*sources, *compiled), ()))
+
+
+def _remove_docstrings(node: ast.AST) -> None:
+    """Remove those of a module, or a class or function, and of all that stands directly in it."""
+    if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+        if ast.get_docstring(node, clean=False) is not None:
+            node.body = node.body[1:] or [ast.Pass(lineno=1, col_offset=0)]
+        for inner in node.body:
+            _remove_docstrings(inner)
+
+
+def of_classes(*used: object) -> str:
     """Digest of classes and of all they use, and of data such as protocols; "none" where all of
     them are classes of rsfstudy.
     """
-    own = [kind for kind in used if not isinstance(kind, type) or _is_own(kind.__module__)]
-    if not own:
-        return "none"
-    sha256, walk = hashlib.sha256(), _Walk()
-    for kind in own:
-        for part in walk.parts(kind, ()) if isinstance(kind, type) else [repr(kind)]:
-            sha256.update(part.encode(errors="surrogatepass") + b"\0")
+    own = tuple(
+        one if isinstance(one, type) else repr(one)
+        for one in used
+        if not isinstance(one, type) or _is_own(one.__module__)
+    )
+    return _digest(_Walk().parts(own, ())) if own else "none"
+
+
+def _digest(parts: Iterable[str]) -> str:
+    sha256 = hashlib.sha256()
+    for part in parts:
+        sha256.update(part.encode(errors="surrogatepass") + b"\0")
     return sha256.hexdigest()[:16]
 
 
@@ -67,14 +94,13 @@ class _Walk:
         """The texts for a value, given the names that the code around it uses."""
         if isinstance(value, _PLAIN):
             yield repr(value)
-            return
-        if isinstance(value, ModuleType):
+        elif isinstance(value, ModuleType):
             yield from self._module(value, names)
-            return
-        if isinstance(value, CodeType):
+        elif isinstance(value, CodeType):
             yield from self._code(value)
         elif isinstance(value, tuple):  # may be one object here and two elsewhere
-            yield from self._all(value, names)
+            for part in value:
+                yield from self.parts(part, names)
         elif id(value) not in self._met:
             self._met[id(value)] = value
             yield from self._met_first(value, names)
@@ -85,21 +111,23 @@ class _Walk:
         elif isinstance(value, type):
             yield from self._class(value)
         elif isinstance(value, property):
-            yield from self._all((value.fget, value.fset), names)
-        elif isinstance(value, classmethod | staticmethod):
-            yield from self.parts(value.__func__, names)
+            yield from self.parts((value.fget, value.fset), names)
         elif isinstance(value, functools.cached_property):
             yield from self.parts(value.func, names)
         elif isinstance(value, functools.partial):
-            yield from self._all((value.func, value.args, value.keywords), names)
-        elif hasattr(value, "__wrapped__"):
+            yield from self.parts((value.func, value.args, value.keywords), names)
+        elif hasattr(value, "__wrapped__"):  # class methods and static methods among them
             yield from self.parts(value.__wrapped__, names)
+        elif isinstance(value, Mapping | list):
+            pairs = value.items() if isinstance(value, Mapping) else value
+            yield from self.parts(tuple(pairs), names)
+        elif isinstance(value, set | frozenset):
+            yield from sorted(map(repr, value))
+        elif type(value) is np.ndarray and value.dtype.kind != "O":
+            yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
         else:
-            yield from self._data(value, names)
-
-    def _all(self, values: Iterable[Any], names: Iterable[str]) -> Iterator[str]:
-        for value in values:
-            yield from self.parts(value, names)
+            yield from self._class(type(value))
+            yield from self._state(value, names)
 
     def _module(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
         """Only what is used of a module counts."""
@@ -109,9 +137,8 @@ class _Walk:
         asked = (id(module), *names)
         if asked not in self._met:
             self._met[asked] = module
-            for name in names:
-                if name in vars(module):
-                    yield from self.parts(vars(module)[name], names)
+            used = [name for name in names if name in vars(module)]
+            yield from self.parts(tuple(vars(module)[name] for name in used), names)
 
     def _function(self, function: FunctionType) -> Iterator[str]:
         yield function.__qualname__
@@ -120,7 +147,7 @@ class _Walk:
         yield from self._code(function.__code__)
         cells = [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
         names = tuple(_names(function.__code__))
-        yield from self._all((function.__defaults__, function.__kwdefaults__, *cells), names)
+        yield from self.parts((function.__defaults__, function.__kwdefaults__, *cells), names)
         for name in names:
             if name in function.__globals__:
                 yield name
@@ -128,32 +155,18 @@ class _Walk:
 
     def _code(self, code: CodeType) -> Iterator[str]:
         yield from (code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
-        yield from self._all(code.co_consts, ())
+        yield from self.parts(code.co_consts[_is_documented(code) :], ())
 
     def _class(self, kind: type) -> Iterator[str]:
         yield kind.__qualname__
         if not _is_own(kind.__module__):
             return
-        yield from self._all(kind.__bases__, ())
+        yield from self.parts(kind.__bases__, ())
         made = _MADE | ({"__init__"} if _inits_itself(kind) else set())
         for name, value in sorted(vars(kind).items()):
             if name not in made:
                 yield name
                 yield from self.parts(value, ())
-
-    def _data(self, value: Any, names: Iterable[str]) -> Iterator[str]:
-        if isinstance(value, Mapping):
-            for key, item in value.items():
-                yield from self._all((key, item), names)
-        elif isinstance(value, list):
-            yield from self._all(value, names)
-        elif isinstance(value, set | frozenset):
-            yield from sorted(map(repr, value))
-        elif type(value) is np.ndarray and value.dtype.kind != "O":
-            yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
-        else:
-            yield from self._class(type(value))
-            yield from self._state(value, names)
 
     def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
         if _is_own(type(value).__module__):
@@ -163,6 +176,13 @@ class _Walk:
             yield pickle.dumps(value, protocol=4).hex()
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
+
+
+def _is_documented(code: CodeType) -> bool:
+    """Whether the first constant is a docstring, or has its place."""
+    if sys.version_info >= (3, 13):
+        return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
+    return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
 
 
 def _inits_itself(kind: type) -> bool:
