@@ -22,8 +22,13 @@ from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
-from rsfstudy.files.comparison import cell_number, compared, differences
-from rsfstudy.files.side_by_side import Comparison, side_by_side
+from rsfstudy.files.comparison import (
+    Comparison,
+    cell_number,
+    compared,
+    differences,
+    side_by_side,
+)
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
 from rsfstudy.progress import compile_with_notice, shown

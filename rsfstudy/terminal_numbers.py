@@ -18,8 +18,8 @@ from rsfstudy.console import console
 from rsfstudy.declare.wording import listed, short
 from rsfstudy.errors import brief
 from rsfstudy.files import numbers
+from rsfstudy.files.comparison import Comparison
 from rsfstudy.files.contents import provenance
-from rsfstudy.files.side_by_side import Comparison
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage
 

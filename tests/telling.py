@@ -36,7 +36,7 @@ SIMULATED = (
 #: Studies that measure time.
 TIMED = ("accuracy_cost", "effects")
 #: Attributes of files that are of a run, of which there only has to be one.
-OF_A_RUN = ("history", "date_created", "provenance", "digests")
+OF_A_RUN = ("history", "date_created", "provenance", "digests", "digest")
 
 
 # ---- events --------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import xarray as xr
 from running import command, ended, named_results
 
 from rsfstudy.files import store
-from rsfstudy.files.side_by_side import side_by_side
+from rsfstudy.files.comparison import side_by_side
 from rsfstudy.reduce import (
     Boundary,
     DecadeFit,

@@ -61,6 +61,7 @@ HOMES = {
     "rich": {"console", "progress", "terminal", "terminal_numbers"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
+    "msgspec": {"files/contents", "files/restore"},
 }
 
 

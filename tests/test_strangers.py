@@ -1,4 +1,4 @@
-"""Files from strangers: results that were altered, digests and all, and paths that are no results.
+"""Files from strangers: results that were altered, and paths that are no results.
 Each command ends with an answer, or with an error that names what is wrong; never with a traceback.
 """
 
@@ -160,7 +160,7 @@ def altered(draw, dataset):
 
 
 def sealed(dataset, path: Path) -> str:
-    """Written as by someone who meant it: the digests are right."""
+    """Written as by someone who meant it: the digest is right."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of xarray, on what it writes
         store.write(dataset, path)
@@ -182,14 +182,14 @@ def test_whatever_is_missing(tiny, capsys):
     """
     for at in places(attributes(tiny)):
         if len(at) > 1 and at[0] == "":
-            used(store.sealed(with_other_attributes(tiny, at, removed)))
+            used(store.clean_attributes(with_other_attributes(tiny, at, removed)))
     for description in {name for values in tiny.variables.values() for name in values.attrs}:
         other = tiny.copy(deep=True)
         for values in other.variables.values():
             values.attrs.pop(description, None)
-        used(store.sealed(other))
+        used(store.clean_attributes(other))
     for name in tiny.variables:
-        used(store.sealed(tiny.drop_vars(name)))
+        used(store.clean_attributes(tiny.drop_vars(name)))
     assert "reproduced" in capsys.readouterr().out
 
 
@@ -200,7 +200,7 @@ ALTERED = {"phases": [Phase.generate]}
 @settings(max_examples=50, **ALTERED)
 @given(data=st.data())
 def test_altered_results_are_used_or_refused(tiny, data):
-    used(store.sealed(altered(data.draw, tiny)))
+    used(store.clean_attributes(altered(data.draw, tiny)))
 
 
 @pytest.mark.filterwarnings("ignore")  # of xarray, and of what is not as it was for the file
@@ -230,26 +230,46 @@ def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, da
     [
         ("id", removed, "id is missing"),
         ("id", replaced("../other"), "id is '../other', and the declared study 'tiny'"),
-        ("title", replaced(3), "title is 3, and must be a text"),
+        ("title", replaced(3), "title is refused .*Expected `str`"),
         ("completeness", renamed, "completeness is missing"),
-        ("declaration", replaced(None), "declaration is null, and must be a mapping"),
-        ("declaration.claims", replaced({}), r"declaration.claims is {}, and must be a list"),
+        ("declaration", replaced(None), "declaration is refused .Expected `object`, got `null`"),
+        ("declaration.claims", replaced({}), r"declaration.claims is refused .Expected `array`"),
         ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
-        ("declaration.claims.0.id", replaced(None), r"claims\[0\].id is null, and must be a text"),
-        ("declaration.claims.0.tolerance", replaced(10**400), r"must be a number"),
+        (
+            "declaration.claims.0.id",
+            replaced(None),
+            r"claims\[0\].id is refused .Expected `str`, got `null`",
+        ),
+        (
+            "declaration.claims.0.tolerance",
+            replaced(10**400),
+            "tolerance is refused .Number out of range",
+        ),
         (
             "declaration.claims.0.where.case",
             replaced([]),
-            r"claims\[0\].where is refused .*must be a text",
+            r"claims\[0\] is refused .where = .*must be a text",
         ),
         ("declaration.claims.0.novel", replaced(1), r"declaration.claims\[0\].novel is unknown"),
         ("declaration.base.phi", removed, "declaration.base.phi is missing"),
         ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
-        ("declaration.accuracy.rtol", replaced("1e-7"), 'rtol is "1e-7", and must be a number'),
+        (
+            "declaration.accuracy.rtol",
+            replaced("1e-7"),
+            "rtol is refused .Expected `float`, got `str`",
+        ),
         ("declaration.novel", replaced(1), "declaration.novel is unknown"),
         ("provenance.fingerprint.own_code", removed, "provenance.fingerprint.own_code is missing"),
-        ("provenance.versions.numpy", replaced(2), "provenance.versions.numpy is 2, and must be"),
-        ("provenance.declared_in", replaced(None), "provenance.declared_in is null"),
+        (
+            "provenance.versions.numpy",
+            replaced(2),
+            r"provenance.versions\[...\] is refused .Expected `str`",
+        ),
+        (
+            "provenance.declared_in",
+            replaced(None),
+            "provenance.declared_in is refused .*got `null`",
+        ),
     ],
 )
 def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_path):
@@ -285,7 +305,7 @@ def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_pat
     [
         ("measure.novel", replaced(1), "declaration.measure.novel is unknown"),
         ("reductions.0.on", removed, r"declaration.reductions\[0\].on is missing"),
-        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is \[1\], and must be a"),
+        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is refused .*of length 2"),
         ("axes.1.values", replaced([1.0, 2.0]), "load_velocity_ratio is not that axis of the decl"),
         ("axes.1.dimension", replaced("a"), "status lies along .*, not the axes of the decl"),
         ("plot", replaced("a\0b"), "declaration makes no study .*must be a text"),

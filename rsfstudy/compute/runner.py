@@ -196,7 +196,7 @@ class Run:
         with self._reducing(journal):
             results = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
         if self.keeping.output is None:
-            return store.sealed(results)
+            return store.clean_attributes(results)
         written = results if zarr else store.write(results, self.path(".nc"))
         for stale in (".partial.nc", ".partial.png", ".unreduced.nc", ".unreduced.png"):
             self.path(stale).unlink(missing_ok=True)

@@ -1,10 +1,13 @@
-"""Compares one results dataset with another, and finds a cell by its place on the axes."""
+"""Compares results datasets: how the numbers of one lattice agree; two files side by side, whatever
+their lattices, with their declarations and what made them; and a cell by its place on the axes.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +17,18 @@ import xarray as xr
 from rsfstudy.declare.wording import listed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
+from rsfstudy.files.numbers import headline
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import MEASURED_TIMES
 
 _COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
+#: Of a fingerprint, what the declaration states too.
+_DECLARED = {"study", "measure", "rtol", "budget", "methods", "engine"}
+
+Pair = tuple[Any, Any]
+
+
+# ---- one lattice --------------------------------------------------------------------------------
 
 
 def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
@@ -31,8 +42,7 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
         no two runs share, are left out.
     """
-    pending = [d["status"] == int(Status.PENDING) for d in (theirs, ours)]
-    both = ~(pending[0] | pending[1])
+    both = _finished(theirs) & _finished(ours)
     rows = []
     for name in theirs.data_vars:
         if name in MEASURED_TIMES:
@@ -56,6 +66,10 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     return frame
 
 
+def _finished(dataset: xr.Dataset) -> xr.DataArray:
+    return dataset["status"] != int(Status.PENDING)
+
+
 def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
     """Whether two variables have the same shape, and both or neither hold real numbers."""
     return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
@@ -77,7 +91,7 @@ def _agreement(
     return dict(zip(_COLUMNS[1:], (same.size, int(same.sum()), largest, beyond), strict=True))
 
 
-def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Pair]:
     """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
     file.
     """
@@ -87,6 +101,185 @@ def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str,
         for name in sorted({*theirs, *ours})
         if theirs.get(name) != ours.get(name)
     }
+
+
+# ---- side by side -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What differs between two results datasets.
+
+    Attributes
+    ----------
+    declaration : mapping of str to (object, object)
+        Parts of the declarations that differ, by their paths; None where one has no such part.
+    origin : mapping of str to (object, object)
+        Versions and machines that differ.
+    points : mapping of str to (list, list)
+        Points that only the first has, and only the second, of axes that differ.
+    cells : tuple of int
+        Finished cells that both have, that only the first has, and only the second.
+    statuses : pandas.DataFrame
+        One row for each cell that both have and that ended otherwise: its place on each axis,
+        ``first`` and ``second``.
+    numbers : pandas.DataFrame
+        One row a variable that both have, over the cells that both have: ``variable``, ``values``,
+        ``identical``, ``largest_difference``, and ``beyond_errors``, how many differ by more than
+        the sum of both error estimates (NaN where there are none; a headline without an estimate
+        counts as exact).
+    left_out : mapping of str to str
+        Variables that are not compared, and why.
+    """
+
+    declaration: Mapping[str, Pair]
+    origin: Mapping[str, Pair]
+    points: Mapping[str, tuple[list[Any], list[Any]]]
+    cells: tuple[int, int, int]
+    statuses: pd.DataFrame
+    numbers: pd.DataFrame
+    left_out: Mapping[str, str]
+
+    @property
+    def beyond_errors(self) -> list[str]:
+        """Variables with numbers that differ by more than both error estimates allow."""
+        return list(self.numbers["variable"][self.numbers["beyond_errors"] > 0])
+
+    @property
+    def agrees(self) -> bool:
+        """True where both have cells in common, which ended alike, with the same numbers within
+        their error estimates.
+        """
+        return self.cells[0] > 0 and self.statuses.empty and not self.beyond_errors
+
+
+def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
+    """Compare two results datasets, cell by cell where both have the same place on every axis.
+
+    Raises
+    ------
+    InvalidValue
+        Where an axis of one has no counterpart in the other, not even a fixed value.
+    """
+    both = [_with_axes(one, other) for one, other in ((first, second), (second, first))]
+    dims = [str(d) for d in both[0]["status"].dims]
+    labelled = [dataset.assign_coords(_labels(dataset)) for dataset in both]
+    left_out = _left_out(labelled)
+    kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
+    shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
+    indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
+    points = {
+        d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
+        for d, (a, b) in zip(dims, indexes, strict=True)
+        if set(a) != set(b)
+    }
+    known = _finished(shared[0]) & _finished(shared[1])
+    alone = [int(_finished(dataset).sum() - known.sum()) for dataset in both]
+    return Comparison(
+        declaration=differences(*(dict(_flat(json.loads(d.attrs["declaration"]))) for d in both)),
+        origin=differences(*(_origin(dataset) for dataset in both)),
+        points=points,
+        cells=(int(known.sum()), alone[0], alone[1]),
+        statuses=_statuses(shared, known.values),
+        numbers=_numbers(shared),
+        left_out=left_out,
+    )
+
+
+def _with_axes(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+    """A dataset with all axes of another: one that it lacks has its fixed value for only point."""
+    cells = set(dataset["status"].dims)
+    for dimension in other["status"].dims:
+        if dimension in cells:
+            continue
+        if dimension not in dataset.coords or dataset[dimension].ndim:
+            rule = "is an axis of one of the two, and the other does not say where on it it is"
+            raise InvalidValue("axis", str(dimension), rule)
+        measured = [n for n, values in dataset.data_vars.items() if cells <= set(values.dims)]
+        wider = dataset[measured].expand_dims(dimension)
+        dataset = dataset.drop_vars([dimension, *measured]).merge(wider)
+    return dataset
+
+
+def _labels(dataset: xr.Dataset) -> dict[str, Any]:
+    """Points of the dimensions to align by: rounding moves no point of an axis from another."""
+    labels = {}
+    for name in map(str, dataset.dims):
+        values = dataset[name]
+        rounded = values.values
+        if values.dtype.kind == "f":
+            rounded = np.array([float(f"{value:.12g}") for value in values.values.tolist()])
+            if len(np.unique(rounded)) < len(rounded):
+                rounded = values.values
+        labels[name] = (name, rounded, values.attrs)
+    return labels
+
+
+def _left_out(both: Sequence[xr.Dataset]) -> dict[str, str]:
+    """Variables that cannot be compared, or would compare other things than numbers of cells."""
+    first, second = both
+    unequal = {
+        str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
+    }
+    why = {str(n): "only the first has them" for n in first.data_vars if n not in second}
+    why |= {str(n): "only the second has them" for n in second.data_vars if n not in first}
+    for name in map(str, first.data_vars):
+        if name in why:
+            continue
+        if set(first[name].dims) != set(second[name].dims):
+            why[name] = "they lie along other axes"
+        elif not unequal <= set(first[name].dims):
+            why[name] = "they draw on cells that only one has"
+    return why
+
+
+def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
+    """How the numbers agree; a headline without an error estimate is held to be exact."""
+    frame = compared(*shared)
+    about = headline(shared[0])
+    exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
+    frame.loc[exact, "beyond_errors"] = (frame["values"] - frame["identical"])[exact]
+    return frame
+
+
+def _statuses(shared: Sequence[xr.Dataset], known: np.ndarray) -> pd.DataFrame:
+    """The cells that ended otherwise, by their places on the axes."""
+    status = [one["status"] for one in shared]
+    dims = [str(d) for d in status[0].dims]
+    labels = {int(s): s.label for s in Status}
+    rows = []
+    for index in np.argwhere(known & (status[0].values != status[1].values)).tolist():
+        at = zip(dims, index, strict=True)
+        ends = (labels[int(values.values[tuple(index)])] for values in status)
+        place = {d: shared[0][d].values[i] for d, i in at}
+        rows.append(place | dict(zip(("first", "second"), ends, strict=True)))
+    return pd.DataFrame(rows, columns=[*dims, "first", "second"])
+
+
+def _flat(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """The parts of a declaration by their paths; lists of plain values are parts as they are."""
+    if isinstance(part, dict) and part:
+        for name, value in part.items():
+            yield from _flat(value, f"{path}.{name}" if path else name)
+    elif isinstance(part, list) and any(isinstance(value, dict) for value in part):
+        for number, value in enumerate(part):
+            named = value.get("dimension") if isinstance(value, dict) else None
+            yield from _flat(value, f"{path}[{named or number}]")
+    else:
+        yield path, part
+
+
+def _origin(dataset: xr.Dataset) -> dict[str, Any]:
+    """What made a dataset: versions, code and machine."""
+    about: Mapping[str, Any] = provenance(dataset)
+    decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED}
+    others = {n: v for n, v in about.items() if isinstance(v, str)}
+    for name in ("time", "command", "declared_in"):
+        others.pop(name, None)
+    return {**about["versions"], **decided, **others}
+
+
+# ---- one cell -----------------------------------------------------------------------------------
 
 
 def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:

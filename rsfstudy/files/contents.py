@@ -2,17 +2,22 @@
 uses it; an error names the part that is wrong by its path, as in ``declaration.claims[3].id``.
 
 The classes describe the layout. A missing part is never replaced by a default: the results would
-then be those of another study.
+then be those of another study. Plain data are held against them by msgspec: one wheel of half a
+megabyte without dependencies, imported in 17 ms (pydantic: four packages, ten megabytes, 50 ms;
+cattrs: three packages, 41 ms), strict unless told otherwise (cattrs makes a number of a text), with
+paths in its errors, and for the dataclasses that are there already.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from types import MappingProxyType, NoneType, UnionType
-from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_typeddict
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any, TypedDict, get_type_hints
 
+import msgspec
 import numpy as np
 import xarray as xr
 
@@ -25,6 +30,11 @@ from rsfstudy.slider.protocol import Protocol
 from rsfstudy.slider.registry import SLOTS, Own, by_class, kinds_with
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+from rsfstudy.vocabulary import QUANTITIES
+
+#: The layout of files as they are written. Those without a number are of layout 1, which had
+#: digests of variables among its attributes.
+LAYOUT = 2
 
 
 class Attributes(TypedDict):
@@ -61,8 +71,7 @@ class PlainReduction(TypedDict):
     of: str
 
 
-@dataclass(frozen=True)
-class Declaration:
+class Declaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The attribute ``declaration``: the study that made the file."""
 
     name: str
@@ -121,18 +130,22 @@ def check(dataset: xr.Dataset) -> None:
     DataError
         Names the first part that is missing or wrong.
     """
+    layout = dataset.attrs.get("layout", 1)
+    if not isinstance(layout, int | np.integer) or not 1 <= layout <= LAYOUT:
+        raise DataError(
+            f"layout is {brief(layout)}, and this version of rsfstudy reads 1 to {LAYOUT}: "
+            "open it with the version that its attribute source names."
+        )
     attrs = fit({"reduced_despite": "", **dataset.attrs}, Attributes, "")
     name = declaration(dataset).name
     if attrs["id"] != name or not name.isidentifier():
         raise refused("id", f"is {brief(attrs['id'])!r}, and the declared study {brief(name)!r}")
-    provenance(dataset)
     for variable in _OF_EVERY_LATTICE:
         if variable not in dataset.data_vars:
             raise refused(variable, "is missing")
-    digests = fit(from_json(dataset, "digests"), Mapping[str, str], "digests")
-    for variable in map(str, dataset.variables):
-        if variable in digests or variable in _OF_EVERY_LATTICE:  # a notebook may have added others
-            _check_kind(variable, dataset[variable])
+    for name in map(str, dataset.variables):
+        if name in QUANTITIES or name in dataset.coords:  # a notebook may have added others
+            _check_kind(name, dataset.variables[name])
     _check_lattice(dataset)
 
 
@@ -160,11 +173,21 @@ def declaration(dataset: xr.Dataset) -> Declaration:
     DataError
         If the dataset carries none, or not as rsfstudy writes it.
     """
-    plain = from_json(dataset, "declaration")
-    declared: Declaration = fit(plain, Declaration, "declaration")
+    declared = declaration_of(from_json(dataset, "declaration"))
     if provenance(dataset)["fingerprint"]["own_code"] == "none":
         scene(declared.base)
     return declared
+
+
+def declaration_of(plain: Any) -> Declaration:
+    """A declaration from plain data; raises DataError where they are none."""
+    declared: Declaration = fit(plain, Declaration, "declaration")
+    for number, claim in enumerate(plain["claims"]):
+        _check_names(claim, _names(Claim), f"declaration.claims[{number}]")
+    _check_names(plain["accuracy"], _names(Accuracy), "declaration.accuracy")
+    # with what else they hold
+    whole = {name: plain[name] for name in ("axes", "measure", "reductions", "overrides")}
+    return msgspec.structs.replace(declared, **whole)
 
 
 def scene(
@@ -190,14 +213,13 @@ def scene(
     """
     parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Protocol)]
     kinds = kinds_with(parts)
-    values = _fitted({**_OLDER, **plain}, kinds, path)
-    for name in plain:
-        if name not in kinds:
-            raise refused(_inside(path, name), "is unknown")
+    values = {**_OLDER, **plain}
+    _check_names(values, kinds, path)
+    values = {name: fit(values[name], kind, f"{path}.{name}") for name, kind in kinds.items()}
     try:
         return Scene(**by_class(values, own))
     except InvalidValue as error:
-        raise refused(_inside(path, error.name), f"is refused ({error})") from error
+        raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
 
 
 def own_part(declared: Declaration) -> tuple[str, str] | None:
@@ -224,7 +246,8 @@ def provenance(dataset: xr.Dataset) -> Provenance:
     DataError
         If the dataset does not say, or not as rsfstudy writes it.
     """
-    origin: Provenance = fit(from_json(dataset, "provenance"), Provenance, "provenance")
+    origin: Provenance = from_json(dataset, "provenance")
+    fit(origin, Provenance, "provenance")
     return origin
 
 
@@ -238,7 +261,7 @@ def from_json(dataset: xr.Dataset, name: str) -> Any:
         raise refused(name, f"is no JSON ({brief(error)})") from error
 
 
-def _check_kind(name: str, values: xr.DataArray) -> None:
+def _check_kind(name: str, values: xr.Variable) -> None:
     """Refuse a variable that does not hold the kind of numbers or texts it must hold."""
     kinds, wanted = _OF_EVERY_LATTICE.get(name, _KINDS)
     kind = values.dtype.kind
@@ -268,21 +291,21 @@ def _check_lattice(dataset: xr.Dataset) -> None:
 def refused(path: str, why: str) -> DataError:
     """The error for a part that is not as rsfstudy writes it."""
     return DataError(
-        f"{brief(path)} {why}. It was not written by this version of rsfstudy, or was edited: run "
-        "the study again."
+        f"{brief(path).lstrip('.')} {why}. It was not written by this version of rsfstudy, or was "
+        "edited: run the study again."
     )
 
 
 def fit(value: Any, kind: Any, path: str) -> Any:
-    """Convert plain data to the type that an annotation names: a mapping of all its fields to a
-    dataclass, a list to a tuple.
+    """Plain data as the type that an annotation names.
 
     Parameters
     ----------
     value : object
-        What JSON gives, or an object of a dataclass that exists already.
+        What JSON gives.
     kind : type
-        A type, or another annotation of a field.
+        A type, or another annotation of a field. Of a typed dictionary what it does not name is
+        left out.
     path : str
         Where the value stands in its file.
 
@@ -291,87 +314,46 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     DataError
         Where it cannot be converted; the text names the path.
     """
-    origin, of = get_origin(kind), get_args(kind)
-    if kind is Any or _is_one(value, kind):
-        return value
-    if kind is Scene and isinstance(value, dict):
-        return scene(value, path=path)
-    if (is_dataclass(kind) or is_typeddict(kind)) and isinstance(value, dict):
-        return _object(value, kind, path)
-    if origin is UnionType:
-        return _either(value, of, path)
-    if origin is Mapping and isinstance(value, dict):
-        return {name: fit(part, of[1], f"{path}.{name}") for name, part in value.items()}
-    if origin in (Sequence, tuple) and isinstance(value, list | tuple):
-        return _list(value, origin, of, path)
-    if kind is float and isinstance(value, int) and abs(value) < 2**1023:
-        return value
-    if kind is int and isinstance(value, float) and value.is_integer():
-        return int(value)
-    raise _unfit(value, (kind,), path)
+    try:
+        return msgspec.convert(value, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        why, _, within = str(error).rpartition(" - at `$")
+        place, why = (f"{path}{within.rstrip('`')}", why) if why else (path, str(error))
+        if field := re.fullmatch("Object .* (required|unknown) field `(.*)`", why):
+            rule = "is missing" if field[1] == "required" else "is unknown"
+            raise refused(f"{place}.{field[2]}", rule) from error
+        raise refused(place, f"is refused ({brief(why)})") from error
 
 
-_WORDS = {
-    str: "a text",
-    float: "a number",
-    int: "a whole number",
-    bool: "true or false",
-    NoneType: "null",
-    Sequence: "a list",
-    tuple: "a list",
-}
+def restored(value: Mapping[str, Any], kind: Any, path: str, **given: Any) -> Any:
+    """An object of a dataclass from all its fields and no others; some may be `given`."""
+    kinds = {name: hint for name, hint in get_type_hints(kind).items() if name in value}
+    _check_names({**value, **given}, _names(kind), path)
+    parts = {
+        # whole numbers that were typed as others
+        name: int(part) if kinds[name] is int and _is_whole(part) else part
+        for name, part in value.items()
+    }
+    fitted = {name: fit(part, kinds[name], f"{path}.{name}") for name, part in parts.items()}
+    try:
+        return kind(**{**fitted, **given})
+    except InvalidValue as error:
+        raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
 
 
-def _is_one(value: Any, kind: Any) -> bool:
-    return isinstance(kind, type) and not is_typeddict(kind) and isinstance(value, kind)
+def _is_whole(number: Any) -> bool:
+    return isinstance(number, float) and number.is_integer()
 
 
-def _unfit(value: Any, kinds: Sequence[Any], path: str) -> DataError:
-    shown = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
-    wanted = " or ".join(_WORDS.get(get_origin(kind) or kind, "a mapping") for kind in kinds)
-    return refused(path, f"is {brief(json.dumps(shown, default=repr))}, and must be {wanted}")
+def _names(kind: Any) -> list[str]:
+    return [field.name for field in fields(kind)]
 
 
-def _either(value: Any, kinds: Sequence[Any], path: str) -> Any:
-    for kind in kinds:
-        try:
-            return fit(value, kind, path)
-        except DataError:
-            continue
-    raise _unfit(value, kinds, path)
-
-
-def _list(value: Sequence[Any], origin: Any, of: tuple[Any, ...], path: str) -> Any:
-    kinds = of[:1] * len(value) if origin is Sequence or of[1:] == (...,) else of
-    if len(value) != len(kinds):
-        raise refused(path, f"has {len(value)} parts, and must have {len(kinds)}")
-    parts = (fit(v, k, f"{path}[{i}]") for i, (v, k) in enumerate(zip(value, kinds, strict=True)))
-    return tuple(parts) if origin is tuple else list(parts)
-
-
-def _object(value: Mapping[str, Any], kind: Any, path: str) -> Any:
-    """A dataclass has its fields and no others; a typed dictionary may have others."""
-    kinds, closed = get_type_hints(kind), is_dataclass(kind)
-    names = [field.name for field in fields(kind)] if is_dataclass(kind) else list(kinds)
-    parts = _fitted(value, {name: kinds[name] for name in names}, path)
-    if not closed:
-        return {**value, **parts}
+def _check_names(value: Mapping[str, Any], names: Collection[str], path: str) -> None:
+    """Refuse plain data that lack one of these, or have others."""
+    for name in names:
+        if name not in value:
+            raise refused(f"{path}.{name}", "is missing")
     for name in value:
         if name not in names:
-            raise refused(_inside(path, name), "is unknown")
-    try:
-        return kind(**parts)
-    except InvalidValue as error:
-        raise refused(_inside(path, error.name), f"is refused ({error})") from error
-
-
-def _fitted(value: Mapping[str, Any], kinds: Mapping[str, Any], path: str) -> dict[str, Any]:
-    """The required parts of a mapping, each converted to its type."""
-    for name in kinds:
-        if name not in value:
-            raise refused(_inside(path, name), "is missing")
-    return {name: fit(value[name], kind, _inside(path, name)) for name, kind in kinds.items()}
-
-
-def _inside(path: str, name: str) -> str:
-    return f"{path}.{name}" if path else name
+            raise refused(f"{path}.{name}", "is unknown")

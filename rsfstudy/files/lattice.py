@@ -12,6 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.axis import kinds
 from rsfstudy.declare.study import Study
+from rsfstudy.files.contents import LAYOUT
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
@@ -178,4 +179,5 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
     }
     # a command, or the environment, may hold bytes that are no text
-    return {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}
+    plain = {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}
+    return {**plain, "layout": LAYOUT}

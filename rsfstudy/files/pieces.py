@@ -21,7 +21,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.files.lattice import attributes, coordinates, variables
-from rsfstudy.files.store import ZARR, Digests
+from rsfstudy.files.store import ZARR, seal
 from rsfstudy.status import Status
 
 #: Numbers in one piece: 32 MB of float64.
@@ -64,17 +64,13 @@ def write(
     beside = path.with_name(f".{path.name}.new")
     try:
         shutil.rmtree(beside, ignore_errors=True)
-        digests = Digests()
-        finished = _write_lattice(study, read, beside, digests)
+        finished = _write_lattice(study, read, beside)
         lattice = xr.open_dataset(beside, **ZARR)
         results = reduce(lattice)
         reductions = _as_objects(results.drop_vars(list(lattice.variables)))
-        digests.add(reductions)
-        digests.describe(reductions)
         about = {**attributes(study, finished, provenance), **results.attrs}
-        sealed = digests.sealing(reductions.assign_attrs(about))
-        sealed.to_zarr(beside, mode="a", **_STORE)
-        digests.check(xr.open_dataset(beside, **ZARR), str(path))
+        reductions.assign_attrs(about).to_zarr(beside, mode="a", **_STORE)
+        seal(beside)
         beside.rename(path)
     except OSError as error:
         raise DataError(f"cannot write {path}: {error}.") from error
@@ -89,22 +85,23 @@ def _as_objects(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
-def _write_lattice(study: Study, read: Read, path: Path, digests: Digests) -> int:
+def _write_lattice(study: Study, read: Read, path: Path) -> int:
     """Write the variables of the lattice; the number of cells that are finished."""
     width = Layout(study.measure).width
     chunk = _chunk(study.shape, _NUMBERS // width)
     template = _template(study, Columns.pending(1, width), chunk)
     template.to_zarr(path, mode="w-", compute=False, **_STORE)
-    digests.describe(template)
-    digests.add(template.coords.to_dataset())
     finished = 0
     for region in _regions(study.shape, chunk):
         shape = tuple(part.stop - part.start for part in region)
         start = int(np.ravel_multi_index([part.start for part in region], study.shape))
         columns = read(start, start + math.prod(shape))
         slab = xr.Dataset(variables(study, columns, shape))
-        slab.to_zarr(path, region=dict(zip(study.dimensions, region, strict=True)), **_STORE)
-        digests.add(slab)
+        where = dict(zip(study.dimensions, region, strict=True))
+        slab.to_zarr(path, region=where, **_STORE)
+        back = xr.open_dataset(path, **ZARR)[list(slab)].isel(where)
+        if not slab.equals(back.drop_vars(list(back.coords))):
+            raise DataError(f"{path} was not written: what was read back differs.")
         finished += int((columns.status != int(Status.PENDING)).sum())
     return finished
 

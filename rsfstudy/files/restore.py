@@ -7,11 +7,11 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict
 
+import msgspec
 import xarray as xr
 
 from rsfstudy import measures, reduce
@@ -26,8 +26,11 @@ from rsfstudy.files.contents import (
     PlainAxis,
     PlainMeasure,
     PlainReduction,
+    PlainScene,
     fit,
     refused,
+    restored,
+    scene,
 )
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
@@ -109,7 +112,7 @@ def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> 
     DataError
         Where the declaration makes no study, naming the part.
     """
-    parts = {field.name: getattr(declared, field.name) for field in fields(declared)}
+    parts = msgspec.structs.asdict(declared)
     own = _own_parts(of_its_own)
     parts["base"] = contents.scene(declared.base, own)
     if of_its_own is None:
@@ -152,36 +155,38 @@ def measure(described: PlainMeasure, path: str) -> Measure:
     name, kinds = values.pop("name"), _kinds(Measure, measures)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
+    given = {}
     if "problems" in values:
-        values["problems"] = _problems(values["problems"], f"{path}.problems")
-    restored: Measure = fit(values, kinds[name], path)
-    return restored
+        plain = fit(values.pop("problems"), Sequence[dict[str, Any]], f"{path}.problems")
+        given["problems"] = [_problem(p, f"{path}.problems[{n}]") for n, p in enumerate(plain)]
+    made: Measure = restored(values, kinds[name], path, **given)
+    return made
 
 
 class _PlainProblem(TypedDict):
     """A problem; what else it holds is numbers and texts."""
 
+    scene: PlainScene
     measure: PlainMeasure
     status: str
     scale: float | None
 
 
-def _problems(described: Any, path: str) -> list[Problem]:
-    plain: Sequence[_PlainProblem] = fit(described, Sequence[_PlainProblem], path)
-    return [_problem(problem, f"{path}[{number}]") for number, problem in enumerate(plain)]
-
-
-def _problem(described: _PlainProblem, path: str) -> Problem:
+def _problem(described: dict[str, Any], path: str) -> Problem:
+    plain: _PlainProblem = fit(described, _PlainProblem, path)
     statuses = {status.label: status for status in Status}
-    if described["status"] not in statuses:
+    if plain["status"] not in statuses:
         raise refused(f"{path}.status", "is unknown")
-    made = {
-        "measure": measure(described["measure"], f"{path}.measure"),
-        "status": statuses[described["status"]],
-        "scale": described["scale"] or 0.0,
-    }
-    problem: Problem = fit({**described, **made}, Problem, path)
-    return problem
+    made: Problem = restored(
+        {name: value for name, value in described.items() if name not in plain},
+        Problem,
+        path,
+        scene=scene(plain["scene"], path=f"{path}.scene"),
+        measure=measure(described["measure"], f"{path}.measure"),
+        status=statuses[plain["status"]],
+        scale=plain["scale"] or 0.0,
+    )
+    return made
 
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
@@ -192,8 +197,8 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
         raise InvalidValue(
             "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
         )
-    restored: Reduction = fit(values, kinds[wanted], path)
-    return restored
+    made: Reduction = restored(values, kinds[wanted], path)
+    return made
 
 
 def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:

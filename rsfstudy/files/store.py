@@ -1,9 +1,6 @@
-"""NetCDF files: written under a temporary name, read back, compared, and only then renamed. They
-carry digests, so that damage is noticed, and the damaged variable named.
-
-A digest of all bytes is appended to the HDF5 file, where HDF5 ignores it. It is checked before HDF5
-opens the file, because HDF5 may hang on damaged bytes. The digests of the variables are an
-attribute, which stays with the dataset when a notebook saves it elsewhere.
+"""NetCDF files: written under a temporary name, read back, compared, and only then renamed. Each
+ends with a digest of all its bytes, where HDF5 ignores it. It is checked before HDF5 opens the
+file, because HDF5 may hang on damaged bytes. Other programs write none when they save a dataset.
 """
 
 from __future__ import annotations
@@ -11,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -22,11 +20,6 @@ import xarray as xr
 from rsfstudy.errors import DataError, brief
 from rsfstudy.files import contents
 
-#: Root attributes that verdicts and reruns depend on.
-_SEALED = ("id", "title", "completeness", "declaration", "provenance", "reduced_despite")
-#: Variables that every results file has. Those that a user added have no digests.
-_OF_EVERY_LATTICE = ("status", "message", "rhs_evaluations", "wall_time")
-_DIGESTS = "digests"
 #: How Zarr stores are opened: lazily, and none of an older format.
 ZARR: Mapping[str, Any] = {
     "engine": "zarr",
@@ -39,91 +32,7 @@ ZARR: Mapping[str, Any] = {
 _CODECS = {"bytes", "vlen-utf8", "zstd"}
 _MARK = b"\nrsfstudy sha256 "
 _TRAILER = len(_MARK) + 64
-
-
-class Digests:
-    """Digests of the values of variables, each added whole or in consecutive pieces."""
-
-    def __init__(self) -> None:
-        self._of: dict[str, Any] = {}
-        self._about: dict[str, str] = {}
-
-    def add(self, dataset: xr.Dataset) -> None:
-        """Add the values of each variable; if they come in pieces, in row-major order."""
-        for name in dataset.variables:
-            values = dataset[name].values
-            digest = self._of.setdefault(str(name), hashlib.sha256())
-            if values.dtype.kind in "OUST":
-                digest.update("".join(f"{text}\0" for text in values.ravel().tolist()).encode())
-            else:
-                little = values.dtype.newbyteorder("<")
-                digest.update(np.ascontiguousarray(values, dtype=little).tobytes())
-
-    def describe(self, dataset: xr.Dataset) -> None:
-        """Add the dimensions and attributes of each variable, as they are written."""
-        for name, variable in dataset.variables.items():
-            sizes = [[str(d), int(n)] for d, n in variable.sizes.items()]
-            attrs = {str(key): np.asarray(v).tolist() for key, v in variable.attrs.items()}
-            self._about[f"{name}()"] = json.dumps(sizes)
-            self._about[f"{name}:"] = json.dumps(attrs, sort_keys=True)
-
-    def sealing(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The dataset with these digests, and those of its root attributes, as an attribute."""
-        return dataset.assign_attrs({_DIGESTS: json.dumps(self._all(dataset.attrs))})
-
-    def _all(self, attrs: Mapping[Any, Any]) -> dict[str, str]:
-        texts = {f":{name}": str(attrs[name]) for name in _SEALED if name in attrs} | self._about
-        digests = self._of | {name: hashlib.sha256(t.encode()) for name, t in texts.items()}
-        return {name: digest.hexdigest()[:16] for name, digest in digests.items()}
-
-    def check(self, dataset: xr.Dataset, where: str) -> None:
-        """Check a dataset against the digests it carries.
-
-        Raises
-        ------
-        DataError
-            Where it carries none, or a variable or attribute is missing or was changed; where it is
-            of one scene.
-        """
-        contents.check_of_a_study(dataset, where)
-        try:
-            carried = dict(json.loads(dataset.attrs[_DIGESTS]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise DataError(
-                f"{where} carries no digests: it was not written by rsfstudy, or damaged."
-            ) from error
-        ours = _digests_of(dataset)._all(dataset.attrs)
-        for name in [n for n in ours if n.startswith(":") or n in _OF_EVERY_LATTICE]:
-            carried.setdefault(name, "")
-        for name, digest in carried.items():
-            if ours.get(name) != digest:
-                what = "missing" if name not in ours else "not what was written"
-                raise DataError(
-                    f"{where} is damaged, or was edited: {_named(name)} is {what}. "
-                    "Run the study again; its finished cells are kept beside it."
-                )
-
-
-def _named(name: str) -> str:
-    """A variable, an attribute of one, or a root attribute, as their digests are named."""
-    if name.endswith("()"):
-        return f"the shape of {name[:-2]!r}"
-    if name.endswith(":"):
-        return f"an attribute of {name[:-1]!r}"
-    return f"the attribute {name[1:]!r}" if name.startswith(":") else repr(name)
-
-
-def _digests_of(dataset: xr.Dataset) -> Digests:
-    digests = Digests()
-    digests.add(dataset)
-    digests.describe(dataset)
-    return digests
-
-
-def sealed(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset as it is written: with attributes that NetCDF keeps unchanged, and digests."""
-    clean = clean_attributes(dataset)
-    return _digests_of(clean).sealing(clean)
+_DIGEST = "digest"
 
 
 def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
@@ -142,7 +51,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If the directory cannot be written, or what is read back differs from what was written.
     """
-    clean = sealed(dataset)
+    clean = clean_attributes(dataset)
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -179,16 +88,46 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
     return digest.hexdigest().encode()
 
 
-def _check_bytes(path: Path) -> None:
-    """Check a file against the digest of its bytes, if one is appended to it."""
+def seal(store: Path) -> None:
+    """Write the digest of all files of a Zarr store among its attributes."""
+    root = store / "zarr.json"
+    about = json.loads(root.read_text())
+    about["attributes"][_DIGEST] = _digest_of_store(store)
+    root.write_text(json.dumps(about, indent=2))
+
+
+def _digest_of_store(store: Path) -> str:
+    """Digest of the files of a store, without the one that its root holds."""
+    digest = hashlib.sha256()
+    for file in sorted(file for file in store.rglob("*") if file.is_file()):
+        content = file.read_bytes()
+        if file == store / "zarr.json":
+            about = json.loads(content)
+            about["attributes"].pop(_DIGEST, None)
+            content = json.dumps(about, sort_keys=True).encode()
+        digest.update(f"{file.relative_to(store)} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def _check_store(path: Path) -> bool:
+    """Check a Zarr store against its digest; whether it has one."""
+    attributes = json.loads((path / "zarr.json").read_text())["attributes"]
+    if _DIGEST in attributes and attributes[_DIGEST] != _digest_of_store(path):
+        raise DataError(f"{path} is damaged, or was edited: its files are not what was written.")
+    return _DIGEST in attributes
+
+
+def _check_bytes(path: Path) -> bool:
+    """Check a file against the digest of its bytes; whether it has one."""
     size = path.stat().st_size - _TRAILER
-    if size < 0:
-        return
     with open(path, "rb") as file:
-        file.seek(size)
+        file.seek(max(0, size))
         trailer = file.read()
-    if trailer.startswith(_MARK) and trailer != _MARK + _digest_of_bytes(path, size):
+    if not trailer.startswith(_MARK):
+        return False
+    if trailer != _MARK + _digest_of_bytes(path, size):
         raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
+    return True
 
 
 def _remove(path: Path) -> None:
@@ -211,21 +150,25 @@ def read(path: Path) -> xr.Dataset:
         _check_there(path, where)
         if path.is_dir():
             _check_codecs(path)
+            sealed = _check_store(path)
             dataset = xr.open_dataset(path, **ZARR)
         else:
-            _check_bytes(path)
+            sealed = _check_bytes(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
-        Digests().check(dataset, where)
     except DataError:
         raise
     except (
         Exception
     ) as error:  # HDF5, Zarr, netCDF4 and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
+    contents.check_of_a_study(dataset, where)
     try:
         contents.check(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
+    if not sealed and "digests" not in dataset.attrs:
+        said = f"{where} has no digest: another program saved it, and may have changed it"
+        warnings.warn(said, stacklevel=2)
     return dataset
 
 

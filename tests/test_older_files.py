@@ -1,0 +1,79 @@
+"""Files of older layouts: they open, are checked and drawn, and the run they are of goes on."""
+
+import contextlib
+import json
+import sqlite3
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import call, run, same_numbers
+
+import rsfstudy
+from rsfstudy.compute import provenance
+from rsfstudy.files import contents
+from rsfstudy.status import Status
+
+#: Written by rsfstudy 0.1.0 before files named their layout: a study with its journal and as a
+#: store, a named one narrowed by --set, one with failed cells, and a motion.
+LAYOUT_1 = Path(__file__).with_name("layout_1.tar.xz")
+RESULTS = ["tiny.nc", "tiny.zarr", "rate_step_boundary.nc", "displacement_boundary.nc"]
+
+
+@pytest.fixture(scope="module")
+def older(tmp_path_factory) -> Path:
+    place = tmp_path_factory.mktemp("layout_1")
+    with tarfile.open(LAYOUT_1) as files:
+        files.extractall(place, filter="data")
+    return place
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_open_check_and_plot(name, older, tmp_path):
+    dataset = rsfstudy.open(older / name)
+    assert "layout" not in dataset.attrs
+    assert dataset.rsf.study.name == dataset.attrs["id"]
+    assert not rsfstudy.check(dataset).moved.any()
+    drawn = call("plot", older / name, "--output", tmp_path)
+    assert (drawn.returncode, drawn.stderr) == (0, "")
+    assert call("show", older / name).returncode == (name == "displacement_boundary.nc")
+    assert rsfstudy.compare(dataset, dataset).agrees
+
+
+def test_they_hold_what_they_held(older):
+    narrowed = rsfstudy.open(older / "rate_step_boundary.nc")
+    assert contents.declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
+    assert set(rsfstudy.check(narrowed).verdict) == {"not applicable", "reproduced"}
+    failed = rsfstudy.open(older / "displacement_boundary.nc")
+    assert (failed.status == int(Status.WORK_BUDGET_SPENT)).any()
+    same_numbers(rsfstudy.open(older / "tiny.nc"), rsfstudy.open(older / "tiny.zarr").load())
+
+
+def test_they_are_computed_again_from_themselves(older):
+    table = rsfstudy.rerun(older / "tiny.nc", workers=0, progress=False)
+    assert (table.beyond_errors.fillna(0) == 0).all()
+    assert "python" in table.attrs["differs"]  # which fingerprints did not name
+
+
+def test_a_motion_opens_and_is_drawn(older):
+    motion = xr.load_dataset(older / "motion.nc")
+    assert motion.rsf.scene.load_velocity_ratio == 3.0
+    assert len(motion.rsf.plot().axes) >= 3
+
+
+def test_a_run_goes_on(older, tmp_path, monkeypatch):
+    """With code of today, whose fingerprint the journal is given."""
+    study = rsfstudy.open(older / "tiny.nc").rsf.study
+    journal = tmp_path / "tiny.cells.sqlite"
+    journal.write_bytes((older / "tiny.cells.sqlite").read_bytes())
+    with contextlib.closing(sqlite3.connect(journal)) as db, db:
+        (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
+        now = json.dumps({**json.loads(text), **provenance.fingerprint(study)}, sort_keys=True)
+        db.execute("UPDATE fingerprint SET json = ?", (now,))
+    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
+    resumed = run(study, output=tmp_path)
+    assert np.array_equal(
+        resumed.critical_stiffness, rsfstudy.open(older / "tiny.nc").critical_stiffness
+    )
