@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
+from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue
 
 # all else is loaded when asked for: xarray imports this module whatever file it opens
@@ -45,6 +46,7 @@ class Accessor:
         self._dataset = dataset
 
     @property
+    @door
     def scene(self) -> Scene:
         """The scene: of results of a study that of the one cell that is selected.
 
@@ -58,6 +60,7 @@ class Accessor:
         return _scene_of(self._dataset)
 
     @property
+    @door
     def study(self) -> Study:
         """The study that made the dataset, all of it, whatever is selected.
 
@@ -78,6 +81,7 @@ class Accessor:
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
         return restore.from_declaration(declared)
 
+    @door
     def to_si(self, **scales: Any) -> xr.Dataset:
         """The dataset in SI units.
 
@@ -91,6 +95,7 @@ class Accessor:
         self._must_be_ours()
         return to_si(self._dataset, **scales)
 
+    @door
     def check(self) -> pd.DataFrame:
         """The claims of the study held against the dataset, as `rsfstudy.check` gives them."""
         from rsfstudy import api
@@ -99,6 +104,7 @@ class Accessor:
         self._must_be_whole("claims are held against")
         return api.check(self._dataset)
 
+    @door
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
         """The figure of the results of a study, or the picture of a motion.
 
@@ -119,6 +125,7 @@ class Accessor:
             raise DataError(f"{text} cycle.plot.scatter('log10_slip_rate', 'shear_stress')")
         return picture(self._dataset, *what, **how)
 
+    @door
     def failures(self) -> pd.DataFrame:
         """The cells that failed or gave no number.
 

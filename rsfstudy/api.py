@@ -20,6 +20,7 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
+from rsfstudy.doors import door
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import (
@@ -38,11 +39,13 @@ if TYPE_CHECKING:
     from rsfstudy import plots
 
 
+@door
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
     return {name: catalogue.load(name) for name in catalogue.names()}
 
 
+@door
 def run(
     study: str | Path | Study,
     *,
@@ -131,7 +134,7 @@ def run(
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         text = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
         text += "; dataset.rsf.failures() lists them"
-        warnings.warn(text, Incomplete, stacklevel=2)
+        warnings.warn(text, Incomplete, stacklevel=3)
     return results
 
 
@@ -182,6 +185,7 @@ def prepared(
     return run
 
 
+@door
 def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
@@ -203,6 +207,7 @@ def _opened(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     return dataset
 
 
+@door
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -241,6 +246,7 @@ def plot(
     return plots.figure(_opened(dataset), own, variable=variable, style=style)
 
 
+@door
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     """Compare a dataset (or a named study's results, or a file) with the claims of its study.
 
@@ -255,6 +261,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     return verdicts(results, list(declared.claims), declared.overrides)
 
 
+@door
 def rerun(
     file: str | Path,
     *,
@@ -310,6 +317,7 @@ def rerun(
     return compared(theirs, ours)
 
 
+@door
 def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
     """What differs between two datasets (or named studies' results, or files): in declaration, in
     what made them, and in numbers, cell by cell where both have the same place on every axis.
@@ -364,12 +372,20 @@ def cell(
     UserWarning
         Where something that decides its numbers has changed since the file was made.
     """
+    declared, number, differs = _found(file, place, study)
+    for name, (theirs, ours) in differs.items():
+        warnings.warn(f"{name}: {theirs} then, {ours} now", stacklevel=2)
+    scene, changes = declared.cell(number)
+    return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
+
+
+@door
+def _found(
+    file: str | Path, place: Mapping[str, Any], study: str | Path | None
+) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
+    """The study of a file, the number of a cell, and what else decided it and has changed."""
     results = open(file)
     number = cell_number(results, place)
     declared = restore.study_of(results, study)
     now = provenance.fingerprint(declared)
-    then = contents.provenance(results)["fingerprint"]
-    for name, (theirs, ours) in differences(then, now).items():
-        warnings.warn(f"{name}: {theirs} then, {ours} now", stacklevel=2)
-    scene, changes = declared.cell(number)
-    return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
+    return declared, number, differences(contents.provenance(results)["fingerprint"], now)

@@ -5,6 +5,9 @@ loaded when it is called, so that help and the list of studies answer at once.
 from __future__ import annotations
 
 import contextlib
+import io
+import os
+import shlex
 import signal
 import sys
 import warnings
@@ -17,6 +20,7 @@ import click
 from rsfstudy import cli_simulate, options
 from rsfstudy.declare import catalogue
 from rsfstudy.defaults import FORMATS
+from rsfstudy.doors import in_words
 from rsfstudy.errors import (
     Incomplete,
     Interrupted,
@@ -24,6 +28,7 @@ from rsfstudy.errors import (
     RsfStudyError,
     Signalled,
     brief,
+    spelt,
 )
 
 OK, FAILED, WRONG_USAGE = 0, 1, 2
@@ -58,10 +63,15 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Entry point: errors of ours end in one message and an exit status, not in a traceback."""
+    """Entry point: errors end in one message and an exit status, not in a traceback, unless the
+    environment has RSFSTUDY_TRACEBACK.
+    """
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _warn(message)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
+            stream.reconfigure(errors="backslashreplace")
     try:
         with _signals_raise():
             sys.exit(cli(standalone_mode=False) or OK)
@@ -80,6 +90,15 @@ def main() -> None:
         sys.exit(error.exit_status)
     except RsfStudyError as error:
         _say(f"error: {error}")
+        sys.exit(FAILED)
+    except Exception as error:
+        if os.environ.get("RSFSTUDY_TRACEBACK"):
+            raise
+        words = brief(shlex.join(sys.argv[1:]))
+        _say(
+            f"error: rsfstudy {words}: {in_words(error)}. Look at what it names: a file may be "
+            "damaged, or no place to write to. RSFSTUDY_TRACEBACK=1 shows where it arose."
+        )
         sys.exit(FAILED)
 
 
@@ -107,10 +126,8 @@ def _signals_raise() -> Iterator[None]:
 
 
 def _warn(message: Warning | str) -> None:
-    from rsfstudy.console import spelt
-
     # not by the console, which knows nothing of a progress bar and would write over it
-    print(spelt(f"warning: {message}"), file=sys.stderr)
+    print(spelt(brief(f"warning: {message}", 5000)), file=sys.stderr)
 
 
 def _say(text: str) -> None:

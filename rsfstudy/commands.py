@@ -6,6 +6,7 @@ import contextlib
 import shlex
 import sys
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -159,8 +160,14 @@ def rerun(
 ) -> int:
     """Compute a results file anew, or one cell of it."""
     if place:
-        with warnings.catch_warnings(record=True) as caught:
-            scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+        except RsfStudyError:
+            raise
+        except Exception:  # it fails as it fails
+            traceback.print_exc()
+            return FAILED
         return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
     with _client(scheduler, serial) as client:
         table = api.rerun(

@@ -7,7 +7,10 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from rsfstudy.errors import RunError
+from rsfstudy.errors import RunError, brief, spelt
+
+#: Most characters of a text that is printed: what a file says may be without end.
+_LONGEST = 5000
 
 
 class Plain(Console):
@@ -16,8 +19,8 @@ class Plain(Console):
     """
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text with control characters spelt out."""
-        return super().render_str(spelt(text), **options)
+        """Text with control characters spelt out, and without its middle where it is endless."""
+        return super().render_str(spelt(brief(text, _LONGEST)), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print; the output may go to a file on a full disk, which is a `RunError`."""
@@ -25,12 +28,6 @@ class Plain(Console):
             super().print(*objects, **options)
         except OSError as error:
             raise RunError(f"cannot print: {error.strerror}.") from error
-
-
-def spelt(text: str) -> str:
-    """Text with its control characters spelt out."""
-    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
-    return "".join(c if isinstance(c, str) else c.decode() for c in characters)
 
 
 console = Plain(markup=False, emoji=False, highlight=False)

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 #: Most characters of a text, and most choices, that a message has room for; and the most that are
 #: listed beside those that look like what was given.
 _MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
+#: Most characters of a message.
+_LONGEST = 5000
 
 _values = reprlib.Repr()
 _values.maxstring = _values.maxother = _values.maxlong = 100
@@ -19,7 +21,12 @@ _values.maxlist = _values.maxtuple = _values.maxdict = _values.maxset = 20
 
 
 class RsfStudyError(Exception):
-    """Anything rsfstudy refuses or cannot finish; its text is meant for the user."""
+    """Anything rsfstudy refuses or cannot finish; its text is meant for the user: one line, however
+    long or odd the values that it shows.
+    """
+
+    def __str__(self) -> str:
+        return spelt(brief(super().__str__().replace("\n", " "), _LONGEST))
 
 
 class InvalidValue(RsfStudyError, ValueError):
@@ -112,3 +119,9 @@ def brief(text: object, most: int = _MOST_CHARACTERS) -> str:
     """A text without its middle where it is too long for a message."""
     whole, half = str(text), most // 2
     return whole if len(whole) <= most else f"{whole[:half]}...{whole[-half:]}"
+
+
+def spelt(text: str) -> str:
+    """Text with its control characters spelt out."""
+    characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
+    return "".join(c if isinstance(c, str) else c.decode() for c in characters)

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
+from rsfstudy.doors import door
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import Measure, Value
 from rsfstudy.measures.critical_step import CriticalStep
@@ -26,6 +27,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 
+@door
 def critical_step(
     scene: Scene,
     of: str = "load_velocity_ratio",
@@ -71,6 +73,7 @@ def critical_step(
     )
 
 
+@door
 def limit_cycle(
     scene: Scene,
     *,
@@ -107,6 +110,7 @@ def limit_cycle(
     return _measured(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
 
 
+@door
 def to_si(
     dataset: xr.Dataset,
     *,
@@ -163,7 +167,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     if outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
-        warnings.warn(text, NoAnswer, stacklevel=3)
+        warnings.warn(text, NoAnswer, stacklevel=4)
     numbers = {**outcome.values, "rhs_evaluations": outcome.rhs_evaluations}
     dataset = _like(_blank(measure), numbers)
     dataset.variables["reference_rate"].data = np.array(scene.reference_rate)

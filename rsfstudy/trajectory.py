@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
+from rsfstudy.doors import door
 from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
@@ -50,6 +51,7 @@ _OVER_LOADING = 1e6
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
 
+@door
 def simulate(
     scene: Scene,
     *nameless: Never,
@@ -123,7 +125,7 @@ def simulate(
     accuracy = Accuracy(rtol, budget, engine=engine)
     check_engine(accuracy.engine)
     if not scene.is_disturbed:
-        warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=2)
+        warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=3)
     meter = Meter(budget, engine=accuracy.engine)
     recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
@@ -163,10 +165,10 @@ def simulate(
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
         dataset[_INSTABILITY_TIME.name] = ((), passed, _about(_INSTABILITY_TIME))
         dataset = dataset.assign_attrs({BEYOND: text})
-        warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=2)
+        warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=3)
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
-        warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=2)
+        warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
     return dataset
 
 

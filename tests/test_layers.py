@@ -16,6 +16,7 @@ ROOT = Path(rsfstudy.__file__).parent
 #: From the bottom up; no two share a floor, but for what users call.
 FLOORS = {
     "errors": 0,
+    "doors": 0,
     "defaults": 0,
     "status": 0,
     "quantity": 0,

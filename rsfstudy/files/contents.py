@@ -15,7 +15,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import Any, TypedDict, get_type_hints
+from typing import Annotated, Any, TypedDict, get_type_hints
 
 import msgspec
 import numpy as np
@@ -35,6 +35,8 @@ from rsfstudy.vocabulary import QUANTITIES
 #: The layout of files as they are written. Those without a number are of layout 1, which had
 #: digests of variables among its attributes.
 LAYOUT = 2
+#: More would take minutes to look through, or not fit in memory.
+MOST_CLAIMS, MOST_POINTS = 10_000, 10_000_000
 
 
 class Attributes(TypedDict):
@@ -83,7 +85,7 @@ class Declaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measure: PlainMeasure
     accuracy: Accuracy
     reductions: Sequence[PlainReduction]
-    claims: Sequence[Claim]
+    claims: Annotated[Sequence[Claim], msgspec.Meta(max_length=MOST_CLAIMS)]
     plot: str
     references: Sequence[str]
     overrides: Mapping[str, Any]
@@ -137,12 +139,18 @@ def check(dataset: xr.Dataset) -> None:
             "open it with the version that its attribute source names."
         )
     attrs = fit({"reduced_despite": "", **dataset.attrs}, Attributes, "")
-    name = declaration(dataset).name
+    declared = declaration(dataset)
+    name = declared.name
     if attrs["id"] != name or not name.isidentifier():
         raise refused("id", f"is {brief(attrs['id'])!r}, and the declared study {brief(name)!r}")
     for variable in _OF_EVERY_LATTICE:
         if variable not in dataset.data_vars:
             raise refused(variable, "is missing")
+    for axis in declared.axes:
+        points = dataset.sizes.get(axis["dimension"])
+        if len(axis["values"]) != points:
+            rule = f"has {len(axis['values'])} points in the declaration, and {points} in the file"
+            raise refused(axis["dimension"], rule)
     for name in map(str, dataset.variables):
         if name in QUANTITIES or name in dataset.coords:  # a notebook may have added others
             _check_kind(name, dataset.variables[name])
@@ -329,6 +337,9 @@ def restored(value: Mapping[str, Any], kind: Any, path: str, **given: Any) -> An
     """An object of a dataclass from all its fields and no others; some may be `given`."""
     kinds = {name: hint for name, hint in get_type_hints(kind).items() if name in value}
     _check_names({**value, **given}, _names(kind), path)
+    for name, part in value.items():
+        if kinds[name] is int and isinstance(part, int | float) and abs(part) > MOST_POINTS:
+            raise refused(f"{path}.{name}", f"is above {MOST_POINTS}")
     parts = {
         # whole numbers that were typed as others
         name: int(part) if kinds[name] is int and _is_whole(part) else part

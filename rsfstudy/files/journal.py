@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.errors import DataError
+from rsfstudy.errors import DataError, brief
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
@@ -36,6 +36,11 @@ CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
     checksum INTEGER);
+"""
+#: What a journal has no need of, and might act when it is written to.
+_OTHERS = """
+SELECT type || ' ' || name FROM sqlite_master
+WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
 _AT_A_TIME = 900
 #: How long to wait for another run to end, in s.
@@ -137,6 +142,7 @@ class Journal:
             self._db = _alone(path or ":memory:")
             with self._db:
                 self._db.executescript(_TABLES)
+                others = self._db.execute(_OTHERS).fetchall()
                 row = self._db.execute("SELECT json FROM fingerprint").fetchone()
                 if row is None:
                     self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
@@ -147,6 +153,11 @@ class Journal:
                     "(output=)."
                 ) from error
             raise DataError(f"cannot use {self._path}: {error}. {_REMEDY}") from error
+        if others:
+            self._db.close()
+            raise DataError(
+                f"{self._path} holds {brief(others[0][0])}, which is not ours. {_REMEDY}"
+            )
         if row is not None and row[0] != wanted:
             if _allows_more(row[0], wanted):
                 with self._db:
@@ -207,16 +218,12 @@ class Journal:
         columns = Columns.pending(len(keys), self._layout.width)
         what = "key, status, message, work, seconds, numbers, checksum"
         for places, rows in self._rows(keys, what):
-            if any(_checksum(*known) != checksum for *known, checksum in rows):
+            try:
+                _fill(columns, places, rows)
+            except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise DataError(
                     f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
-                )
-            _keys, status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
-            columns.status[places] = [Status[name] for name in status]
-            columns.message[places], columns.work[places] = message, work
-            columns.seconds[places] = [math.nan if s is None else s for s in seconds]
-            found = np.frombuffer(b"".join(numbers), dtype="<f8")
-            columns.numbers[places] = found.reshape(len(rows), -1)
+                ) from error
         return columns
 
     def _holds_any(self) -> bool:
@@ -251,6 +258,18 @@ class Journal:
                 yield [cell for cell, _row in known], [row for _cell, row in known]
 
 
+def _fill(columns: Columns, places: list[int], rows: list[Any]) -> None:
+    """Fill in rows; an error of Python's where one is not what was written."""
+    if any(_checksum(*known) != checksum for *known, checksum in rows):
+        raise ValueError("checksum")
+    _keys, status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
+    columns.status[places] = [Status[name] for name in status]
+    columns.message[places], columns.work[places] = message, work
+    columns.seconds[places] = [math.nan if s is None else s for s in seconds]
+    found = np.frombuffer(b"".join(numbers), dtype="<f8")
+    columns.numbers[places] = found.reshape(len(rows), -1)
+
+
 @dataclass(frozen=True)
 class Timed:
     """How long cells took.
@@ -273,7 +292,7 @@ def timed(path: Path) -> Timed | None:
         uri = f"{path.resolve().as_uri()}?mode=ro"
         with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
             (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
-            seconds = db.execute("SELECT key, seconds FROM cells WHERE seconds IS NOT NULL")
+            seconds = db.execute("SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'")
             return Timed(dict(json.loads(known)), dict(seconds))
     except (OSError, sqlite3.Error, TypeError, ValueError):
         return None

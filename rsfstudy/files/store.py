@@ -168,7 +168,7 @@ def read(path: Path) -> xr.Dataset:
         raise DataError(f"{where}: {error}") from error
     if not sealed and "digests" not in dataset.attrs:
         said = f"{where} has no digest: another program saved it, and may have changed it"
-        warnings.warn(said, stacklevel=2)
+        warnings.warn(said, stacklevel=4)
     return dataset
 
 
@@ -179,8 +179,8 @@ def _check_there(path: Path, where: str) -> None:
     if path.is_dir() and not (path / "zarr.json").is_file():
         raise DataError(f"{where} is a directory, and no Zarr store.")
     for part in path.rglob("*") if path.is_dir() else [path]:
-        if not (part.is_file() or part.is_dir()):
-            raise DataError(f"{brief(part)} is no file, but a pipe, a device or a broken link.")
+        if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
+            raise DataError(f"{brief(part)} is no file, but a pipe, a device or a link.")
 
 
 def _check_codecs(path: Path) -> None:

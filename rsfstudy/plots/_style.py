@@ -21,6 +21,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
+from rsfstudy.doors import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.plots._text import wrapped
 
@@ -48,6 +49,9 @@ def styled(over: Any = None) -> Iterator[None]:
     """
     others = over if isinstance(over, list | tuple) else [over]
     sheets = [SHEET, *(other for other in others if other is not None)]
+    for other in others:
+        if isinstance(other, str | Path):
+            check_file("style", other)
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(style.context(sheets))

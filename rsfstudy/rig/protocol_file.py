@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from pathlib import Path
 
+from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import number
@@ -21,6 +22,7 @@ _HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 _EXAMPLE = "velocity (um/s), distance (um)"
 
 
+@door
 def read_protocol(
     path: str | Path, laboratory: Laboratory | None = None, name: str = "protocol"
 ) -> Protocol:
@@ -46,6 +48,7 @@ def read_protocol(
     InvalidValue
         For a header without units, or a field that is no number, with its line and column.
     """
+    check_file("protocol", path)
     try:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             rows = [(n, row) for n, row in enumerate(csv.reader(file), start=1) if any(row)]

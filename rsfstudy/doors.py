@@ -1,0 +1,70 @@
+"""The doors of rsfstudy: whatever goes wrong behind one, and is no error of ours yet, becomes one
+that says what was asked, what went wrong and what to do.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def door(function: Callable[P, T]) -> Callable[P, T]:
+    """The function, with errors of ours only.
+
+    Of a call with a dataset, or on one, any other becomes a `DataError`, of all others an
+    `InvalidValue`; where it arose is kept as the cause. A call that does not fit the signature is
+    Python's own `TypeError`, and what is a warning stays one.
+    """
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def answered(*args: P.args, **options: P.kwargs) -> T:
+        given = signature.bind(*args, **options).arguments
+        try:
+            return function(*args, **options)
+        except (RsfStudyError, Warning):
+            raise
+        except Exception as error:
+            raise _told(function.__name__, given, error) from error
+
+    return answered
+
+
+def _told(name: str, given: dict[str, Any], error: Exception) -> RsfStudyError:
+    """The error for a call that went wrong."""
+    why = in_words(error)
+    if any(hasattr(value, "data_vars") or name == "self" for name, value in given.items()):
+        return DataError(
+            f"{name} cannot be had of this dataset ({why}): it is not as rsfstudy made it. "
+            "Ask the dataset as it was opened, or run the study again."
+        )
+    shown = {key: value for key, value in given.items() if value is not None}
+    remedy = f"help(rsfstudy.{name}) says what it takes."
+    return InvalidValue(name, shown, f"cannot be answered ({why})", remedy=remedy)
+
+
+def in_words(error: BaseException) -> str:
+    """What kind of error it is, and what it says, if it can say anything."""
+    try:
+        return f"{type(error).__name__}: {brief(error)}"
+    except Exception:  # its text may raise as well
+        return type(error).__name__
+
+
+def check_file(name: str, path: str | Path) -> None:
+    """Refuse what is there and no file: reading a pipe or a device may never end."""
+    try:
+        is_other = Path(path).exists() and not Path(path).is_file()
+    except (OSError, ValueError) as error:
+        raise InvalidValue(name, str(path), f"is no path of a file ({in_words(error)})") from error
+    if is_other:
+        remedy = "Name a file."
+        raise InvalidValue(name, str(path), "is a directory, a pipe or a device", remedy=remedy)

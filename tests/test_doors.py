@@ -1,0 +1,317 @@
+"""Whatever is asked of rsfstudy ends with an answer or an error of its own, in one line: junk for
+each parameter of each call, altered datasets, and junk for each option of each command.
+
+What is tried is drawn from signatures, options and the parts of a dataset, with a seed: what is new
+is tried too.
+"""
+
+import contextlib
+import inspect
+import io
+import itertools
+import json
+import os
+import random
+import sqlite3
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+import xarray as xr
+from running import SMALL, call, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, cli
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.measures.linear_stability import LinearStability
+
+JUNK = [
+    None, True, -1, 0, 3, 1.5, float("nan"), float("inf"), 10**400, 1j, "", "other", "\0", "\udcff",
+    "\x1b[31m", "a" * 300, "../..", b"bytes", [], {}, [[]], {"a": None}, {1: 2}, set(), ("a", 2),
+    object(), int, np.ones(2), np.array("x", dtype=object), np.datetime64("2020"), xr.Dataset(),
+    lambda: 1, ValueError("x"), Path("."), Path("a" * 5000), io.StringIO("a"),
+]  # fmt: skip
+LATTICE = Study(
+    name="lattice",
+    title="A lattice",
+    base=Scene(),
+    axes=[Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])],
+    measure=LinearStability(),
+)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory) -> Path:
+    place = tmp_path_factory.mktemp("doors")
+    run(LATTICE, output=place)
+    (place / "circle").symlink_to("circle")
+    (place / "protocol.csv").write_text("velocity (V_*), duration (D_c/V_*)\n2, 1\n")
+    os.mkfifo(place / "pipe")
+    return place
+
+
+def answered(ask) -> None:
+    """It answers, or refuses in one line of text."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            ask()
+        except RsfStudyError as error:
+            text = str(error)
+        else:
+            return
+    assert text.isprintable()
+    assert 0 < len(text) < 6000
+
+
+# ---- calls --------------------------------------------------------------------------------------
+
+
+def calls(place: Path) -> dict[str, dict]:
+    """A call of each function that computes next to nothing."""
+    quick = {"duration": 0.1, "rtol": 1e-2, "engine": "compiled"}
+    scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
+    cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
+    dataset, no_workers = rsfstudy.open(place / "lattice.nc"), {"workers": 0, "progress": False}
+    return {
+        "cell": {"file": place / "lattice.nc", "place": {"law": "slip", "b_over_a": 2.0}},
+        "check": {"dataset": dataset},
+        "compare": {"first": dataset, "second": dataset},
+        "critical_step": {"scene": scene, "rtol": 1e-2, "engine": "compiled"},
+        "limit_cycle": {"scene": cycling, "rtol": 1e-2, "engine": "compiled"},
+        "open": {"name": place / "lattice.nc"},
+        "plot": {"dataset": dataset},
+        "read_protocol": {"path": place / "protocol.csv"},
+        "rerun": {"file": place / "lattice.nc", **no_workers},
+        "run": {"study": LATTICE, "output": None, **no_workers},
+        "simulate": {"scene": scene, **quick},
+        "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
+    }
+
+
+def functions() -> list[tuple[str, str]]:
+    """Functions that are public, and their parameters."""
+    named = {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
+    return [
+        (name, parameter)
+        for name, function in named.items()
+        if inspect.isfunction(function) and name not in ("picture", "protocol", "studies")
+        for parameter, kind in inspect.signature(function).parameters.items()
+        # a client, or a figure, of one's own may be anything
+        if parameter not in ("client", "own", "workers", "progress")
+        and kind.kind not in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+    ]
+
+
+@pytest.mark.parametrize(("name", "parameter"), functions())
+def test_junk_in_calls(name, parameter, place, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for junk in random.Random(f"{name} {parameter}").sample(JUNK, 8):
+        given = {**calls(place)[name], parameter: junk}
+        answered(lambda given=given: getattr(rsfstudy, name)(**given))
+
+
+def test_a_call_that_does_not_fit_is_a_type_error_of_python():
+    with pytest.raises(TypeError, match="missing a required argument: 'dataset'"):
+        rsfstudy.check()
+
+
+# ---- datasets -----------------------------------------------------------------------------------
+
+
+def alterations(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Whatever a notebook may make of a dataset."""
+    dims = list(map(str, dataset.dims))
+    numbers = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f"]
+    made = {
+        **{f"isel {d}": dataset.isel({d: 0}) for d in dims},
+        **{f"dropped {d}": dataset.isel({d: 0}, drop=True) for d in dims},
+        **{f"none along {d}": dataset.isel({d: slice(0)}) for d in dims},
+        **{f"reversed {d}": dataset.isel({d: slice(None, None, -1)}) for d in dims},
+        **{f"no index {d}": dataset.drop_indexes(d) for d in dims},
+        **{f"mean {d}": dataset[numbers].mean(d, keep_attrs=True) for d in dims},
+        **{f"without {n}": dataset.drop_vars(n) for n in map(str, dataset.variables)},
+        **{f"no attribute {n}": without(dataset, n) for n in map(str, dataset.attrs)},
+        **{
+            f"{n} is {junk!r:.20}": dataset.assign_attrs({n: junk})
+            for n, junk in itertools.product(("declaration", "provenance", "id", "scene"), JUNK)
+        },
+        "where": dataset.where(dataset[dims[0]] == dataset[dims[0]][0]) if dims else dataset,
+        "bare": dataset.drop_attrs() if hasattr(dataset, "drop_attrs") else dataset,
+        "complex": dataset.assign({n: dataset[n] + 0j for n in numbers}),
+        "texts": dataset.astype(str),
+        "stacked": dataset.stack(cell=dims),
+        "transposed": dataset.transpose(*dims[::-1]),
+        "renamed": dataset.rename({d: f"{d}_" for d in dims}),
+        "nothing": dataset.drop_vars(list(dataset.variables)),
+        "nested": dataset.assign_attrs(declaration='{"a":' * 900 + "1" + "}" * 900),
+        "endless": dataset.assign_attrs(declaration="[" * 10**6),
+    }
+    with contextlib.suppress(Exception):
+        made["by a table"] = xr.Dataset.from_dataframe(dataset.to_dataframe()).assign_attrs(
+            dataset.attrs
+        )
+    return made
+
+
+def without(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    other = dataset.copy()
+    del other.attrs[name]
+    return other
+
+
+@pytest.fixture(scope="module")
+def motion() -> xr.Dataset:
+    scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
+    return rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
+
+
+@pytest.mark.parametrize("of", ["a study", "a motion"])
+def test_altered_datasets(of, place, motion):
+    whole = rsfstudy.open(place / "lattice.nc") if of == "a study" else motion
+    drawn = {"where", "transposed", "by a table", "nothing", "without status", "complex"}
+    made = alterations(whole)
+    chosen = {*drawn & made.keys(), *random.Random(of).sample(sorted(made), 40)}
+    for name in sorted(chosen):
+        dataset = made[name]
+        for ask in (
+            lambda d=dataset: d.rsf.scene,
+            lambda d=dataset: d.rsf.study,
+            lambda d=dataset: d.rsf.check(),
+            lambda d=dataset: d.rsf.failures(),
+            lambda d=dataset: d.rsf.to_si(normal_stress=5e6, slip_distance=1e-5),
+            lambda d=dataset: rsfstudy.compare(d, whole),
+            lambda d=dataset: rsfstudy.compare(whole, d),
+        ):
+            answered(ask)
+        if name in drawn:  # figures take a while
+            answered(dataset.rsf.plot)
+
+
+def test_an_error_of_pythons_is_told_with_its_cause(place):
+    dataset = rsfstudy.open(place / "lattice.nc").drop_vars("status")
+    with pytest.raises(DataError, match="failures cannot be had of this dataset .KeyError") as told:
+        dataset.rsf.failures()
+    assert isinstance(told.value.__cause__, KeyError)
+
+
+@pytest.mark.parametrize(
+    "crafted",
+    [
+        lambda d: d["claims"].extend(d["claims"][:1] * 100_000),
+        lambda d: d["axes"][1].update(values=list(map(float, range(10**6)))),
+        lambda d: d["measure"].update(phases=10**9),
+        lambda d: d.update(title="x" * 10**7),
+    ],
+)
+def test_a_declaration_without_end_is_refused_at_once(crafted, tmp_path):
+    study = "limit_cycles"
+    dataset = xr.Dataset(attrs={"declaration": json.dumps(rsfstudy.studies()[study].describe())})
+    declared = json.loads(dataset.attrs["declaration"])
+    crafted(declared)
+    dataset.attrs |= {"declaration": json.dumps(declared), "provenance": "{}"}
+    answered(lambda: dataset.rsf.study)
+
+
+# ---- commands -----------------------------------------------------------------------------------
+
+
+def commands(place: Path) -> dict[str, list[str]]:
+    """A call of each command that computes next to nothing."""
+    file = str(place / "lattice.nc")
+    return {
+        "list": [],
+        "show": [file],
+        "run": ["linear_stability", "--serial", "--quiet", "--set", "b_over_a=2"],
+        "check": [file],
+        "plot": [file],
+        "compare": [file, file],
+        "rerun": [file, "--serial", "--quiet", "--cell", "law=slip", "--cell", "b_over_a=2"],
+        "simulate": ["--duration", "0.1", "--engine", "compiled", "--rtol", "0.01"],
+    }
+
+
+WORDS = ["", "-", "a=b", "=", "nan", "-1", "1e400", "\x1b[31m", "ä\udcff", "a" * 300, "a/" * 3000]
+OPTIONS = [
+    (name, parameter)
+    for name, command in cli.cli.commands.items()
+    for parameter in command.params
+    if not getattr(parameter, "is_flag", False) and parameter.name not in ("scheduler", "workers")
+]
+
+
+@pytest.mark.parametrize(("name", "parameter"), OPTIONS)
+def test_junk_in_commands(name, parameter, place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    draw = random.Random(f"{name} {parameter.name}")
+    paths = [place / part for part in ("pipe", "circle", ".", "protocol.csv")]
+    for word in [draw.choice(WORDS), str(draw.choice(paths))]:
+        rest = commands(place)[name]
+        words = [word] if isinstance(parameter, click.Argument) else [parameter.opts[0], word]
+        if isinstance(parameter, click.Argument):
+            rest = rest[1:]
+        done = call(name, *words, *rest)
+        assert done.returncode in (None, 0, 1, 2, 3), words
+        assert done.stdout or done.stderr, words
+        assert len(done.stderr) < 20_000, words
+        for line in done.stderr.splitlines():
+            assert line.isprintable(), words
+
+
+@pytest.mark.parametrize(("encoding", "columns"), [("ascii", "20"), ("latin-1", "80")])
+def test_output_that_cannot_hold_a_character(encoding, columns, tmp_path):
+    run(LATTICE.with_(b_over_a=[2.0, 3.0]), output=tmp_path, command="rsfstudy run Größe ζ ✓")
+    for words in (["show"], ["compare", tmp_path / "lattice.nc"]):
+        ran = subprocess.run(
+            [sys.executable, "-m", "rsfstudy.cli", *words, tmp_path / "lattice.nc"],
+            capture_output=True,
+            env={**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": columns},
+            check=False,
+        )
+        assert (ran.returncode, ran.stderr) == (0, b"")
+        assert ran.stdout.decode(encoding)
+
+
+# ---- journals and stores ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "CREATE TRIGGER t AFTER INSERT ON cells BEGIN DELETE FROM cells; END",
+        "CREATE VIEW v AS SELECT * FROM cells",
+        "DROP TABLE cells; CREATE VIEW cells AS SELECT 1 AS key, 2 AS status",
+        "DROP TABLE fingerprint; CREATE TABLE fingerprint (json BLOB); "
+        "INSERT INTO fingerprint VALUES (x'ff')",
+        *(
+            f"UPDATE cells SET {column} = {value}"
+            for column in ("status", "message", "work", "seconds", "numbers", "checksum")
+            for value in ("NULL", "'text'", "1.5", "x'ff'", "9223372036854775807")
+        ),
+    ],
+)
+def test_a_journal_of_other_things_is_refused(change, tmp_path):
+    run(SMALL, output=tmp_path)
+    with contextlib.closing(sqlite3.connect(tmp_path / "small.cells.sqlite")) as db, db:
+        db.executescript(change)
+    answered(lambda: run(SMALL, output=tmp_path))
+    assert call("show", "rate_step_boundary", "--output", tmp_path).returncode == 0
+
+
+def test_a_store_with_a_link_is_refused(tmp_path):
+    run(SMALL, output=tmp_path, format="zarr")
+    array = tmp_path / "small.zarr" / "critical_velocity_ratio"
+    array.rename(tmp_path / "elsewhere")
+    array.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(DataError, match="critical_velocity_ratio is no file, but .* a link"):
+        rsfstudy.open(tmp_path / "small.zarr")
+
+
+def test_an_error_is_one_line_whatever_it_shows():
+    error = InvalidValue("name\n\x1b[31m", "value\r\0" * 10**6, "must be\nshort")
+    assert str(error).isprintable()
+    assert len(str(error)) < 6000
