@@ -19,6 +19,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, brief
 from rsfstudy.files import contents
+from rsfstudy.files.contents import LAYOUT
 
 #: How Zarr stores are opened: lazily, and none of an older format.
 ZARR: Mapping[str, Any] = {
@@ -51,7 +52,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If the directory cannot be written, or what is read back differs from what was written.
     """
-    clean = clean_attributes(dataset)
+    clean = clean_attributes(dataset.assign_attrs({"layout": LAYOUT, **dataset.attrs}))
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -166,7 +167,7 @@ def read(path: Path) -> xr.Dataset:
         contents.check(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
-    if not sealed and "digests" not in dataset.attrs:
+    if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
         said = f"{where} has no digest: another program saved it, and may have changed it"
         warnings.warn(said, stacklevel=4)
     return dataset
