@@ -27,9 +27,9 @@ from rsfstudy.files.comparison import (
     Comparison,
     cell_number,
     compared,
-    differences,
     side_by_side,
 )
+from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
 from rsfstudy.progress import compile_with_notice, shown

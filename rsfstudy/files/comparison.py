@@ -17,6 +17,7 @@ import xarray as xr
 from rsfstudy.declare.wording import listed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
+from rsfstudy.files.journal import differences
 from rsfstudy.files.numbers import headline
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import MEASURED_TIMES
@@ -89,18 +90,6 @@ def _agreement(
         # a number that one of them lacks, or whose error is unknown, is beyond any estimate
         beyond = int((~same & ~(np.abs(theirs - ours) <= errors[0] + errors[1])).sum())
     return dict(zip(_COLUMNS[1:], (same.size, int(same.sum()), largest, beyond), strict=True))
-
-
-def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Pair]:
-    """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
-    file.
-    """
-    theirs, ours = (json.loads(json.dumps(fingerprint)) for fingerprint in (theirs, ours))
-    return {
-        name: (theirs.get(name), ours.get(name))
-        for name in sorted({*theirs, *ours})
-        if theirs.get(name) != ours.get(name)
-    }
 
 
 # ---- side by side -------------------------------------------------------------------------------

@@ -139,18 +139,12 @@ def check(dataset: xr.Dataset) -> None:
             "open it with the version that its attribute source names."
         )
     attrs = fit({"reduced_despite": "", **dataset.attrs}, Attributes, "")
-    declared = declaration(dataset)
-    name = declared.name
+    name = declaration(dataset).name
     if attrs["id"] != name or not name.isidentifier():
         raise refused("id", f"is {brief(attrs['id'])!r}, and the declared study {brief(name)!r}")
     for variable in _OF_EVERY_LATTICE:
         if variable not in dataset.data_vars:
             raise refused(variable, "is missing")
-    for axis in declared.axes:
-        points = dataset.sizes.get(axis["dimension"])
-        if len(axis["values"]) != points:
-            rule = f"has {len(axis['values'])} points in the declaration, and {points} in the file"
-            raise refused(axis["dimension"], rule)
     for name in map(str, dataset.variables):
         if name in QUANTITIES or name in dataset.coords:  # a notebook may have added others
             _check_kind(name, dataset.variables[name])

@@ -159,16 +159,31 @@ class Journal:
                 f"{self._path} holds {brief(others[0][0])}, which is not ours. {_REMEDY}"
             )
         if row is not None and row[0] != wanted:
-            if _allows_more(row[0], wanted):
+            self._accept(row[0], ours)
+
+    def _accept(self, theirs: Any, ours: Mapping[str, Any]) -> None:
+        """Take over a journal of another fingerprint, where nothing differs but the work allowed,
+        which is more now: no answer depends on it. Any other is refused.
+        """
+        try:
+            differ = differences(dict(json.loads(theirs)), ours)
+            if differ.keys() == {"budget"} and differ["budget"][0] < differ["budget"][1]:
                 with self._db:
+                    wanted = json.dumps(ours, sort_keys=True)
                     self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
                 return
-            self._db.close()
-            raise DataError(
-                f"{self._path} holds cells computed differently: {_differences(row[0], ours)}. "
-                "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
-                "another --output (output=)."
+            told = "; ".join(
+                f"{name}: {_brief(there)} there, {_brief(now)} now"
+                for name, (there, now) in differ.items()
             )
+        except (TypeError, ValueError):
+            told = "its fingerprint is damaged"
+        self._db.close()
+        raise DataError(
+            f"{self._path} holds cells computed differently: {told}. "
+            "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
+            "another --output (output=)."
+        )
 
     def __enter__(self) -> Journal:
         return self
@@ -338,28 +353,18 @@ def _checksum(
     return zlib.crc32(numbers, zlib.crc32(text.encode()))
 
 
-def _allows_more(theirs: str, ours: str) -> bool:
-    """Whether nothing differs but the work allowed, which is more now: no answer depends on it."""
-    try:
-        before, now = dict(json.loads(theirs)), dict(json.loads(ours))
-        less, more = before.pop("budget"), now.pop("budget")
-        return less < more and before == now
-    except (KeyError, TypeError, ValueError):
-        return False
-
-
 def _brief(value: object) -> str:
     """A value of a fingerprint, shortened for a message."""
     return textwrap.shorten(str(value), 70, placeholder="...")
 
 
-def _differences(theirs: str, ours: Mapping[str, Any]) -> str:
-    try:
-        before = dict(json.loads(theirs))
-    except (TypeError, ValueError):
-        return "its fingerprint is damaged"
-    return "; ".join(
-        f"{name}: {_brief(before.get(name))} there, {_brief(ours.get(name))} now"
-        for name in sorted({*before, *ours})
-        if before.get(name) != ours.get(name)
-    )
+def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
+    file.
+    """
+    theirs, ours = (json.loads(json.dumps(fingerprint)) for fingerprint in (theirs, ours))
+    return {
+        name: (theirs.get(name), ours.get(name))
+        for name in sorted({*theirs, *ours})
+        if theirs.get(name) != ours.get(name)
+    }

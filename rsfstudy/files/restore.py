@@ -45,6 +45,11 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     from the file that declares the study.
     """
     declared = contents.declaration(results)
+    for axis in declared.axes:
+        points = results.sizes.get(axis["dimension"])
+        if len(axis["values"]) != points:
+            rule = f"has {len(axis['values'])} points in the declaration, and {points} in the file"
+            raise refused(axis["dimension"], rule)
     if file is None:
         about = contents.provenance(results)
         if about["fingerprint"]["own_code"] != "none":
