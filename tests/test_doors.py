@@ -25,7 +25,8 @@ import xarray as xr
 from running import SMALL, call, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, cli
+from rsfstudy import Axis, Laboratory, Scene, Study, cli
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.linear_stability import LinearStability
 
@@ -51,6 +52,9 @@ def place(tmp_path_factory) -> Path:
     (place / "circle").symlink_to("circle")
     (place / "protocol.csv").write_text("velocity (V_*), duration (D_c/V_*)\n2, 1\n")
     os.mkfifo(place / "pipe")
+    scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
+    motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
+    motion.to_netcdf(place / "motion.nc")
     return place
 
 
@@ -89,6 +93,7 @@ def calls(place: Path) -> dict[str, dict]:
         "rerun": {"file": place / "lattice.nc", **no_workers},
         "run": {"study": LATTICE, "output": None, **no_workers},
         "simulate": {"scene": scene, **quick},
+        "picture": {"motion": xr.load_dataset(place / "motion.nc")},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
     }
 
@@ -99,7 +104,7 @@ def functions() -> list[tuple[str, str]]:
     return [
         (name, parameter)
         for name, function in named.items()
-        if inspect.isfunction(function) and name not in ("picture", "protocol", "studies")
+        if inspect.isfunction(function) and name not in ("protocol", "studies")
         for parameter, kind in inspect.signature(function).parameters.items()
         # a client, or a figure, of one's own may be anything
         if parameter not in ("client", "own", "workers", "progress")
@@ -113,6 +118,24 @@ def test_junk_in_calls(name, parameter, place, monkeypatch, tmp_path):
     for junk in random.Random(f"{name} {parameter}").sample(JUNK, 8):
         given = {**calls(place)[name], parameter: junk}
         answered(lambda given=given: getattr(rsfstudy, name)(**given))
+
+
+RIG = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_velocity": "1 um/s"}
+CLAIM = {"id": "C", "statement": "", "source": "", "variable": "v", "where": {}, "published": 1.0}
+MADE = {
+    Scene: {},
+    Axis: {"dimension": "b_over_a", "values": [1.0]},
+    Study: {name: getattr(LATTICE, name) for name in ("name", "title", "base", "axes", "measure")},
+    Laboratory: RIG,
+    Claim: {**CLAIM, "tolerance": 1.0, "reason": ""},
+}
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_junk_in_what_is_made(kind):
+    for parameter in inspect.signature(kind).parameters:
+        for junk in JUNK:
+            answered(lambda given={**MADE[kind], parameter: junk}: kind(**given))
 
 
 def test_a_call_that_does_not_fit_is_a_type_error_of_python():
@@ -164,15 +187,9 @@ def without(dataset: xr.Dataset, name: str) -> xr.Dataset:
     return other
 
 
-@pytest.fixture(scope="module")
-def motion() -> xr.Dataset:
-    scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
-    return rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
-
-
 @pytest.mark.parametrize("of", ["a study", "a motion"])
-def test_altered_datasets(of, place, motion):
-    whole = rsfstudy.open(place / "lattice.nc") if of == "a study" else motion
+def test_altered_datasets(of, place):
+    whole = xr.load_dataset(place / ("lattice.nc" if of == "a study" else "motion.nc"))
     drawn = {"where", "transposed", "by a table", "nothing", "without status", "complex"}
     made = alterations(whole)
     chosen = {*drawn & made.keys(), *random.Random(of).sample(sorted(made), 40)}

@@ -25,7 +25,10 @@ UNDECIDED = "undecided"
 NOT_APPLICABLE = "not applicable"
 
 RELATIONS = ("equals", "below", "above")
-_TEXTS = ("id", "statement", "source", "variable", "minus_variable", "reason", "because")
+_TEXTS = (
+    *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
+    *("relation", "expected"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots import Drawing
 from rsfstudy.plots._axes import log_scale
@@ -40,6 +41,7 @@ _FRICTION = r"Friction coefficient, $\mu$"
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 
 
+@door
 def picture(
     motion: xr.Dataset,
     laboratory: Laboratory | None = None,
