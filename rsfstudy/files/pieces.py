@@ -7,10 +7,9 @@ existing store is never replaced: a reader that has it open would mix old chunks
 from __future__ import annotations
 
 import importlib.util
-import itertools
 import math
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -87,12 +86,14 @@ def _as_objects(dataset: xr.Dataset) -> xr.Dataset:
 
 def _write_lattice(study: Study, read: Read, path: Path) -> int:
     """Write the variables of the lattice; the number of cells that are finished."""
+    from dask.array.core import normalize_chunks, slices_from_chunks
+
     width = Layout(study.measure).width
     chunk = _chunk(study.shape, _NUMBERS // width)
     template = _template(study, Columns.pending(1, width), chunk)
     template.to_zarr(path, mode="w-", compute=False, **_STORE)
     finished = 0
-    for region in _regions(study.shape, chunk):
+    for region in slices_from_chunks(normalize_chunks(chunk, study.shape)):
         shape = tuple(part.stop - part.start for part in region)
         start = int(np.ravel_multi_index([part.start for part in region], study.shape))
         columns = read(start, start + math.prod(shape))
@@ -134,13 +135,3 @@ def _chunk(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
             along = min(length, most // within)
             return (1,) * place + (along, *shape[place + 1 :])
     return (1,) * len(shape)
-
-
-def _regions(shape: tuple[int, ...], chunk: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Slabs of that size that fill a lattice, in row-major order."""
-    starts = (range(0, length, part) for length, part in zip(shape, chunk, strict=True))
-    for corner in itertools.product(*starts):
-        yield tuple(
-            slice(start, min(start + part, length))
-            for start, part, length in zip(corner, chunk, shape, strict=True)
-        )
