@@ -240,7 +240,6 @@ class Law:
     [
         ("The rate.", "What it gives.", True),
         ("A law.", "A law\n\n    of rocks.", True),
-        ('    """The rate."""\n', "", True),
         ("  # twice", "", True),
         ("\n\n\nclass", "\n\n# of rocks\n\n\n\nclass", True),
         ("2.0 * x", "2.0 / x", False),
