@@ -23,7 +23,6 @@ from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.console import console
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
-from rsfstudy.files import contents, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider.registry import FIELDS
 
@@ -276,41 +275,6 @@ def test_what_is_no_results_file(command, how, tmp_path):
     code, said = called([command, str(path)])
     assert code == 1
     assert "what.nc" in said
-
-
-JSON = st.recursive(
-    st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(max_size=5),
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3)
-    ),
-    max_leaves=6,
-)
-
-
-@pytest.mark.filterwarnings("ignore:Glyph")
-@settings(max_examples=60)
-@given(data=st.data())
-def test_a_declaration_that_was_meddled_with(small, data):
-    """In memory, where no digest is looked at: it is restored, or refused."""
-    dataset = store.read(small)
-    declared = json.loads(dataset.attrs["declaration"])
-    place, key = declared, data.draw(st.sampled_from(sorted(declared)))
-    while isinstance(place[key], dict | list) and place[key] and data.draw(st.booleans()):
-        place = place[key]
-        key = data.draw(
-            st.sampled_from(list(place) if isinstance(place, dict) else range(len(place)))
-        )
-    place[key] = data.draw(JSON)
-    meddled = dataset.assign_attrs(declaration=json.dumps(declared))
-    for use in (
-        rsfstudy.check,
-        plots.figure,
-        lambda d: restore.from_declaration(contents.declaration(d)),
-    ):
-        try:
-            use(meddled)
-        except RsfStudyError:
-            continue
 
 
 @settings(max_examples=60)
