@@ -529,7 +529,9 @@ def test_an_error_keeps_both_ends_of_what_is_long():
     assert len(str(error)) < 200
     assert str(error).startswith("name = 'begin")
     assert str(error).endswith("end': must be short.")
-    many = InvalidValue("name", 1, "is unknown", choices=map(str, range(10_000)), remedy="Choose.")
+    many = InvalidValue(
+        "name", "?", "is unknown", choices=map(str, range(10_000)), remedy="Choose."
+    )
     assert str(many).endswith("58, 59 and 9,940 more. Choose.")
     error = InvalidValue("name", "25", "is unknown", choices=map(str, range(300)))
     assert "Did you mean '25'" in str(error)
