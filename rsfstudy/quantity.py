@@ -32,16 +32,6 @@ class Quantity:
     long_name: str
     scale: str = ""
 
-    @property
-    def axis_label(self) -> str:
-        """Label with units, for the axis of a figure."""
-        text = f"{self.long_name[0].upper()}{self.long_name[1:]}"
-        if self.symbol:
-            text += f", {self.symbol}"
-        if self.units not in ("", "1"):
-            text += f" ({self.units})"
-        return text
-
 
 @dataclass(frozen=True)
 class Output(Quantity):

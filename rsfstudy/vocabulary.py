@@ -104,10 +104,16 @@ _QUANTITIES = (
         "sigma_*",
     ),
     Quantity(
-        "min_log10_slip_rate", "", "1", "decimal logarithm of the slowest slip rate over V_star"
+        "min_log10_slip_rate",
+        r"$\log_{10}(V/V_*)$",
+        "1",
+        "decimal logarithm of the slowest slip rate over V_star",
     ),
     Quantity(
-        "max_log10_slip_rate", "", "1", "decimal logarithm of the fastest slip rate over V_star"
+        "max_log10_slip_rate",
+        r"$\log_{10}(V/V_*)$",
+        "1",
+        "decimal logarithm of the fastest slip rate over V_star",
     ),
     Quantity(
         "peak_log10_slip_rate",

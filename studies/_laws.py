@@ -1,5 +1,15 @@
 """What the studies of state evolution laws share: the laws they compare, and their sources."""
 
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.declare.figure import Panel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 #: The family from slip (eps = 0) to slowness (eps = 1), and laws beside it.
 SLIP, MIDDLE, SLOWNESS = "eps = 0 (slip)", "eps = 0.5", "eps = 1 (slowness)"
 PERRIN, COMPOSITE, CUT_OFF = "Perrin-Rice-Zheng", "composite", "cut-off"
@@ -33,3 +43,35 @@ REFERENCES = [
     "Nagata, Nakatani and Yoshida (2012), J. Geophys. Res. 117, B02314",
     "Ciardo and Viesca (2024), arXiv 2407.16846",
 ]
+
+
+# ---- how figures draw them ----------------------------------------------------------------------
+
+#: Colour and line, by their places in the cycle of the style, of laws beside the family; no colour
+#: is one of the family's, and no two lines look alike in grey.
+_BESIDE = {PERRIN: (1, 1), COMPOSITE: (3, 3), CUT_OFF: (6, 2), NAGATA: (5, 4)}
+
+
+def shade(exponent: float) -> Any:
+    """Colour of a member of the family of laws, from dark to light."""
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.85 * exponent)
+
+
+def line_of_law(row: xr.Dataset) -> dict[str, Any]:
+    """The family solid, from dark to light and with markers; others in other colours and dashed."""
+    from rsfstudy.plots._style import look, marker
+
+    name, exponent = str(row["evolution"].item()), float(row.get("law_exponent", math.nan))
+    if math.isnan(exponent):
+        colour, dashes = next((at for law, at in _BESIDE.items() if name.startswith(law)), (2, 1))
+        return {**look(dashes), "color": look(colour)["color"], "marker": "", "markersize": 2.8}
+    solid = {"color": shade(exponent), "linestyle": "-", "markersize": 2.8}
+    return solid | {"marker": marker(round(4.0 * exponent))}
+
+
+def by_law(x: str, y: str, log: str, **more: Any) -> Panel:
+    """A panel for each normal stress condition, with a curve a law."""
+    laws: dict[str, Any] = {"by": ["evolution"], "each": ["normal_stress"], "style": line_of_law}
+    return Panel(x=x, y=y, log=log, alike=y, **laws, **more)

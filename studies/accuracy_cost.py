@@ -1,7 +1,10 @@
 """What accuracy costs: every integrator on problems whose answer is known to more digits."""
 
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, level, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.critical_step import CriticalStep
@@ -11,6 +14,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.work_precision import INTEGRATORS, WorkPrecision
 from rsfstudy.reduce import Cheapest, LinearFit
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
 
 from . import _references as known
 
@@ -119,6 +123,52 @@ def cheapest(label: str, digits: float) -> Claim:
 
 STATIC_DROP, RECURRENCE = HEADLINES[1:]
 
+
+DEFAULT = "DOP853"
+
+
+def mark_lost(dataset: xr.Dataset, axes: Axes) -> None:
+    """The best that the answer is known to, and runs whose accuracy was out of reach."""
+    from rsfstudy.plots._style import look
+
+    floor = max(float(dataset["measured_error_error"].max()), 1e-16)
+    level(floor, linestyle=":")(dataset, axes)
+    for number in range(dataset.sizes["integrator"]):
+        runs = dataset.isel(integrator=number)
+        work = runs["run_evaluations"].where(runs["status"] == Status.ACCURACY_OUT_OF_REACH)
+        asked = {"color": look(number)["color"], "label": "accuracy out of reach"}
+        axes.plot(work, 10.0 ** -runs["requested_digits"], "x", **asked)
+
+
+figure = Figure(
+    [
+        Panel(
+            x="run_evaluations",
+            y=lambda runs: runs["measured_error"].where(runs["measured_error"] > 0.0),
+            by=["integrator"],
+            each=["problem"],
+            style=lambda runs: {"linewidth": 1.6 if runs["integrator"] == DEFAULT else 0.8},
+            marks=[mark_lost],
+            x_label="Right-hand sides",
+            y_label="Measured error",
+            log="xy",
+        ),
+        Panel(
+            x="requested_digits",
+            y="achieved_digits",
+            by=["problem"],
+            at={"integrator": lambda names: DEFAULT if DEFAULT in names else names[0]},
+            marks=[reference_line("requested_digits", lambda x: x, "as asked", linewidth=0.9)],
+            x_label="Digits asked for",
+            y_label="Digits reached",
+            columns=1,
+        ),
+    ],
+    columns=3,
+    height=58.0,
+)
+
+
 study = Study(
     name="accuracy_cost",
     title="What accuracy costs: error against work for SciPy's integrators",
@@ -155,6 +205,6 @@ study = Study(
         cheapest(RECURRENCE, 6.0),
         cheapest(RECURRENCE, 9.0),
     ],
-    plot="accuracy_cost",
+    plot=figure,
     references=["Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I"],
 )

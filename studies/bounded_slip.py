@@ -1,13 +1,21 @@
 """Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.reduce import Difference, Parting
 from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
+from ._phase_plane import mark_reversed, mark_steady
 
 RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
 
@@ -52,6 +60,56 @@ def repeats(rate: float) -> Claim:
 
 
 LARGEST = {"normal_stress": "variable", "stiffness_ratio": 1.0, "load_velocity_ratio": 200.0}
+
+
+orbit = Panel(
+    x="log10_slip_rate",
+    y="frictional_stress",
+    at={"normal_stress": max, "stiffness_ratio": min},
+    style={"marker": "", "linewidth": 0.9},
+    marks=[mark_steady, mark_reversed],
+    columns=3,
+)
+
+
+def mark_parting(dataset: xr.Dataset, axes: Axes) -> None:
+    """Where paths with mass and without it part, and where they merge."""
+    for name in ("paths_parting", "paths_merging"):
+        rates = np.atleast_1d(dataset.get(name, math.nan))
+        for rate in rates[np.isfinite(rates)]:
+            text = "paths part and merge"
+            axes.axvline(rate, color="0.5", linewidth=0.8, linestyle="-.", label=text)
+
+
+peaks = Panel(by=["normal_stress", "stiffness_ratio"])
+
+figure = Figure(
+    [
+        # Fig. 8
+        replace(
+            orbit,
+            by=["load_velocity_ratio"],
+            at={"inertia": min, **orbit.at, "load_velocity_ratio": lambda v: [max(v), min(v)]},
+        ),
+        # Fig. 12
+        replace(
+            orbit,
+            by=["inertia"],
+            at={"load_velocity_ratio": max, **orbit.at},
+            marks=[mark_parting, *orbit.marks],
+            when=lambda dataset: dataset.sizes["inertia"] > 1,
+        ),
+        replace(peaks, x="load_velocity_ratio", y="max_log10_slip_rate", each=["inertia"], log="x"),
+        replace(
+            peaks,
+            x="peak",
+            y="peak_log10_slip_rate",
+            at={"inertia": min, "load_velocity_ratio": min},
+            x_label="Number of the peak",
+        ),
+    ]
+)
+
 
 study = Study(
     name="bounded_slip",
@@ -134,6 +192,6 @@ study = Study(
             reason="an inequality: the norm V T/(2 pi D_c) = 5e-4 is at 10^4.73 V_*",
         ),
     ],
-    plot="bounded_slip",
+    plot=figure,
     references=[REFERENCE, RANJITH_RICE],
 )

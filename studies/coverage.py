@@ -1,7 +1,11 @@
 """Coverage: do error estimates cover the errors, over random scenes?"""
 
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.coverage import QUESTIONS, Coverage
 from rsfstudy.reduce import Covered
@@ -64,6 +68,39 @@ def claims(digits: int) -> list[Claim]:
     ]
 
 
+#: Errors this far below and above their estimates are drawn there.
+SHOWN = (1e-3, 10.0)
+
+
+def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+    """One outline an accuracy."""
+    from rsfstudy.plots._style import look
+
+    for number, digits in enumerate(dataset["requested_digits"].values):
+        values = dataset["error_over_estimate"].isel(requested_digits=number).values.ravel()
+        values = np.clip(values[np.isfinite(values)], *SHOWN)
+        covered = f"{(values <= 1.0).sum()} of {values.size} covered"
+        label = f"rtol $10^{{-{digits:g}}}$: {covered}"
+        axes.hist(
+            values, np.geomspace(*SHOWN, 33).tolist(), histtype="step", label=label, **look(number)
+        )
+    axes.axvline(1.0, color="0.3", linestyle="-", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.locator_params(axis="y", integer=True)
+
+
+figure = Figure(
+    [
+        Panel(
+            each=["question"],
+            marks=[mark_histogram],
+            x_label="Error over its estimate",
+            y_label="Numbers",
+        )
+    ]
+)
+
+
 study = Study(
     name="coverage",
     title="How error estimates cover the errors, over random scenes",
@@ -95,6 +132,6 @@ study = Study(
         ),
     ],
     claims=[c for digits in DIGITS for c in claims(digits)],
-    plot="coverage",
+    plot=figure,
     references=["Shampine (1985), Numerical Methods: on global error estimates"],
 )

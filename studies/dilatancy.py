@@ -1,9 +1,11 @@
 """Dilatancy: the critical stiffness of steady sliding against drainage."""
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.linear_stability import LinearStability
 
@@ -50,6 +52,44 @@ def vouched(dilatancy: float, drainage: float) -> Claim:
         tolerance=3e-11,
         reason="central differences of the assembled equations, to 1e-8 of it",
     )
+
+
+def weakening(dataset: xr.Dataset) -> float:
+    """b - a, the critical stiffness of a drained fault."""
+    return float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
+
+
+def mark_limits(dataset: xr.Dataset, axes: Axes) -> None:
+    """The drained limit across, and at the left those without drainage."""
+    from rsfstudy.plots._style import look
+
+    drained = weakening(dataset)
+    axes.axhline(drained, color="0.75", linewidth=2.2, zorder=1, label="drained, $b-a$")
+    for number, dilatancy in enumerate(dataset["dilatancy"].values):
+        undrained = drained - float(dataset["mu_star"]) * dilatancy
+        if undrained > 0.0:
+            look_of_it = {"color": look(number)["color"], "linewidth": 2.2, "alpha": 0.45}
+            text = r"undrained, $b-a-\mu_*\epsilon/(\beta\sigma_*)$"
+            axes.axhline(undrained, xmax=0.16, label=text, **look_of_it)
+
+
+figure = Figure(
+    [
+        Panel(
+            x="drainage",
+            y=lambda row: row["critical_stiffness_from_growth"].where(
+                np.arange(row["drainage"].size) % 4 == 0
+            ),
+            by=["dilatancy"],
+            through=lambda row: (row["drainage"], row["critical_stiffness"]),
+            marks=[mark_limits],
+            title="Stable above; lines: closed form, points: growth",
+            y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
+            log="x",
+        )
+    ],
+    height=70.0,
+)
 
 
 study = Study(
@@ -100,6 +140,6 @@ study = Study(
             reason="an inequality",
         ),
     ],
-    plot="dilatancy",
+    plot=figure,
     references=[REFERENCE],
 )

@@ -1,7 +1,11 @@
 """Dilatancy: stick-slip cycles that become slow."""
 
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -22,6 +26,64 @@ def peak(law: str, dilatancy: float, relation: str, log10: float, what: str) -> 
         tolerance=0.0,
         reason="an inequality; dynamic ruptures reach 10^9 V_*",
     )
+
+
+#: Time, in D_c/V_*, before and after the fastest slip is on log scales that meet in a linear one of
+#: this width: slip speeds up to a rupture as one over the time that is left.
+LINEAR = 1e-6
+
+
+def mark_undrained(dataset: xr.Dataset, axes: Axes) -> None:
+    """Where the spring is as stiff as the critical one of no drainage."""
+    weakening = float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
+    critical = (weakening - float(dataset["stiffness"])) / float(dataset["mu_star"])
+    text = "spring as stiff as the undrained critical one"
+    axes.axvline(critical, color="0.4", linestyle=":", label=text)
+
+
+def from_fastest_slip(row: xr.Dataset) -> xr.DataArray:
+    """Time from the fastest slip."""
+    fastest = int(np.argmax(np.nan_to_num(row["log10_slip_rate"].values, nan=-np.inf)))
+    return row["time"] - row["time"][fastest]
+
+
+def scale_of_time(_dataset: xr.Dataset, axes: Axes) -> None:
+    """Log scales before and after the fastest slip."""
+    axes.set_xscale("symlog", linthresh=LINEAR, linscale=0.5)
+    axes.set_xticks([-1.0, -1e-3, 0.0, 1e-3, 1.0], ["$-1$", "$-10^{-3}$", "0", "$10^{-3}$", "1"])
+    axes.set_xticks([], minor=True)
+
+
+figure = Figure(
+    [
+        *(
+            Panel(
+                x="dilatancy",
+                y=variable,
+                by=["drainage", "law"],
+                marks=[mark_undrained],
+                title=title,
+            )
+            for variable, title in (
+                ("max_log10_slip_rate", "Ruptures become slow slip"),
+                ("static_stress_drop", "Stress drop"),
+            )
+        ),
+        Panel(
+            x=from_fastest_slip,
+            y=lambda row: row["log10_slip_rate"].where(row["status"] == 0),
+            by=["dilatancy"],
+            each=["law"],
+            at={"drainage": 0, "dilatancy": slice(None, None, 2)},
+            marks=[scale_of_time],
+            x_label=r"Time from fastest slip, $t V_*/D_c$",
+            y_label=r"Slip rate, $\log_{10}(V/V_*)$",
+            x_limits=(-10.0, 400.0),
+            alike="slip rate",
+            columns=3,
+        ),
+    ]
+)
 
 
 study = Study(
@@ -62,6 +124,6 @@ study = Study(
             ),
         )
     ],
-    plot="dilatant_cycles",
+    plot=figure,
     references=[REFERENCE],
 )

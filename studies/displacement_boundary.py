@@ -2,10 +2,14 @@
 7).
 """
 
+from typing import Any
+
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel, level, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit, RelativeDifference
@@ -34,6 +38,44 @@ def near(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Cl
         tolerance=tolerance,
         reason=reason,
     )
+
+
+X = "a_over_b_minus_a"
+
+
+def sizes(row: xr.Dataset) -> dict[str, Any]:
+    """Points that lie on each other show all the same, the larger behind."""
+    alpha = float(np.nan_to_num(row.get("alpha", 0.0)))
+    return {
+        "markersize": max(2.0, 7.0 - 9.0 * alpha),
+        "fillstyle": "none" if alpha < 0.5 else "full",
+    }
+
+
+figure = Figure(
+    [
+        Panel(
+            x=X,
+            y="critical_displacement",
+            by=["case"],
+            at={"law": 0, "load": 0, "stiffness_ratio": min},
+            points=True,
+            style=sizes,
+            marks=[reference_line(X, lambda x: x, r"$D_c\,a/(b-a)$ (Gu et al. 1984)", 0.0)],
+            x_limits=(0.0, None),
+            y_limits=(0.0, None),
+        ),
+        Panel(
+            x=X,
+            y=lambda row: row["critical_displacement"] / row[X],
+            by=["case", "stiffness_ratio"],
+            each=["law", "load"],
+            style={"markersize": 2.5, "linewidth": 0.9},
+            marks=[level(1.0)],
+            y_label=r"Critical $\Delta\delta_0/D_c$ over $a/(b-a)$",
+        ),
+    ]
+)
 
 
 study = Study(
@@ -102,7 +144,7 @@ study = Study(
             reason="printed to three decimals; ours is 2.6975, and theirs cut rather than rounded",
         ),
     ],
-    plot="displacement_boundary",
+    plot=figure,
     references=[
         REFERENCE,
         "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",

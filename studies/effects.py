@@ -2,8 +2,12 @@
 
 import math
 
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Draw, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.reduce import RelativeDifference
@@ -39,6 +43,50 @@ def loses(law: str, dynamics: str, published: float) -> Claim:
         tolerance=0.0,
         reason="an inequality",
     )
+
+
+def bars(variable: str, digits: int) -> Draw:
+    """Bars of a number: one row a combination, and one bar a law."""
+
+    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        from rsfstudy.plots._axes import name_points
+        from rsfstudy.plots._style import look
+
+        values = dataset[variable].stack(row=("coupling", "dynamics")).transpose("law", "row")
+        for number, law in enumerate(values["law"].values):
+            at = np.arange(values.sizes["row"]) + 0.4 * (number - 0.5 * (values.sizes["law"] - 1))
+            of_law = values.isel(law=number).values
+            look_of_it = {"color": look(number)["color"], "hatch": ("", "/////")[number % 2]}
+            look_of_it |= {"edgecolor": "white", "linewidth": 0.0, "label": f"{law} law"}
+            axes.barh(at, of_law, height=0.36, **look_of_it)
+            for y, value in zip(at, of_law, strict=True):
+                text = f" {value:.{digits}g}" if np.isfinite(value) else " no cycle"
+                axes.text(
+                    value if value > 0.0 else 0.0, y, text, va="center", fontsize=5.5, clip_on=True
+                )
+        name_points(axes.yaxis, [", ".join(row) for row in values["row"].values], 20)
+        axes.tick_params(axis="y", labelsize=6)
+        axes.set_ylim(values.sizes["row"] - 0.5, -0.5)
+        axes.margins(x=0.25)
+        axes.grid(axis="y", visible=False)
+
+    return mark
+
+
+figure = Figure(
+    [
+        Panel(
+            x=variable, x_label=label, y_label="Effects", marks=[bars(variable, digits)], title=""
+        )
+        for variable, digits, label in (
+            ("work_per_cycle", 4, "Right-hand sides per cycle"),
+            ("evaluation_cost", 2, "Time of a right-hand side, relative"),
+            ("static_stress_drop", 4, None),
+            ("max_log10_slip_rate", 4, None),
+        )
+    ],
+    height=88.0,
+)
 
 
 study = Study(
@@ -102,6 +150,6 @@ study = Study(
             reason="an inequality",
         ),
     ],
-    plot="effects",
+    plot=figure,
     references=["Rice (1993), J. Geophys. Res. 98, 9885-9907"],
 )

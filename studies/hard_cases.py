@@ -2,8 +2,12 @@
 
 import math
 
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
@@ -303,6 +307,68 @@ ends(
     {"inertia": True, "period": 1e8, "load_velocity_ratio": 100.0},
 )
 
+
+def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
+    """Rows with the names of cases."""
+    from rsfstudy.plots._axes import name_points
+
+    name_points(axes.yaxis, [str(name) for name in dataset["hard_case"].values], 60)
+    axes.tick_params(axis="y", labelsize=5.5)
+    axes.set_ylim(dataset.sizes["hard_case"] - 0.5, -0.5)
+    if math.isfinite(axes.dataLim.minposx):
+        axes.set_xscale("log")
+
+
+def write(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
+    """Words in a row."""
+    across = {"transform": axes.get_yaxis_transform(), "va": "center", "fontsize": 5.5}
+    axes.text(0.02, row, text, color=color, **across)
+
+
+def mark_errors(dataset: xr.Dataset, axes: Axes) -> None:
+    """Measured errors (filled) and their estimates (open); names of statuses, and "exact" where
+    there is no error.
+    """
+    from rsfstudy.plots._style import look
+
+    rows, numbers = np.arange(dataset.sizes["hard_case"]), dataset["answer"].notnull().values
+    labels = {int(status): status.label.replace("_", " ") for status in Status}
+    blue, red = look(0)["color"], look(1)["color"]
+    wrong = dataset["status"].values != int(Status.OK)
+    for name, style in (
+        ("error_estimate", {"fillstyle": "none", "label": "estimate"}),
+        ("measured_error", {"markersize": 2, "label": "measured error"}),
+    ):
+        values = dataset[name].where(numbers & (dataset[name] > 0.0))
+        axes.plot(values, rows, "o", color=blue, **style)
+    for row in rows[~numbers | (dataset["measured_error"].values == 0.0)]:
+        ended = labels[int(dataset["ended_as"].values[row])]
+        write(axes, row, "exact" if numbers[row] else ended, red if wrong[row] else "0.35")
+    if wrong.any():
+        axes.plot(np.ones(int(wrong.sum())), rows[wrong], "x", color=red, label="wrong")
+    name_cases(dataset, axes)
+
+
+def mark_work(dataset: xr.Dataset, axes: Axes) -> None:
+    """Right-hand sides of each case, none where none was needed."""
+    rows, work = np.arange(dataset.sizes["hard_case"]), dataset["rhs_evaluations"].values
+    axes.barh(rows[work > 0], work[work > 0], color="0.6", left=0.0)
+    for row in rows[work == 0]:
+        write(axes, row, "none")
+    name_cases(dataset, axes)
+
+
+figure = Figure(
+    [
+        Panel(
+            marks=[mark_errors], x_label="Error; in words: what came out", y_label="Case", columns=3
+        ),
+        Panel(marks=[mark_work], x_label="Right-hand sides", y_label="Case"),
+    ],
+    height=150.0,
+)
+
+
 study = Study(
     name="hard_cases",
     title="Cases that break ordinary slider codes, and what comes out",
@@ -330,6 +396,6 @@ study = Study(
         for label in CASES
         if label.startswith(("cycle at", "cycle from", "cycle, T"))
     ],
-    plot="hard_cases",
+    plot=figure,
     references=["Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"],
 )

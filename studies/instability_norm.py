@@ -1,11 +1,14 @@
 """Instability norm: how boundaries depend on it, and which norm the paper's numbers imply."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import Inverse
@@ -41,6 +44,63 @@ BOUNDARIES: dict[str, dict[str, str | float]] = {
         for inverse in (1.0, 2.0, 4.0, 10.0)
     },
 }
+
+
+def mark_norm(_dataset: xr.Dataset, axes: Axes) -> None:
+    """The norm of the other studies."""
+    grey = {"color": "0.7", "linewidth": 0.8, "linestyle": ":"}
+    axes.axvline(5e-4, label="norm of our studies", **grey)
+
+
+def mark_published(dataset: xr.Dataset, axes: Axes) -> None:
+    """The norms that published values imply."""
+    from rsfstudy.plots._style import look, marker
+    from rsfstudy.plots._text import number
+
+    for place in range(dataset.sizes["boundary"]):
+        row = dataset.isel(boundary=place)
+        norm = float(row.get("implied_norm", math.nan))
+        if math.isfinite(norm):
+            axes.errorbar(
+                norm,
+                float(row["critical_velocity_ratio"].interp(instability_norm=norm)),
+                xerr=float(row["implied_norm_error"]),
+                fmt=marker(place),
+                color=look(place)["color"],
+                label=f"published value: norm {number(norm, 4)}",
+            )
+
+
+def of_law(law: str, values: xr.DataArray) -> xr.DataArray:
+    """Those of one law."""
+    return values.where(values["law"] == law)
+
+
+panel = Panel(
+    x="instability_norm", by=["boundary"], style={"marker": ""}, marks=[mark_norm], log="x"
+)
+figure = Figure(
+    [
+        replace(
+            panel,
+            y=lambda row: of_law("slowness", row["critical_velocity_ratio"]),
+            marks=[mark_norm, mark_published],
+            title="Slowness law",
+            y_label="Critical load point velocity, $V_0/V_*$",
+            log="xy",
+        ),
+        replace(
+            panel,
+            y=lambda row: of_law(
+                "slip", (row["critical_velocity_ratio"] - 1.0) * (row["b_over_a"] - 1.0)
+            ),
+            marks=[mark_norm, level(1.0)],
+            title="Slip law, $k = k_{cr}$",
+            y_label=r"$(V_0/V_* - 1)\,(b-a)/a$",
+        ),
+    ]
+)
+
 
 study = Study(
     name="instability_norm",
@@ -90,6 +150,6 @@ study = Study(
             reason="half a unit of each printed number: 7.7e-6 and 1.3e-7 in the norm",
         ),
     ],
-    plot="instability_norm",
+    plot=figure,
     references=[REFERENCE],
 )

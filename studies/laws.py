@@ -3,9 +3,11 @@
 import math
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, RelativeDifference
@@ -24,6 +26,7 @@ from ._laws import (
     REFERENCES,
     SLIP,
     SLOWNESS,
+    by_law,
 )
 from ._paper import REFERENCE
 
@@ -72,6 +75,24 @@ def moved(law: str, published: float) -> Claim:
         tolerance=0.05,
         reason="'a few percents'",
     )
+
+
+def mark_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
+    """Open circles at the closed forms that there are."""
+    if "over_closed_form_closed_form" in dataset:
+        known = dataset["over_closed_form_closed_form"].where(
+            dataset["normal_stress"] == "constant"
+        )
+        x = dataset["stiffness_ratio"].broadcast_like(known)
+        circles = {"markersize": 5.0, "markeredgewidth": 0.6, "fillstyle": "none", "color": "0.2"}
+        label = "closed form" if known.notnull().any() else None
+        axes.plot(x.values.ravel(), known.values.ravel(), "o", label=label, **circles)
+
+
+figure = Figure(
+    [by_law("stiffness_ratio", "critical_displacement", "y", marks=[mark_closed_forms])],
+    height=70.0,
+)
 
 
 study = Study(
@@ -140,6 +161,6 @@ study = Study(
         moved(PERRIN, 0.0),
         moved(COMPOSITE, 0.0),
     ],
-    plot="laws",
+    plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

@@ -2,12 +2,24 @@
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import Difference, LinearFit, OverClosedForm
 from rsfstudy.slider.scene import Scene
 
-from ._laws import COMPOSITE, CUT_OFF, LAWS, MIDDLE, NAGATA, PERRIN, REFERENCES, SLIP, SLOWNESS
+from ._laws import (
+    COMPOSITE,
+    CUT_OFF,
+    LAWS,
+    MIDDLE,
+    NAGATA,
+    PERRIN,
+    REFERENCES,
+    SLIP,
+    SLOWNESS,
+    by_law,
+)
 from ._paper import PAPER, REFERENCE
 
 base = Scene(b_over_a=2.0, stiffness_ratio=0.8, inertia=True)
@@ -57,6 +69,14 @@ def slower(law: str, relation: str, decades: float) -> Claim:
     )
 
 
+figure = Figure(
+    [
+        by_law("load_velocity_ratio", variable, "x")
+        for variable in ("static_stress_drop", "min_log10_slip_rate")
+    ]
+)
+
+
 study = Study(
     name="laws_cycles",
     title="Stick-slip cycles and the state evolution law, k = 0.8 k_cr",
@@ -100,6 +120,6 @@ study = Study(
         slower(MIDDLE, "above", -1.5),
         slower(SLOWNESS, "above", 0.0),
     ],
-    plot="laws_cycles",
+    plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

@@ -4,12 +4,24 @@ import numpy as np
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import RelativeDifference
 from rsfstudy.slider.scene import Scene
 
-from ._laws import COMPOSITE, CUT_OFF, LAWS, MIDDLE, NAGATA, PERRIN, REFERENCES, SLIP, SLOWNESS
+from ._laws import (
+    COMPOSITE,
+    CUT_OFF,
+    LAWS,
+    MIDDLE,
+    NAGATA,
+    PERRIN,
+    REFERENCES,
+    SLIP,
+    SLOWNESS,
+    by_law,
+)
 from ._paper import PAPER, REFERENCE
 
 STIFF = {"normal_stress": "constant", "stiffness_ratio": 1.25}
@@ -44,6 +56,9 @@ def lowered(law: str) -> Claim:
         tolerance=0.0,
         reason="an inequality; ours are 0.12 to 0.48",
     )
+
+
+figure = Figure([by_law("stiffness_ratio", "critical_velocity_ratio", "y")], height=70.0)
 
 
 study = Study(
@@ -90,6 +105,6 @@ study = Study(
             reason="an inequality; ours is -0.03",
         ),
     ],
-    plot="laws_velocity_steps",
+    plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

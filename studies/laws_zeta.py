@@ -1,15 +1,17 @@
 """Laws: zeta of the rate-step boundary, from the slip law towards the slowness law."""
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit
 from rsfstudy.slider.scene import Scene
 
-from ._laws import REFERENCES
+from ._laws import REFERENCES, shade
 from ._paper import PAPER, REFERENCE
 
 
@@ -42,6 +44,30 @@ def below(exponent: float) -> Claim:
         tolerance=0.0,
         reason="an inequality",
     )
+
+
+def fit(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """The line of a fit."""
+    reach = np.array([0.0, 1.04 * float(row["a_over_b_minus_a"].max())])
+    return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
+
+
+figure = Figure(
+    [
+        Panel(
+            x="a_over_b_minus_a",
+            y="critical_velocity_ratio",
+            by=["law_exponent", "normal_stress"],
+            style=lambda row: {"color": shade(2.0 * float(row["law_exponent"]))},
+            through=fit,
+            says="zeta",
+            title="Family of laws, $k = k_{cr}$; by normal stress",
+            x_limits=(0.0, None),
+            y_limits=(1.0, None),
+        )
+    ],
+    height=70.0,
+)
 
 
 study = Study(
@@ -78,6 +104,6 @@ study = Study(
         zeta(0.5),
         *map(below, (0.0, 0.25, 0.5)),
     ],
-    plot="laws_zeta",
+    plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

@@ -1,17 +1,130 @@
 """Stick-slip limit cycles: both laws, constant and variable normal stress (Figs. 9, 10 and 11)."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
+from ._phase_plane import LN10, constant_state_line, coupling, mark_reversed, scene_of, steady_line
 
 
 def speaks_of(law: str, normal_stress: str) -> dict[str, str]:
     """Place of one cycle on the lattice."""
     return {"law": law, "normal_stress": normal_stress}
+
+
+#: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
+#: steady state.
+STATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
+
+
+def orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
+    """The cycles that exist and differ, over all axes of the lattice, each with a name."""
+    from rsfstudy.plots._axes import place
+
+    found: dict[bytes, tuple[xr.Dataset, str]] = {}
+    dims = dataset["status"].dims
+    for at in np.ndindex(*dataset["status"].shape):
+        cell = dataset.isel(dict(zip(dims, at, strict=True)))
+        constant = coupling(cell)[0] == "constant"  # angles mean nothing there
+        words = [place(cell, str(d)) for d in dims if not (constant and d in ("phi", "alpha"))]
+        if int(cell["status"]) == 0:
+            found.setdefault(cell["frictional_stress"].values.tobytes(), (cell, ", ".join(words)))
+    return list(found.values())
+
+
+def mark_orbits(dataset: xr.Dataset, axes: Axes) -> None:
+    """Stress against slip rate, with lines of steady state and of constant state, for each coupling
+    of stress and slip that there is.
+    """
+    from rsfstudy.plots._style import look
+
+    cells = [cell for cell, _name in orbits(dataset)]
+    for number, (cell, name) in enumerate(orbits(dataset)):
+        style = {"color": look(number)["color"], "linewidth": 1.2 + 0.8 * (number == 0)}
+        axes.plot(cell["log10_slip_rate"], cell["frictional_stress"], "-", label=name, **style)
+    axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
+    low, high = axes.get_xlim()
+    rates = np.linspace(low, high, 400)
+    taken = [_on(axes, cell["log10_slip_rate"], cell["frictional_stress"]) for cell in cells]
+    drawn: set[tuple[str | float, ...]] = set()
+    for number, cell in enumerate(cells):
+        if coupling(cell) in drawn:
+            continue
+        drawn.add(coupling(cell))
+        colour, steady = look(number)["color"], steady_line(cell, rates)
+        axes.plot(rates, steady, "--", color=colour, linewidth=0.8, label="steady state")
+        taken.append(_on(axes, rates, steady))
+        for state in STATES:
+            theta = -state * LN10 * scene_of(cell).b
+            line, text = (
+                constant_state_line(cell, theta, rates),
+                r"constant state, with its $\Theta$",
+            )
+            axes.plot(rates, line, ":", color=colour, linewidth=0.7, label=text)
+            taken.append(
+                _numbered(axes, _on(axes, rates, line), f"${theta + 0.0:.2g}$", colour, taken)
+            )
+
+
+def _on(axes: Axes, x: Any, y: Any) -> np.ndarray:
+    """Places on the axes, as fractions of their sides."""
+    panel = axes.transData + axes.transAxes.inverted()
+    return np.asarray(panel.transform(np.column_stack([np.asarray(x), np.asarray(y)])))
+
+
+def _numbered(
+    axes: Axes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Write a number on what is seen of a line, far from all else; where that is."""
+    seen = line[((line > 0.06) & (line < 0.94)).all(axis=1)][::8]
+    others = np.concatenate([points[np.isfinite(points).all(axis=1)] for points in taken])
+    if not len(seen):
+        return seen
+    wide = (1.0, 2.0)  # numbers are wider than high
+    apart = np.hypot(*((seen[:, None, :] - others[None, :, :]) * wide).T).min(axis=0)
+    place = seen[int(apart.argmax())]
+    white = {"facecolor": "white", "edgecolor": "none", "pad": 0.4}
+    style = {"color": colour, "fontsize": 6, "bbox": white, "zorder": 1.5}  # below the orbits
+    axes.text(*place, number, ha="center", va="center", transform=axes.transAxes, **style)
+    return np.asarray(place + np.outer(np.linspace(-0.07, 0.07, 5), (1.0, 0.0)))
+
+
+def mark_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
+    """Two cycles, one after the other, against slip; what the spring carries in the first."""
+    from rsfstudy.plots._style import look, marker
+
+    for number, (cell, name) in enumerate(orbits(dataset)):
+        slip, stress = cell["slip"].values, cell["frictional_stress"].values
+        colour, fastest = look(number)["color"], int(cell["log10_slip_rate"].values.argmax())
+        both = np.concatenate([slip, slip + slip[-1] - slip[0]])
+        axes.plot(both, np.tile(stress, 2), "-", color=colour, linewidth=1.2, label=name)
+        thin = {"linewidth": 0.7, "label": "spring"}
+        axes.plot(slip, cell["shear_stress"], "--", color=colour, **thin)
+        dot = {"marker": marker(number), "markersize": 4, "label": "fastest slip"}
+        axes.plot(slip[fastest], stress[fastest], linestyle="none", color=colour, **dot)
+
+
+panel = Panel(y_label=r"Frictional stress, $\tau_f/\sigma_*$", each=["law"])
+figure = Figure(
+    [
+        replace(
+            panel, marks=[mark_orbits, mark_reversed], x_label=r"Slip rate, $\log_{10}(V/V_*)$"
+        ),
+        replace(panel, marks=[mark_along_slip, mark_reversed], x_label=r"Slip, $\delta/D_c$"),
+    ],
+    more_axes=True,
+)
 
 
 study = Study(
@@ -106,7 +219,7 @@ study = Study(
             reason="'different to the slip law', whose two drops are within a quarter of equal",
         ),
     ],
-    plot="limit_cycles",
+    plot=figure,
     references=[
         REFERENCE,
         "Rice and Tse (1986), J. Geophys. Res. 91, 521-530",

@@ -2,16 +2,24 @@
 2).
 """
 
+import math
+from dataclasses import replace
+
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import Inverse, LinearFit
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.stability import critical_stiffness
+from rsfstudy.slider.steady import slowest_steady
 
 from ._paper import PAPER, REFERENCE
+from ._phase_plane import scene_of
 
 MASSLESS, AS_PUBLISHED, HEAVY = "no mass", "T = 5 s", "T = 1e6 s"
 MASSES: dict[str, dict[str, bool | float]] = {
@@ -49,6 +57,81 @@ def steepness(phi: float, gentler: float) -> Claim:
         tolerance=0.0,
         reason="an inequality",
     )
+
+
+def curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Slip rates and the critical stiffness there, closely where it grows without bound."""
+    scene, rates = scene_of(row.isel(load_velocity_ratio=-1)), row["load_velocity_ratio"].values
+    slowest = max(slowest_steady(scene), math.log(rates.min()))
+    if slowest > math.log(rates.max()) - 0.05:
+        return np.full(1, math.nan), np.full(1, math.nan)
+    logs = slowest + np.geomspace(0.05, math.log(rates.max()) - slowest, 200)
+    stiffnesses = np.array([critical_stiffness(scene, x, quasi_static=True) for x in logs])
+    return np.exp(logs), np.where(stiffnesses > 0.0, stiffnesses, math.nan)
+
+
+def mark_slowest(dataset: xr.Dataset, axes: Axes) -> None:
+    """Dotted lines where slower sliding has no steady state."""
+    from rsfstudy.plots._style import look
+
+    for number in range(dataset.sizes["phi"]):
+        row = dataset.isel(phi=number, load_velocity_ratio=-1)
+        slowest = math.exp(slowest_steady(scene_of(row)))
+        if slowest > float(dataset["load_velocity_ratio"].min()):
+            axes.axvline(slowest, color=look(number)["color"], linestyle=":", linewidth=0.8)
+            soon = slowest < 1e3 * float(dataset["load_velocity_ratio"].min())
+            side = "left" if soon or dataset.sizes["phi"] == 1 else "right"
+            above = {"transform": axes.get_xaxis_transform(), "ha": side, "va": "top"}
+            axes.text(slowest, 0.98, r" $\phi = \tan^{-1}\mu_{ss}$ ", fontsize=7, **above)
+
+
+def angle(row: xr.Dataset) -> str:
+    """The angle, and from which slip rate on a spring of 0.8 k_cr(V_*) is stable."""
+    from rsfstudy.plots._text import number
+
+    text = rf"$\phi = {float(row['phi']):g}°$"
+    velocity = float(row.get("stabilising_velocity", math.nan))
+    stable = rf"{text}: $0.8\,k_{{cr}}(V_*)$ stable from {number(velocity)} $V_*$"
+    return stable if math.isfinite(velocity) else text
+
+
+def seen_rise(row: xr.Dataset) -> xr.DataArray:
+    """Rise of the stiffness at which perturbations neither grow nor decay, where it is one."""
+    massless = row["critical_stiffness"] / (1.0 + row["rise_by_dynamics"])
+    rise = row["critical_stiffness_from_growth"] / massless - 1.0
+    return rise.where((rise > 1e-8) & (row["rise_by_dynamics"] > 0.0))
+
+
+panel = Panel(x="load_velocity_ratio", by=["phi"], x_label="Slip rate, $V/V_*$", log="xy")
+figure = Figure(
+    [
+        replace(
+            panel,
+            y="critical_stiffness_from_growth",
+            at={"mass": 0},
+            style={"markersize": 2},
+            through=curve,
+            name=angle,
+            marks=[mark_slowest],
+            y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
+            title="Stable above; lines: closed form, points: growth",
+        ),
+        replace(
+            panel,
+            y=seen_rise,
+            by=["phi", "mass"],
+            style={"markersize": 2},
+            through=lambda row: (
+                row["load_velocity_ratio"],
+                row["rise_by_dynamics"].where(row["rise_by_dynamics"] > 0.0),
+            ),
+            name=lambda row: str(row["mass"].item()),
+            title="Rise by mass; colours as in (a)",
+            when=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
+            y_label=r"Rise of $k_{cr}$ by mass, as a fraction",
+        ),
+    ]
+)
 
 
 study = Study(
@@ -146,7 +229,7 @@ study = Study(
             reason="'the curve is very flat'",
         ),
     ],
-    plot="linear_stability",
+    plot=figure,
     references=[
         REFERENCE,
         "Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694",

@@ -1,15 +1,21 @@
 """Steps of normal stress: alpha and D_c as Linker and Dieterich's test gives them."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
+import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.scene import Scene
+
+from ._phase_plane import scene_of
 
 #: Stiffness over critical stiffness, compliant to stiff.
 RATIOS = [10.0, 20.0, 50.0, 100.0]
@@ -106,6 +112,68 @@ def is_direct(law: str, step: float) -> Claim:
     )
 
 
+#: Slip that is shown of the records, in D_c.
+SHOWN = 4.0
+
+
+def change(row: xr.Dataset) -> xr.DataArray:
+    """Change of friction, as far as it is shown."""
+    return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= SHOWN)
+
+
+def mark_rigid(dataset: xr.Dataset, axes: Axes) -> None:
+    """The transients of a rigid slider, by the closed form of its law."""
+    slip, highest = np.linspace(0.0, SHOWN, 100), 0.0
+    for place in range(dataset.sizes["normal_stress_step"]):
+        row = dataset.isel(normal_stress_step=place, stiffness_ratio=0)
+        scene = scene_of(row)
+        if form := scene.parts.law.relaxation:
+            away = -scene.alpha / scene.b * math.log1p(float(row["normal_stress_step"]))
+            left = scene.b * np.array([form(away, at) for at in slip.tolist()])
+            axes.plot(slip, left, ":", color="black", label="rigid")
+            highest = max(highest, float(np.abs(left).max()))
+    if highest:
+        axes.set_ylim(-1.4 * highest, 1.4 * highest)
+
+
+read = Panel(
+    x="stiffness_ratio",
+    by=["normal_stress_step", "law"],
+    style={"linewidth": 0.9},
+    marks=[level(1.0)],
+    log="x",
+)
+figure = Figure(
+    [
+        Panel(
+            x="slip",
+            y=change,
+            by=["stiffness_ratio", "normal_stress_step"],
+            each=["law"],
+            at={"normal_stress_step": lambda steps: sorted({min(steps), max(steps)})},
+            style={"marker": ""},
+            marks=[mark_rigid],
+            x_label=r"Slip since the step, $\delta/D_c$",
+            y_label=r"Change of friction, $\Delta\mu$",
+            x_limits=(0.0, SHOWN),
+        ),
+        replace(
+            read,
+            y=lambda row: row["apparent_alpha"] / row["alpha"],
+            title=r"$\alpha$ as read off",
+            y_label=r"$\alpha_{read}/\alpha$",
+        ),
+        replace(
+            read,
+            y="apparent_slip_distance",
+            title="Slip distance as read off",
+            y_label="$D_{read}/D_c$",
+        ),
+    ],
+    height=48.0,
+)
+
+
 study = Study(
     name="normal_stress_steps",
     title="Steps of normal stress as an experimenter reads them, b/a = 2",
@@ -130,7 +198,7 @@ study = Study(
         *(falls_over(law, step) for law in LAWS for step in STEPS),
         *(is_direct(law, step) for law in LAWS for step in (STEPS[0], STEPS[-1])),
     ],
-    plot="normal_stress_steps",
+    plot=figure,
     references=[
         "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940",
         "Hong and Marone (2005), Geochem. Geophys. Geosyst. 6, Q03012",

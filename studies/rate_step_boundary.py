@@ -3,9 +3,11 @@
 """
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import ProportionalFit, RelativeDifference
@@ -16,6 +18,45 @@ from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
 #: a/(b-a): densely over the paper's range, which is fitted, and on to where the finite norm bends
 #: the curves.
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 17) / 4])
+
+
+FITTED = (0.25, 1.0)
+
+
+def fit(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """The line of a fit."""
+    reach = np.array([0.0, 1.03 * float(row["a_over_b_minus_a"].max())])
+    return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
+
+
+def mark_fitted(_dataset: xr.Dataset, axes: Axes) -> None:
+    """The range of the fit."""
+    axes.axvspan(*FITTED, color="0.94", zorder=0)
+    axes.text(0.27, 0.97, "fitted", transform=axes.get_xaxis_transform(), va="top", color="0.45")
+
+
+figure = Figure(
+    [
+        Panel(
+            x="a_over_b_minus_a",
+            y="critical_velocity_ratio",
+            by=["case"],
+            through=fit,
+            says="zeta",
+            marks=[
+                reference_line(
+                    "a_over_b_minus_a", lambda x: 1.0 + x, "$1 + a/(b-a)$ (Gu et al. 1984)", 0.0
+                ),
+                mark_fitted,
+            ],
+            at={"law": 0, "stiffness_ratio": 0},
+            x_limits=(0.0, None),
+            y_limits=(1.0, None),
+            columns=1,
+        )
+    ]
+)
+
 
 study = Study(
     name="rate_step_boundary",
@@ -110,7 +151,7 @@ study = Study(
             reason="whole per cent (0.5), and the paper's error of 0.4 % in each of two velocities",
         ),
     ],
-    plot="rate_step_boundary",
+    plot=figure,
     references=[
         REFERENCE,
         "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",

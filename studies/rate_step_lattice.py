@@ -3,15 +3,45 @@
 import math
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.reduce import Boundary
 from rsfstudy.slider.scene import Scene
 
 from ._paper import CASES, CONSTANT, PAPER, REFERENCE
+
+
+def mark_cells(dataset: xr.Dataset, axes: Axes) -> None:
+    """Stable cells open, and unstable ones filled."""
+    ratio, velocity = xr.broadcast(dataset["stiffness_ratio"], dataset["load_velocity_ratio"])
+    for answer, face, text in ((0.0, "none", "stable"), (1.0, "0.6", "unstable")):
+        here = dataset["unstable"].transpose(*ratio.dims).values == answer
+        places = ratio.values[here], velocity.values[here]
+        look = {"facecolors": face, "edgecolors": "0.6", "linewidths": 0.5}
+        axes.scatter(*places, s=8, label=text, **look)
+
+
+figure = Figure(
+    [
+        Panel(
+            x="stiffness_ratio",
+            y="lattice_boundary",
+            each=["case"],
+            error="lattice_boundary_error",
+            marks=[mark_cells],
+            name=lambda _row: "boundary with its bracket",
+            y_label="Load point velocity, $V_0/V_*$",
+            columns=3,
+        )
+    ],
+    columns=3,
+)
+
 
 study = Study(
     name="rate_step_lattice",
@@ -43,6 +73,6 @@ study = Study(
             reason="half of the spacing of the lattice there",
         ),
     ],
-    plot="rate_step_lattice",
+    plot=figure,
     references=[REFERENCE],
 )

@@ -1,11 +1,14 @@
 """Rate-step boundary against stiffness, b/a = e, both laws (Fig. 6 and section 4)."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, RelativeDifference
@@ -43,6 +46,30 @@ def eq_11(stiffness_ratio: float, published: float, tolerance: float, reason: st
 
 
 UNDERESTIMATED = "'underestimates by 1-2 %', which the paper takes for its procedure's error"
+
+
+def mark_eq_11(dataset: xr.Dataset, axes: Axes) -> None:
+    """The approximation that is published for the slip law."""
+    weakening, text = float(dataset["b_over_a"]) - 1.0, r"$\exp(k/k_{cr})/\lambda$ (eq. 11)"
+    if dataset["law"] == "slip":
+        reference_line("stiffness_ratio", lambda x: np.exp(x) / weakening, text)(dataset, axes)
+
+
+curves = Panel(x="stiffness_ratio", y="critical_velocity_ratio", by=["case"])
+
+figure = Figure(
+    [
+        replace(curves, at={"law": 0, "b_over_a": 0}, marks=[mark_eq_11]),
+        replace(
+            curves,
+            by=["case", "law"],
+            log="y",
+            when=lambda dataset: dataset.sizes["law"] > 1,
+            at={"b_over_a": 0},
+        ),
+    ]
+)
+
 
 study = Study(
     name="rate_step_stiffness",
@@ -100,7 +127,7 @@ study = Study(
         slowness(1.0, 11.8, 0.05, "one decimal"),
         slowness(1.5, 2361.0, 0.5, "the unit"),
     ],
-    plot="rate_step_stiffness",
+    plot=figure,
     references=[
         REFERENCE,
         "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",

@@ -1,14 +1,25 @@
 """Resonance: what oscillating normal stress makes of spring stress, against its period."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Inverse
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.stability import response_to_normal_stress
+
+from ._phase_plane import scene_of
 
 base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0)
 a, b = base.a, base.b
@@ -114,6 +125,71 @@ def fails_earlier(softer: float, stiffer: float) -> Claim:
     )
 
 
+def theory(part: Callable[[np.ndarray], Any], row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Periods, to twice as far as those of the motions, and what linear theory says of them."""
+    scene, known = scene_of(row.isel(oscillation_period=0)), row["oscillation_period"]
+    periods = np.geomspace(0.5 * float(known.min()), 2.0 * float(known.max()), 300)
+    frequencies = 2.0 * math.pi / periods
+    found = [response_to_normal_stress(scene, scene.log_load_rate, f) for f in frequencies]
+    return periods, np.asarray(part(np.array(found)))
+
+
+def leads(responses: np.ndarray) -> Any:
+    """Lead of spring stress in degrees."""
+    return np.degrees(np.angle(responses))
+
+
+def settled(variable: str, row: xr.Dataset) -> xr.DataArray:
+    """Where the motion repeats itself."""
+    return row[variable].where(row["settled"] == 1.0)
+
+
+def mark_theory(dataset: xr.Dataset, axes: Axes) -> None:
+    """Gains of linear theory."""
+    from rsfstudy.plots._style import look
+
+    for number in range(dataset.sizes["stiffness_ratio"]):
+        gain = float(dataset["linear_gain"].isel(stiffness_ratio=number).max())
+        level(gain, color=look(number)["color"], linewidth=0.6, linestyle=":")(dataset, axes)
+
+
+def closest_to_resonance(periods: list[float]) -> float:
+    """The period that linear theory has the largest gain near, on the softest machine."""
+    return min(periods, key=lambda period: abs(period - RESONANT))
+
+
+small = Panel(
+    x="oscillation_period",
+    by=["stiffness_ratio", "law"],
+    style=lambda row: {"markersize": 3.0 if row["law"] == LAWS[0] else 5.5},
+    at={"oscillation_amplitude": 0},
+    log="x",
+    columns=3,
+)
+large = Panel(
+    x="oscillation_amplitude",
+    by=["stiffness_ratio", "law"],
+    at={"oscillation_period": closest_to_resonance},
+    style={"linewidth": 0.9},
+    log="xy",
+)
+GAIN = r"Gain, $|\hat\tau/\hat\sigma|$"
+figure = Figure(
+    [
+        replace(small, y="gain", through=partial(theory, np.abs), y_label=GAIN, log="xy"),
+        replace(small, y="phase_lead", through=partial(theory, leads), y_label="Lead (degree)"),
+        replace(large, y=partial(settled, "gain"), marks=[mark_theory], y_label=GAIN),
+        replace(
+            large,
+            y=partial(settled, "departure_from_linear"),
+            marks=[level(FAILED)],
+            y_label="Relative departure from linear theory",
+        ),
+    ],
+    height=50.0,
+)
+
+
 study = Study(
     name="resonance",
     title="Response to oscillating normal stress, b/a = 2",
@@ -149,7 +225,7 @@ study = Study(
         *(holds(law, RATIOS[-1], LARGE) for law in LAWS),
         fails_earlier(RATIOS[0], RATIOS[1]),
     ],
-    plot="resonance",
+    plot=figure,
     references=[
         "Perfettini, Schmittbuhl, Rice and Cocco (2001), J. Geophys. Res. 106, 13455-13472",
         "Boettcher and Marone (2004), J. Geophys. Res. 109, B03406",

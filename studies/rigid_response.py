@@ -1,7 +1,13 @@
 """Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4)."""
 
+import math
+from typing import Any
+
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.reduce import RelativeDifference, Spread
@@ -26,6 +32,46 @@ def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
         tolerance=0.0,
         reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
     )
+
+
+def stress_left(row: xr.Dataset) -> xr.DataArray:
+    """Stress less its future steady value; steps between decades are there for their numbers."""
+    future = row["mu_star"] + row["steady_stress_change"]
+    return ((row["shear_stress"] - future) / row["a"]).where(decade(row) is not None)
+
+
+def decade(row: xr.Dataset) -> int | None:
+    """Decades of the step, if it is of whole ones."""
+    decades = math.log10(row["load_velocity_ratio"]) if row["load_velocity_ratio"] > 0.0 else 0.0
+    whole = round(decades)
+    return whole if whole and abs(decades - whole) < 1e-9 else None
+
+
+def line(row: xr.Dataset) -> dict[str, Any]:
+    """Steps up solid, and steps down dashed."""
+    from rsfstudy.plots._style import look
+
+    decades = decade(row) or 1
+    colour = look(abs(decades) - 1)["color"]
+    return {"color": colour, "linestyle": "-" if decades > 0 else "--", "linewidth": 1.0}
+
+
+figure = Figure(
+    [
+        Panel(
+            x="slip",
+            y=stress_left,
+            by=["load_velocity_ratio"],
+            each=["law", "normal_stress"],
+            style=line,
+            name=lambda row: f"$10^{{{decade(row)}}}$",
+            marks=[level(0.0)],
+            y_label=r"Stress left, $(\tau - \tau_{ss})/(a\,\sigma_*)$",
+            columns=4,
+            legend_title="Slip rate after the step, $V(0^+)/V_*$",
+        )
+    ]
+)
 
 
 study = Study(
@@ -148,7 +194,7 @@ study = Study(
             reason="'~3.5', printed to one decimal",
         ),
     ],
-    plot="rigid_response",
+    plot=figure,
     references=[
         REFERENCE,
     ],

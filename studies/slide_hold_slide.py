@@ -3,9 +3,11 @@
 import math
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.healing import Healing
 from rsfstudy.reduce import DecadeFit
@@ -71,6 +73,53 @@ def heals(ratio: float) -> Claim:
         reason="what the form leaves out goes as 1/t, up to 10/t of b: 1e-3 of it at 1e4, the "
         "first of the points, which weighs a fifth",
     )
+
+
+def change(row: xr.Dataset) -> xr.DataArray:
+    """Change of friction since steady sliding."""
+    return row["friction_coefficient"] - row["mu_star"]
+
+
+figure = Figure(
+    [
+        *(
+            Panel(
+                x="hold_time",
+                y=variable,
+                by=["stiffness"],
+                each=["case"],
+                style={"markersize": 2.5},
+                log="x",
+                alike=variable,
+            )
+            for variable in ("healing", "relaxation")
+        ),
+        Panel(
+            x="load_point_displacement",
+            y=change,
+            by=["hold_time"],
+            at={
+                "hold_time": slice(None, None, 4),
+                "case": lambda cases: cases[min(1, len(cases) - 1)],
+                "stiffness": lambda points: points[len(points) // 2],
+            },
+            style={"marker": ""},
+            y_label=r"Change of friction, $\mu - \mu_*$",
+        ),
+        Panel(
+            x="stiffness",
+            y="healing_per_decade",
+            by=["case"],
+            error="healing_per_decade_stderr",
+            title="Healing per decade, from $10^4$ on",
+            y_label=r"Healing per decade, $\beta$",
+            log="x",
+            columns=1,
+        ),
+    ],
+    columns=3,
+    height=48.0,
+)
 
 
 study = Study(
@@ -140,7 +189,7 @@ study = Study(
             reason="an inequality",
         ),
     ],
-    plot="slide_hold_slide",
+    plot=figure,
     references=[
         "Dieterich (1972), J. Geophys. Res. 77, 3690-3697",
         "Beeler, Tullis and Weeks (1994), Geophys. Res. Lett. 21, 1987-1990",

@@ -3,11 +3,14 @@
 """
 
 import math
+from functools import partial
 
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
@@ -74,6 +77,88 @@ def fits(drop: str) -> list[Reduction]:
         LinearFit(name=f"{drop}_slope_fast", of=of, on=on, within=FAST),
         OverClosedForm(name=f"{drop}_slope_scaled", of=f"{drop}_slope", form="net_weakening"),
     ]
+
+
+X = "log_load_velocity_ratio"
+#: Where a line misses by more than this part of what it spans, no line fits.
+CURVED = 0.05
+DROPS = ("static", "dynamic")
+
+
+def is_straight(drop: str, row: xr.Dataset) -> bool:
+    """Whether a line in ln V_0 fits a stress drop."""
+    values, misfit = row[f"{drop}_stress_drop"], float(row.get(f"{drop}_slope_misfit", math.nan))
+    return misfit <= CURVED * float(values.max() - values.min())
+
+
+def fit(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    """The line of a fit, if one fits."""
+    known = row[f"{drop}_stress_drop"]
+    x = row[X].where(known.notnull() & is_straight(drop, row))
+    slope = float(row.get(f"{drop}_slope", math.nan))
+    return x, float(known.mean()) + slope * (x - x.mean())
+
+
+def name(drop: str, row: xr.Dataset) -> str:
+    """The case, and its slope if a line fits."""
+    from rsfstudy.plots._text import slope_with_error
+
+    text, slope = str(row["case"].item()), row.get(f"{drop}_slope", xr.DataArray(math.nan))
+    if not bool(np.isfinite(slope)):
+        return text
+    return f"{text}: " + (
+        slope_with_error(row, f"{drop}_slope") if is_straight(drop, row) else "no line fits"
+    )
+
+
+def scaled_slope(row: xr.Dataset) -> xr.DataArray:
+    """f(k), where a line fits."""
+    places = range(row.sizes["stiffness_ratio"])
+    straight = [is_straight("static", row.isel(stiffness_ratio=place)) for place in places]
+    return row["static_slope_scaled"].where(xr.DataArray(straight, dims="stiffness_ratio"))
+
+
+def local_slope(row: xr.Dataset) -> xr.DataArray:
+    """Slope at each load point velocity, from its neighbours."""
+    values = row["static_stress_drop"]
+    several = values.size > 1
+    return values.copy(data=np.gradient(values, row[X])) if several else values * math.nan
+
+
+figure = Figure(
+    [
+        *(
+            Panel(
+                x=X,
+                y=f"{drop}_stress_drop",
+                by=["case"],
+                each=["law"],
+                at={"stiffness_ratio": max},
+                through=partial(fit, drop),
+                name=partial(name, drop),
+                y_limits=(0.0, None),
+                legend_title="Slopes",
+            )
+            for drop in DROPS
+        ),
+        Panel(
+            x="stiffness_ratio",
+            y=scaled_slope,
+            by=["case", "law"],
+            title="Slopes of lines that fit, $f(k)$",
+            y_label=r"Slope of static drop over $(a-b)\,\sigma_*$",
+        ),
+        Panel(
+            x=X,
+            y=local_slope,
+            by=["case", "law"],
+            at={"stiffness_ratio": max},
+            title="Local slopes: level where the law holds",
+            y_label=r"Local slope of static drop, $\sigma_*$",
+        ),
+    ],
+    height=46.0,
+)
 
 
 study = Study(
@@ -155,7 +240,7 @@ study = Study(
             reason="an inequality: cells without stick-slip are left out",
         ),
     ],
-    plot="stress_drop",
+    plot=figure,
     references=[
         REFERENCE,
         "Gu and Wong (1991), J. Geophys. Res. 96, 21677-21691",

@@ -1,7 +1,13 @@
 """Triggering: critical steps of normal stress, displacement and velocity as changes of stress."""
 
+from dataclasses import replace
+from typing import Any
+
+import xarray as xr
+
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.triggers import Triggers
 from rsfstudy.reduce import LinearFit
@@ -82,6 +88,76 @@ def weaker(law: str) -> Claim:
 
 
 EXACT = "its error estimate, to 1.2e-9 of it, and what a finite norm leaves, no more than that"
+
+
+X = "stiffness_ratio"
+FALL, PULL, FASTER = (
+    "coulomb_stress_of_normal_stress",
+    "coulomb_stress_of_displacement",
+    "direct_stress_of_velocity",
+)
+RUN: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 3.5, "linewidth": 0.5}
+PULLED: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 6.0,
+    "markeredgewidth": 0.6,
+    "fillstyle": "none",
+}
+
+
+def beside(variable: str, name: str, style: dict[str, Any], over: str | None = None) -> Draw:
+    """What is drawn beside falls of normal stress, in their colours; over a number of the scene."""
+
+    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        from rsfstudy.plots._style import in_grey, look
+
+        values = dataset[variable] / (dataset[over] if over else 1.0)
+        for number in range(values.sizes["case"]):
+            row = values.isel(case=number)
+            axes.plot(row[X], row, **style | {"color": look(number)["color"]})
+        if values.notnull().any():
+            in_grey(axes, name, style)
+
+    return mark
+
+
+panel = Panel(
+    x=X,
+    by=["case"],
+    each=["law"],
+    style={"markersize": 2.6},
+    x_limits=(0.0, None),
+    legend_title="Filled markers: fall of normal stress, case by case",
+)
+FASTER_NAME = r"velocity step, $a\,\ln(V_0/V_*)$"
+figure = Figure(
+    [
+        replace(
+            panel,
+            y=lambda row: row[FALL] / row["a"],
+            marks=[
+                reference_line(X, lambda x: x, "Coulomb, first order, imposed"),
+                beside(PULL, "displacement step", PULLED, over="a"),
+                beside(FASTER, FASTER_NAME, RUN, over="a"),
+            ],
+            y_label=r"Critical stress change over $a\sigma_*$",
+            log="y",
+            alike="stress",
+        ),
+        replace(
+            panel,
+            y="coulomb_ratio",
+            marks=[
+                level(1.0, color="0.82", linewidth=2.5),
+                beside("direct_ratio", FASTER_NAME, RUN),
+            ],
+            y_label="Stress change over that by a displacement step",
+        ),
+    ],
+    height=58.0,
+)
+
 
 study = Study(
     name="triggering",
@@ -170,7 +246,7 @@ study = Study(
             reason="an inequality; ours is 2.40",
         ),
     ],
-    plot="triggering",
+    plot=figure,
     references=[
         REFERENCE,
         "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940",

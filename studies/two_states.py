@@ -2,15 +2,21 @@
 Becker 2000).
 """
 
+import math
+from dataclasses import replace
+
 import numpy as np
+import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Boundary, Inverse
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
 
 GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 BECKER = "Becker (2000), in AGU Geophys. Monogr. 120, 5-26"
@@ -37,6 +43,115 @@ SPRINGS = np.round(
     ),
     4,
 )
+
+
+def mark_peaks(dataset: xr.Dataset, axes: Axes) -> None:
+    """Peaks of the events that are kept, and the cycle of one event."""
+    from rsfstudy.plots._style import look
+
+    ratio, peaks = dataset["stiffness_ratio"], dataset["peak_log10_slip_rate"]
+    chaotic = dataset["status"] == int(Status.NOT_PERIODIC)
+    for number, (where, shape, label) in enumerate(
+        ((~chaotic, "o", "repeats itself"), (chaotic, "x", "does not repeat itself"))
+    ):
+        at, shown = xr.broadcast(ratio, peaks.where(where))
+        small = {"markersize": 2.6 - 0.6 * number, "markeredgewidth": 0.5, "label": label}
+        axes.plot(
+            at.values.ravel(), shown.values.ravel(), shape, color=look(number)["color"], **small
+        )
+    dashed = {"color": "0.4", "linewidth": 0.8, "label": "cycle of one event"}
+    axes.plot(ratio, dataset["one_event_log10_peak"], "--", **dashed)
+
+
+def mark_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
+    """Floquet multipliers of the cycle of one event, and growth of departures by each event."""
+    from rsfstudy.plots._style import look
+
+    imaginary = dataset["floquet_multiplier_imaginary"]
+    for number, (values, style, label) in enumerate(
+        (
+            (
+                dataset["floquet_multiplier"],
+                {"marker": "o"},
+                r"multiplier, $\mathrm{Re}\,\Lambda_1$",
+            ),
+            (dataset["lyapunov_exponent"], {"marker": "s"}, r"growth per event, $\lambda$"),
+            (
+                imaginary.where(imaginary > 0.0),
+                {"marker": "x", "linestyle": "none"},
+                r"$\mathrm{Im}\,\Lambda_1$, where complex",
+            ),
+        )
+    ):
+        axes.plot(
+            dataset["stiffness_ratio"],
+            values,
+            label=label,
+            **{**look(number), "linewidth": 0.9, "markersize": 2.5, **style},
+        )
+
+
+def abscissa(magnified: bool) -> Draw:
+    """The stiffness of all springs, or of those around where periods double; and where they do."""
+
+    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        ratio = dataset["stiffness_ratio"].values
+        beyond = ratio[dataset["status"].values == int(Status.SLIP_RATE_UNBOUNDED)]
+        bounded = ratio[np.isfinite(dataset["peak_spread"].values)]
+        low, high = float(ratio.min()), float(ratio.max())
+        if magnified and bounded.size:
+            low = float(bounded.min()) - 0.001
+            high = min(high, low + 0.02)
+        if high > low:
+            axes.set_xlim(low, high)
+        axes.locator_params(axis="x", nbins=5)
+        if beyond.size:
+            end = float(bounded.min()) if bounded.size else high
+            grey = {"color": "0.9", "linewidth": 0.0, "zorder": 0}
+            axes.axvspan(low, end, label="slip rate unbounded", **grey)
+        doubling = float(dataset.get("doubling_by_multiplier", math.nan))
+        if math.isfinite(doubling):
+            label = rf"$\Lambda_1 = -1$ at $k = {doubling:.5f}\,k_{{cr}}$"
+            axes.axvline(doubling, color="k", linestyle=":", linewidth=0.9, label=label)
+
+    return mark
+
+
+def has_doublings(dataset: xr.Dataset) -> bool:
+    """Whether there are springs enough to be magnified."""
+    ratio = dataset["stiffness_ratio"].where(dataset["peak_spread"].notnull())
+    return 2 < int((ratio < ratio.min() + 0.019).sum()) < int(ratio.notnull().sum())
+
+
+peaks = Panel(
+    x="stiffness_ratio",
+    y_label=r"Peak slip rate, $\log_{10}(V_{peak}/V_*)$",
+    at={"law": 0},
+    title="Peaks of slip rate, event by event",
+    marks=[mark_peaks, abscissa(False)],
+)
+multipliers = replace(
+    peaks,
+    y_label=r"$\Lambda_1$ of the cycle of one event; $\lambda$",
+    title="Multipliers: beyond $-1$ the cycle repels",
+    marks=[mark_multipliers, level(-1.0), level(1.0), abscissa(False)],
+)
+figure = Figure(
+    [
+        peaks,
+        replace(
+            peaks, title="Peaks, magnified", marks=[mark_peaks, abscissa(True)], when=has_doublings
+        ),
+        multipliers,
+        replace(
+            multipliers,
+            title="Multipliers, magnified",
+            marks=[*multipliers.marks[:-1], abscissa(True)],
+            when=has_doublings,
+        ),
+    ]
+)
+
 
 study = Study(
     name="two_states",
@@ -133,7 +248,7 @@ study = Study(
             reason="a whole number",
         ),
     ],
-    plot="two_states",
+    plot=figure,
     references=[
         GU,
         BECKER,

@@ -2,10 +2,12 @@
 
 import math
 
+import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Figure, Panel, level
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.reduce import OverClosedForm
@@ -97,6 +99,65 @@ def reads_distance(ratio: float) -> Claim:
     )
 
 
+#: Load point displacement that is shown of the records, in D_c.
+SHOWN = 8.0
+
+
+def smallest_steps(ratios: list[float]) -> list[float]:
+    """The step down and the step up that are closest to none."""
+    down, up = [r for r in ratios if r < 1.0], [r for r in ratios if r > 1.0]
+    return [*([min(up)] if up else []), *([max(down)] if down else [])]
+
+
+def change(row: xr.Dataset) -> xr.DataArray:
+    """Change of friction, as far as it is shown."""
+    change = (row["friction_coefficient"] - row["friction_before"]) / row["a"]
+    return change.where(row["load_point_displacement"] <= SHOWN)
+
+
+def read_off(
+    title: str, label: str, name: str, over: tuple[str, ...] = (), alike: str = ""
+) -> Panel:
+    """A number as read off over the product of some of the scene's own, against stiffness."""
+    return Panel(
+        x="stiffness_ratio",
+        y=lambda row: row[name] / math.prod(float(row[factor]) for factor in over),
+        by=["velocity_ratio", "law"],
+        style={"linewidth": 0.9},
+        marks=[level(1.0)],
+        title=title,
+        y_label=label,
+        log="x",
+        alike=alike,
+    )
+
+
+LENGTH = "$D_{read}/D_c$"
+figure = Figure(
+    [
+        Panel(
+            x="load_point_displacement",
+            y=change,
+            by=["stiffness_ratio", "velocity_ratio"],
+            each=["law"],
+            at={"velocity_ratio": smallest_steps, "stiffness_ratio": slice(None, None, 2)},
+            style={"marker": ""},
+            y_label=r"Change of friction, $\Delta\mu/a$",
+            x_limits=(-0.3, SHOWN),
+            alike="records",
+        ),
+        read_off("Direct effect as read off", "$a_{read}/a$", "apparent_a", ("a",)),
+        read_off("Evolution as read off", "$b_{read}/b$", "apparent_b", ("a", "b_over_a")),
+        read_off(
+            "Slip distance, by the load point", LENGTH, "apparent_slip_distance", alike="length"
+        ),
+        read_off("Slip distance, by slip", LENGTH, "corrected_slip_distance", alike="length"),
+        read_off("Rate dependence as read off", "$(a-b)_{read}/(a-b)$", "a_minus_b_over_true"),
+    ],
+    height=48.0,
+)
+
+
 study = Study(
     name="velocity_steps",
     title="Velocity steps as an experimenter reads them, b/a = 2",
@@ -127,7 +188,7 @@ study = Study(
         reads_distance(0.1),
         reads_distance(10.0),
     ],
-    plot="velocity_steps",
+    plot=figure,
     references=[
         "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",
         "Ruina (1983), J. Geophys. Res. 88, 10359-10370",

@@ -14,19 +14,19 @@ from types import SimpleNamespace
 import cloudpickle
 import numpy as np
 import pytest
+from rsfstudy.named_studies._phase_plane import scene_of
 from running import call, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.declare import catalogue
+from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.plots import lines
-from rsfstudy.plots._phase_plane import scene_of
 from rsfstudy.slider import laws, places, registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
@@ -588,12 +588,20 @@ def squares(dataset, axes):
     axes.set_title("squares")
 
 
+def named_figure(name):
+    return SimpleNamespace(__name__=name, draw=squares)
+
+
 @pytest.mark.parametrize(
     ("plot", "complaint"),
     [
-        (3, "plot = 3: must be a name, or a function or module"),
+        (3, "plot = 3: must be a name, a Figure, or a function or module"),
         (lambda dataset, axes: axes, "plot = '<lambda>': needs a name of its own"),
-        (lines, "plot = 'lines': needs a name of its own"),
+        (
+            SimpleNamespace(__name__="lines", draw=squares),
+            "plot = 'lines': needs a name of its own",
+        ),
+        (SimpleNamespace(__name__="laws", draw=squares), "plot = 'laws': needs a name of its own"),
     ],
 )
 def test_figures_that_are_none(plot, complaint):
@@ -615,3 +623,20 @@ def test_a_module_or_a_function_draws(tmp_path):
     assert len(plots.figure(dataset, module).axes) == 2
     partial = dataset.assign_attrs(completeness="partial: 1 of 2 cells")
     assert "partial" in plots.figure(partial, squares).axes[0].get_title()
+
+
+def test_panels_draw():
+    """By the name of their study; with labels and units from what the measure says of itself."""
+    figure = Figure([Panel(x="phi", y="held", each=["law"]), squares])
+    axes = [Axis("law", ["slip", "slowness"]), Axis("phi", [60, 70])]
+    study = Study(name="n", title="t", base=Scene(), axes=axes, measure=Held(), plot=figure)
+    dataset = run(study)
+    assert json.loads(dataset.attrs["declaration"])["plot"] == "n"
+    slip, slowness, own = plots.figure(dataset, study.plot).axes
+    assert (slip.get_title(), slowness.get_title(), own.get_title()) == (
+        "Slip law",
+        "Slowness law",
+        "squares",
+    )
+    assert slip.get_xlabel().endswith(r"$\phi$ (degree)")
+    np.testing.assert_array_equal(slip.lines[0].get_ydata(), dataset.held.sel(law="slip"))

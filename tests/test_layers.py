@@ -128,6 +128,17 @@ def test_workers_load_no_more_than_the_physics_needs():
     assert ran.stdout.strip() == ""
 
 
+def test_studies_load_nothing_that_draws():
+    """A worker that is given a cell of any of them has no matplotlib."""
+    asked = (
+        "import sys; from rsfstudy.declare import catalogue\n"
+        "for name in catalogue.names(): catalogue.load(name)\n"
+        "print(*{'matplotlib'} & set(sys.modules))"
+    )
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == ""
+
+
 HEAVY = (
     "numpy scipy pandas xarray netCDF4 matplotlib dask distributed numba rich importlib.metadata"
 )

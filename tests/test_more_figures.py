@@ -10,7 +10,7 @@ from running import named_results
 import rsfstudy
 from rsfstudy import Scene, plots
 from rsfstudy.plots import _text
-from rsfstudy.plots._map import contours
+from rsfstudy.plots.maps import contours
 
 
 def test_laws_stand_at_one_height_under_constant_and_variable_normal_stress(tmp_path_factory):

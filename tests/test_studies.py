@@ -222,7 +222,6 @@ def test_vocabulary_describes_itself():
     for name, quantity in vocabulary.QUANTITIES.items():
         assert quantity.name == name
         assert quantity.long_name
-        assert quantity.axis_label
     error = vocabulary.quantity("critical_displacement_error")
     assert error.long_name.startswith("numerical error estimate of critical load point")
     assert error.scale == "D_c"

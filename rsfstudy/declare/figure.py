@@ -1,25 +1,185 @@
-"""The figure of a study: one of rsfstudy by its name, or a function or module of a user's own."""
+"""The figure of a study: panels, or a function or module of a user's own. Nothing here loads what
+draws.
+"""
 
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import check_text
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 
-#: Names of the figures of rsfstudy.
-_FIGURES = frozenset(
+if TYPE_CHECKING:
+    import xarray as xr
+
+    Along = str | Callable[[xr.Dataset], xr.DataArray]
+    Text = str | Callable[[xr.Dataset], str]
+
+#: `matplotlib.axes.Axes`, for annotations: what workers load must not load matplotlib.
+Axes = Any
+#: A function of a dataset and of axes, which draws the one on the other.
+Draw = Callable[[Any, Any], Any]
+
+#: Names of the figures that draw any study.
+ANY_LATTICE = frozenset(
     module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
 )
 
 
-def figure_name(plot: Any) -> str:
-    """Name of a figure in a declaration: one of rsfstudy by its name, one of the user's own by that
-    of its function or module.
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One panel of a figure, or one for each point of some axes.
+
+    Functions of a dataset are given the part of it that the panel shows, those of a row the part
+    that one curve shows. Labels come from names, symbols and units of what is drawn.
+
+    Parameters
+    ----------
+    x, y : str or function of dataset
+        What curves are drawn of: variables by their names, or what a function makes of them.
+    by : sequence of str
+        Axes whose points are curves: the first is told by colours and markers, and the second by
+        dashes and open markers.
+    each : sequence of str
+        Axes whose points have a panel each.
+    at : mapping of str to int, list of int, slice or function
+        Places on other axes: numbers of points, or what gives one of their values, or several, as
+        `min` and `max` do; of what is the same everywhere, 0, for the title to say it.
+    points : bool
+        Have markers without a line.
+    style : mapping, or function of row
+        What `matplotlib.axes.Axes.plot` takes, laid over that of the curve.
+    error : str
+        Variable of the bars of error.
+    through : function of row
+        x and y of a line through the points of a curve, in its colour: a fit or a theory.
+    name : function of row
+        What the legend calls a curve, by default its place on the axes of `by`.
+    says : str
+        A slope that the legend says of each curve, with its standard error; left out where there
+        is none.
+    marks : sequence of function of (dataset, axes)
+        What is drawn beside the curves.
+    title : str, or function of dataset
+        By default the place on the axes of `each` and `at`.
+    x_label, y_label : str, optional
+        For what has no name, symbol and units.
+    log : str
+        Which of x and y have log scales; None for those along which points or values span decades.
+    x_limits, y_limits : tuple of float or None
+        Ends of the scales; None leaves an end to what is drawn.
+    alike : str
+        Panels that say the same have the same scale along y.
+    when : function of dataset
+        Whether there is such a panel; always by default.
+    columns : int
+        Most entries of the legend beside each other.
+    legend_title : str
     """
+
+    x: Along = ""
+    y: Along = ""
+    by: Sequence[str] = ()
+    each: Sequence[str] = ()
+    at: Mapping[str, Any] = field(default_factory=dict)
+    points: bool = False
+    style: Mapping[str, Any] | Callable[[xr.Dataset], Mapping[str, Any]] = field(
+        default_factory=dict
+    )
+    error: str = ""
+    through: Callable[[xr.Dataset], tuple[Any, Any]] | None = None
+    name: Callable[[xr.Dataset], str] | None = None
+    says: str = ""
+    marks: Sequence[Draw] = ()
+    title: Text | None = None
+    x_label: Text | None = None
+    y_label: Text | None = None
+    log: str | None = ""
+    x_limits: tuple[float | None, float | None] = (None, None)
+    y_limits: tuple[float | None, float | None] = (None, None)
+    alike: str = ""
+    when: Callable[[xr.Dataset], bool] | None = None
+    columns: int = 2
+    legend_title: str | None = None
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels, from left to right and from top to bottom.
+
+    Parameters
+    ----------
+    panels : sequence of Panel, or function of (dataset, axes)
+    columns : int
+        Most panels beside each other.
+    height : float, optional
+        Of a panel without its legend, in mm; that of the style by default.
+    more_axes : bool
+        Whether it shows further axes of the lattice too.
+    """
+
+    panels: Sequence[Panel | Draw]
+    columns: int = 2
+    height: float | None = None
+    more_axes: bool = False
+
+    @property
+    def dimensions(self) -> set[str]:
+        """Axes that its panels name."""
+        panels = [panel for panel in self.panels if isinstance(panel, Panel)]
+        return {
+            name for p in panels for name in (p.x, *p.by, *p.each, *p.at) if isinstance(name, str)
+        }
+
+
+def level(height: float, **style: Any) -> Draw:
+    """A mark: a thin line across the panel."""
+    thin = {"color": "0.6", "linewidth": 0.8, "linestyle": "-", "zorder": 0}
+    return lambda _dataset, axes: axes.axhline(height, **thin | style)
+
+
+def reference_line(
+    x: str, of: Callable[[Any], Any], name: str, start: float | None = None, **style: Any
+) -> Draw:
+    """A mark: a wide grey line behind the points.
+
+    Parameters
+    ----------
+    x : str
+        Variable along x.
+    of : function of array
+    name : str
+        What the legend calls it.
+    start : float, optional
+        Where it begins, by default at the first point.
+    **style
+        As `matplotlib.axes.Axes.plot` takes.
+    """
+
+    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        low, high = float(dataset[x].min()), float(dataset[x].max())
+        low = low if start is None else start
+        at = np.linspace(low, high + 0.03 * (high - low), 200)
+        wide = {"color": "0.8", "linewidth": 2.2, "linestyle": "-", "zorder": 1.5}
+        axes.plot(at, of(at), label=name, **wide | style)
+
+    return mark
+
+
+def figure_name(plot: Any, study: str) -> str:
+    """Name of a figure in a declaration: one that draws any study by its name, panels by that of
+    their study, others by that of their function or module.
+    """
+    if isinstance(plot, Figure):
+        return study
     return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
 
 
@@ -28,10 +188,12 @@ def check_figure(plot: Any) -> None:
     if isinstance(plot, str):
         check_text("plot", plot)
         return
+    if isinstance(plot, Figure):
+        return
     if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
-        rule = "must be a name, or a function or module of yours that draws"
+        rule = "must be a name, a Figure, or a function or module of yours that draws"
         raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
-    name = figure_name(plot)
-    if not is_name(name) or name in _FIGURES:
+    name = figure_name(plot, "")
+    if not is_name(name) or name in ANY_LATTICE or name in catalogue.names():
         rule = "needs a name of its own, which no figure of rsfstudy has"
         raise InvalidValue("plot", name, rule)

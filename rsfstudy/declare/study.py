@@ -61,10 +61,10 @@ class Study:
         What the lattice is reduced to.
     claims : sequence of Claim
         Published values the results are held against.
-    plot : str, function or module
-        What draws the study: a module of `rsfstudy.plots` by its name, or a function
-        ``draw(dataset, axes)`` or a module like those of the user's own. The default, "lines",
-        draws maps where two axes are of numbers.
+    plot : Figure, function, module or str
+        What draws the study: panels, a function ``draw(dataset, axes)`` or a module of such
+        functions, or the name of a named study, whose figure is used. The default, "lines", draws
+        maps where two axes are of numbers.
     references : sequence of str
         Sources of the study.
     accuracy : Accuracy
@@ -371,7 +371,7 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": figure_name(self.plot),
+            "plot": figure_name(self.plot, self.name),
             "references": list(self.references),
             "overrides": dict(self.overrides),
         }

@@ -84,7 +84,7 @@ def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
         remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
         raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
     study = catalogue.load(str(file))
-    if study.name != results.attrs["id"] or figure_name(study.plot) != name:
+    if study.name != results.attrs["id"] or figure_name(study.plot, study.name) != name:
         rule = f"does not draw {name!r} of {results.attrs['id']!r}"
         raise InvalidValue("study", str(file), rule)
     return None if isinstance(study.plot, str) else study.plot

@@ -1,42 +1,48 @@
-"""Figures: ``draw(dataset, axes)`` draws a results dataset and computes nothing; one file each,
-found by name, or a function or module of the user's own.
+"""Figures of results: the `Figure` that a study declares, lines or maps of any lattice, or a
+function ``draw(dataset, axes)`` or a module of the user's own.
 
-A figure of several panels lists its functions of that kind in ``PANELS``, or gives those that a
+A module with several panels lists its functions of that kind in ``PANELS``, or gives those that a
 dataset needs by ``panels(dataset)``; ``COLUMNS`` says how many stand beside each other, and
 ``HEIGHT`` how many mm one is high. How figures look is in ``rsfstudy.mplstyle``.
 """
 
 from __future__ import annotations
 
-import importlib
 import io
 import os
-import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.figure import Figure as Declared
+from rsfstudy.declare.figure import Panel
+from rsfstudy.declare.study import Study
 from rsfstudy.declare.wording import settings
 from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
+from rsfstudy.plots import _panel
 from rsfstudy.plots._style import hold_ticks, letter, make_room, settle, share_legends, size
 from rsfstudy.plots._style import styled as styled
 from rsfstudy.plots._text import pretty, symbol, wrapped
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import quantity
+from rsfstudy.vocabulary import DERIVED, quantity
 
-Panel = Callable[[xr.Dataset, Axes], Axes]
+Draw = Callable[[xr.Dataset, Axes], Any]
 
-NAMES = tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+#: What draws any lattice.
+_ANY = ("lines", "maps")
+#: Names of figures: those, and those of the named studies.
+NAMES = (*_ANY, *catalogue.names())
 
 #: Points an inch of what a notebook shows.
 _ON_SCREEN = 150
@@ -81,17 +87,16 @@ def figure(
         Where there is no such variable or style.
     """
     with styled(style):
-        module = _module(dataset, own) if variable is None else _drawing(dataset, variable)
-        dataset = dataset.squeeze(sorted(_single(dataset, module)), drop=False)
-        panels = _panels(module, dataset)
-        columns = min(getattr(module, "COLUMNS", _COLUMNS), len(panels))
+        drawing, dataset = _fitting(dataset, own, variable)
+        panels = _panels(drawing, dataset)
+        columns = min(drawing.columns, len(panels))
         rows = -(-len(panels) // columns)
-        height = getattr(module, "HEIGHT", None)
-        figure = Drawing(figsize=size(columns, rows, height), layout="constrained")
+        figure = Drawing(figsize=size(columns, rows, drawing.height), layout="constrained")
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)
             _draw(dataset, axes, panel)
+        _panel.settle(panels, drawn)
         for scale in figure.axes:
             if scale not in drawn:
                 hold_ticks(scale)
@@ -105,19 +110,23 @@ def figure(
     return figure
 
 
-def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
+def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | Draw | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
-    module = _module(dataset)
-    dataset = dataset.squeeze(sorted(_single(dataset, module)), drop=False)
-    return _draw(dataset, axes, panel or _panels(module, dataset)[0])
+    drawing, dataset = _fitting(dataset)
+    panel = panel or _panels(drawing, dataset)[0]
+    _draw(dataset, axes, panel)
+    _panel.settle([panel], [axes])
+    return axes
 
 
-def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel) -> Axes:
-    panel(dataset, axes)
+def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel | Draw) -> None:
+    if isinstance(panel, Panel):
+        _panel.draw(panel, dataset, axes)
+    else:
+        panel(dataset, axes)
     lacking = _lacking(dataset)
     if lacking:
         axes.set_title(f"{axes.get_title()}\n[{lacking}]".strip(), color="tab:red")
-    return axes
 
 
 def _lacking(dataset: xr.Dataset) -> str:
@@ -139,46 +148,85 @@ def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:
     return wrapped(f"not as declared: {text}", 55 if columns == 1 else 120)
 
 
-# ---- which module draws, and what ---------------------------------------------------------------
+# ---- what draws ---------------------------------------------------------------------------------
 
 
-def _module(dataset: xr.Dataset, own: Any = None) -> Any:
-    """The module, or an object like one, that draws a dataset: the one it declares, or plain lines
-    or maps if the dataset has more axes than that can show.
+def _fitting(
+    dataset: xr.Dataset, own: Any = None, variable: str | None = None
+) -> tuple[Declared, xr.Dataset]:
+    """What draws a dataset, and the dataset with the axes that it expects: what the study declares,
+    or plain lines or maps if there are more axes than that can show.
     """
-    name = declaration(dataset).plot
-    if name in NAMES:
-        module: Any = importlib.import_module(f"{__name__}.{name}")
-    elif own is None:
+    name, sizes = declaration(dataset).plot, dataset["status"].sizes
+    study = catalogue.load(name) if name in catalogue.names() else None
+    if own is None and study is None and name not in _ANY:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
+    known = {str(dimension) for dimension in sizes}
+    if study is not None and own in (None, study.plot):
+        own, dataset = study.plot, _with_axes(dataset, study)
+        if isinstance(own, Declared) and not own.more_axes:
+            known = set(study.dimensions)
+    elif isinstance(own, Declared):
+        known -= set(declaration(dataset).overrides) - own.dimensions
     else:
-        module = own if hasattr(own, "draw") else SimpleNamespace(draw=own)
-    varied = {str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1}
-    fits = varied <= set(getattr(module, "DIMENSIONS", varied))
-    return module if fits and name != "lines" else _drawing(dataset)
+        known = set(getattr(own, "DIMENSIONS", known))
+    varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
+    if variable is not None or own is None or isinstance(own, str) or not varied <= known:
+        return _of_any(dataset, variable), dataset
+    drawing = own if isinstance(own, Declared) else _of_module(own, dataset)
+    return drawing, dataset.squeeze(sorted(set(map(str, sizes)) - known), drop=False)
 
 
-def _drawing(dataset: xr.Dataset, variable: str | None = None) -> Any:
+def _with_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """The dataset with the axes of its study of which one point was selected."""
+    gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
+    if not gone:
+        return dataset
+    reduced = tuple(reduction.name for reduction in study.reductions)
+    cells = [name for name in dataset.data_vars if not str(name).startswith(reduced)]
+    derived = {
+        name: (axis, np.atleast_1d(dataset[name]), dataset[name].attrs)
+        for name, (axis, _formula) in DERIVED.items()
+        if axis in gone and name in dataset.coords
+    }
+    measured = dataset[cells].drop_vars(derived).expand_dims(gone)
+    return dataset.drop_vars([*cells, *derived, *gone]).merge(measured).assign_coords(derived)
+
+
+def _of_module(own: Any, dataset: xr.Dataset) -> Declared:
+    """A function or module of the user's own."""
+    if hasattr(own, "panels"):
+        found = list(own.panels(dataset))
+    else:
+        draw = getattr(own, "draw", own)
+        found = [panel or draw for panel in getattr(own, "PANELS", (None,))]
+    columns = getattr(own, "COLUMNS", Declared.columns)
+    return Declared(found, columns, getattr(own, "HEIGHT", None))
+
+
+def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:
     """What draws any lattice: maps where it has two numeric axes, else lines."""
     from rsfstudy.plots import _axes, lines, maps
 
     for module in (maps, lines):
         if found := module.panels(dataset, variable):
-            return SimpleNamespace(PANELS=found)
+            return Declared(found)
     choices = [str(name) for name, values in dataset.data_vars.items() if _axes.is_number(values)]
     raise InvalidValue("variable", variable, "is no number of these results", choices=choices)
 
 
-def _panels(module: Any, dataset: xr.Dataset) -> Sequence[Panel]:
-    if hasattr(module, "panels"):
-        return list(module.panels(dataset))
-    return [panel or module.draw for panel in getattr(module, "PANELS", (None,))]
-
-
-def _single(dataset: xr.Dataset, module: Any) -> set[str]:
-    """Dimensions of one point that a figure does not expect."""
-    known = getattr(module, "DIMENSIONS", dataset["status"].dims)
-    return {str(d) for d in dataset["status"].dims if dataset.sizes[d] == 1 and d not in known}
+def _panels(drawing: Declared, dataset: xr.Dataset) -> list[Panel | Draw]:
+    """All panels, each of one point of the axes that have a panel for each."""
+    found = [
+        each
+        for panel in drawing.panels
+        for each in (_panel.expanded(panel, dataset) if isinstance(panel, Panel) else [panel])
+    ]
+    named = [panel.y for panel in drawing.panels if isinstance(panel, Panel)]
+    if not found and not any(isinstance(name, str) and name in dataset for name in named):
+        rule = "does not fit these results (they have none of its variables)"
+        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
+    return found or list(_of_any(dataset).panels)
 
 
 # ---- files --------------------------------------------------------------------------------------

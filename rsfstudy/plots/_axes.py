@@ -4,13 +4,19 @@ what their points are called.
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from rsfstudy.plots._text import label, number, pretty, symbol, wrapped
+from rsfstudy.plots._text import label, number, pretty, stiffness, symbol, wrapped
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -18,6 +24,10 @@ from rsfstudy.vocabulary import coverage, quantity
 _WIDE = 100.0
 #: Log axes that span less than this have numbers between decades too.
 _NARROW = 50.0
+#: Most names along an axis.
+_NAMES = 45
+#: What the points of some axes are said to be.
+_NOUNS = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load point {}"}
 
 
 def is_numeric(dataset: xr.Dataset, dimension: str) -> bool:
@@ -73,24 +83,18 @@ def place(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     value = cell[dimension].item()
     about = quantity(dimension, stated_by(cell.coords.to_dataset()))
     if isinstance(value, str):
-        return pretty(value)
+        return _NOUNS.get(dimension, "{}").format(pretty(value))
+    if dimension == "stiffness_ratio":
+        return stiffness(value)
+    if dimension == "inertia":
+        return "with mass" if value else "without mass"
     units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {pretty(about.units)}")
     return f"{symbol(about)} = {number(value, 4)}{units}"
 
 
-def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str, width: int = 45) -> np.ndarray:
-    """Name the x axis as a dimension, and say where its points are.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    dataset : xarray.Dataset
-    dimension : str
-    width : int
-        Characters in a line.
-    """
+def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
+    """Where the points of a dimension are along x; those that are no numbers are named there."""
     points = dataset[dimension].values
-    axes.set_xlabel(label(quantity(dimension, stated_by(dataset)), width))
     if is_numeric(dataset, dimension):
         return np.asarray(points, dtype=float)
     name_points(axes.xaxis, [str(point) for point in points], max(8, 48 // points.size))
@@ -109,35 +113,42 @@ def log_scale(axes: Axes, which: str) -> None:
     axes.set(**{f"{which}scale": "log"})
     axis: Axis = getattr(axes, f"{which}axis")
     low, high = sorted(axis.get_view_interval())
-    if high < _NARROW * low:
-        between = (2.0, 5.0) if high < 10.0 * low else (3.0,)
+    if high < 3.0 * low:
+        axis.set_major_locator(MaxNLocator(3))
+        axis.set_major_formatter(FuncFormatter(lambda value, _place: number(value)))
+    elif high < _NARROW * low:
+        between: tuple[float, ...] = (3.0,)
+        if high < 10.0 * low:
+            between = (2.0, 5.0) if which == "x" else (2.0, 3.0, 4.0, 6.0, 8.0)
         axis.set_major_locator(LogLocator(subs=(1.0, *between)))
         axis.set_major_formatter(FuncFormatter(lambda value, _place: number(value)))
     axis.set_minor_formatter(NullFormatter())
 
 
-def same_height(axes: Axes, *values: xr.DataArray, log: bool = False) -> None:
-    """Have an axis along y as high as all of these need, so that panels can be compared; one of
-    which nothing is known stays as it is.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    *values : xarray.DataArray
-        What is drawn here and in the panels to compare with.
-    log : bool
-        Whether the axis is to be a log one.
-    """
-    found = np.concatenate([np.ravel(each.values) for each in values])
-    known = found[np.isfinite(found) & ((found > 0.0) | (not log))]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
-    if high > low:
-        margin = (high / low) ** 0.05 if log else 0.05 * (high - low)
-        axes.set_ylim(*((low / margin, high * margin) if log else (low - margin, high + margin)))
-    if log and known.size:
-        log_scale(axes, "y")
-
-
 def name_points(axis: Axis, names: list[str], width: int) -> None:
-    """Ticks at 0, 1, ... with names."""
-    axis.set_ticks(range(len(names)), [wrapped(pretty(name), width) for name in names])
+    """Ticks at 0, 1, ... with names: of all points, or of some where there are many."""
+    some = slice(None, None, -(-len(names) // _NAMES))
+    texts = [wrapped(pretty(name), width) for name in names[some]]
+    axis.set_ticks(range(len(names))[some], texts)
+
+
+# ---- scales of colours --------------------------------------------------------------------------
+
+
+def colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
+    """Colours for the points of an axis of numbers."""
+    points = dataset[dimension].values.astype(float)
+    return np.asarray(_scale(dataset, dimension).to_rgba(points))
+
+
+def colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
+    """Say beside a panel what `colours` stand for."""
+    scale = _scale(dataset, dimension)
+    bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
+    bar.set_label(label(quantity(dimension, stated_by(dataset)), 34))
+
+
+def _scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
+    points = dataset[dimension].values.astype(float)
+    kind = LogNorm if is_log_spaced(points) else Normalize
+    return ScalarMappable(kind(points.min(), points.max()), colormaps["viridis"])

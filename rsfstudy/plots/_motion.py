@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots import Drawing
 from rsfstudy.plots._axes import log_scale
-from rsfstudy.plots._phase_plane import LN10
 from rsfstudy.plots._style import (
     hold_ticks,
     legend,
@@ -32,6 +32,7 @@ from rsfstudy.slider.steady import steady_excess
 
 #: Of a panel, in mm.
 HEIGHT = 48.0
+LN10 = math.log(10.0)
 #: What a motion may be drawn against.
 AGAINST = ("load_point_displacement", "slip", "time")
 #: Change of load point displacement, over slip, below which the load point is held.

@@ -7,7 +7,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import string
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -93,6 +93,17 @@ def letter(panels: Sequence[Axes]) -> None:
             panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
 
 
+def room(axes: Axes) -> tuple[int, int]:
+    """Characters that a line of text along x, and along y, may have."""
+    figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
+    place = axes.get_subplotspec()
+    rows = 1 if place is None else place.get_gridspec().nrows
+    width, height = figure.get_size_inches()
+    across, up = (right - left) * width, height / rows
+    letter = 0.53 * rcParams["font.size"] / 72.0
+    return max(12, int(0.9 * across / letter)), max(12, int(0.9 * up / letter))
+
+
 # ---- legends ------------------------------------------------------------------------------------
 
 
@@ -107,8 +118,10 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     title : str, optional
     """
     handles, labels = axes.get_legend_handles_labels()
-    shown = {label: handle for handle, label in zip(handles, labels, strict=True)}
-    shown = {wrapped(label, 48): shown[label] for label in shown if _is_drawn(shown[label])}
+    shown: dict[str, Any] = {}
+    for handle, label in zip(handles, labels, strict=True):
+        if _is_drawn(handle):
+            shown.setdefault(wrapped(label, 48), handle)
     if not shown:
         return
     lines = 1 + axes.get_xlabel().count("\n")
@@ -127,6 +140,12 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         )
         if made.get_window_extent().width <= 0.97 * (right - left) * figure.bbox.width:
             return
+
+
+def in_grey(axes: Axes, name: str, style: Mapping[str, Any]) -> None:
+    """Name in the legend what is drawn in several colours; the line is out of sight."""
+    line = {"color": "0.3", **style}
+    axes.add_artist(Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, **line))
 
 
 def _slot(axes: Axes) -> tuple[float, float]:
@@ -161,7 +180,9 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     if not alike:
         return
     handles, labels = chosen.get_legend_handles_labels()
-    by_text = {wrapped(label, 48): handle for handle, label in zip(handles, labels, strict=True)}
+    by_text: dict[str, Any] = {}
+    for handle, label in zip(handles, labels, strict=True):
+        by_text.setdefault(wrapped(label, 48), handle)
     title = cast(Legend, chosen.get_legend()).get_title().get_text()
     for panel in alike:
         cast(Legend, panel.get_legend()).remove()

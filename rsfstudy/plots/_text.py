@@ -26,10 +26,38 @@ _SYMBOLS: tuple[tuple[str, str], ...] = (
     (r"\b(sigma|mu)_(?:\*|star\b)", r"$\\\1_*$"),
     (r"\bmu_ss\b", r"$\\mu_{ss}$"),
     (r"\b(alpha|phi|lambda|zeta|theta|Theta)\b", r"$\\\1$"),
+    (r"\beps\b", r"$\\epsilon$"),
     (r"\b10\^(-?\d+)", r"$10^{\1}$"),
     (r"\b1e\+?(-?)0*(\d+)\b", r"$10^{\1\2}$"),
     (r"\b(\d+(?:\.\d+)?)e\+?(-?)0*(\d+)\b", r"$\1\\times10^{\2\3}$"),
 )
+
+
+#: Names that are enough on an axis, where files say more.
+_SHORT = {
+    "a_over_b_minus_a": "",
+    "critical_displacement": "critical displacement",
+    "critical_velocity_ratio": "critical load point velocity",
+    "critical_stiffness": "critical stiffness",
+    "dilatancy": "dilatancy",
+    "drainage": "drainage",
+    "dynamic_stress_drop": "dynamic stress drop",
+    "frictional_stress": "frictional stress",
+    "hold_time": "time of the hold",
+    "instability_norm": "instability norm",
+    "lattice_boundary": "load point velocity",
+    "load_velocity_ratio": "load point velocity",
+    "log10_slip_rate": "slip rate",
+    "log_load_velocity_ratio": "load point velocity",
+    "max_log10_slip_rate": "fastest slip rate",
+    "min_log10_slip_rate": "slowest slip rate",
+    "oscillation_amplitude": "amplitude",
+    "oscillation_period": "period",
+    "peak_log10_slip_rate": "peak slip rate",
+    "slip": "slip",
+    "static_stress_drop": "static stress drop",
+    "stiffness_ratio": "stiffness",
+}
 
 
 def pretty(text: Any) -> str:
@@ -75,9 +103,8 @@ def _length(text: str) -> int:
 
 def label(about: Quantity, width: int = 45) -> str:
     """What a quantity is, its symbol and its units, for an axis."""
-    text = f"{about.long_name[0].upper()}{about.long_name[1:]}"
-    if about.symbol:
-        text += f", {about.symbol}"
+    words = _SHORT.get(about.name, about.long_name.split(":")[0])
+    text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
     powers = re.sub(r"\b([a-zA-Z]+)(-?\d)\b", r"\1$^{\2}$", units)
     return wrapped(pretty(f"{text} ({powers})" if units else text), width)

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 
+from rsfstudy.declare.figure import Panel
 from rsfstudy.files.contents import declaration
-from rsfstudy.plots import Panel
 from rsfstudy.plots._axes import (
     axis_of,
+    colour_bar,
+    colours,
     is_log_spaced,
     is_number,
     is_numeric,
     is_wide,
-    log_scale,
     place,
     varied,
 )
-from rsfstudy.plots._style import legend, look, marker
-from rsfstudy.plots._text import label, pretty, wrapped
+from rsfstudy.plots._style import in_grey, look, marker
+from rsfstudy.plots._text import label, pretty
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import quantity
 
@@ -46,53 +44,47 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     else:
         names = [variable] if variable in dataset and is_number(dataset[variable]) else []
     named = len(names) == 1 and not declaration(dataset).overrides
-    return [_panel(name, dataset.attrs.get("title", "") if named else "") for name in names]
+    return [
+        _panel(dataset, name, dataset.attrs.get("title", "") if named else "") for name in names
+    ]
 
 
-def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """The first variable that was measured."""
-    return panels(dataset)[0](dataset, axes)
+def _panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
+    """All values of a variable."""
+    along = _along(dataset, dataset[name]) if dataset[name].ndim else ""
+    return Panel(
+        x=along,
+        marks=[partial(_lines, name, along)],
+        y_label=label(quantity(name, stated_by(dataset)), 200),
+        title=pretty(title),
+    )
 
 
-def _panel(name: str, title: str) -> Panel:
-    def panel(dataset: xr.Dataset, axes: Axes) -> Axes:
-        _lines(dataset, axes, name)
-        axes.set_title(wrapped(pretty(title), 48))
-        return axes
-
-    return panel
-
-
-def _lines(dataset: xr.Dataset, axes: Axes, name: str) -> None:
-    values = dataset[name].squeeze()
-    if values.ndim == 0:
-        values = values.expand_dims(dataset[name].dims[-1:] or "point")
-        dataset = dataset if dataset[name].dims else dataset.assign_coords(point=[name])
-    along = _along(dataset, values)
-    x = axis_of(axes, dataset, along)
+def _lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
+    values = dataset[name]
+    x = axis_of(axes, dataset, along) if along else np.zeros(1)
+    numeric = bool(along) and is_numeric(dataset, along)
     coloured = _coloured(dataset, values, along)
     others = [str(d) for d in values.dims if d not in (along, coloured)]
     curves = _different(list(_points(values, others)), others)
     for number, (group, text) in enumerate(curves):
         style = look(number) | {"label": text if number < _NAMED and text else None}
-        style["marker"] = marker(number) if x.size <= _MARKED else ""
-        if not is_numeric(dataset, along):
-            style |= {"linestyle": "none", "marker": marker(number)}
+        style["marker"] = marker(number) if x.size <= _MARKED or not numeric else ""
+        style |= {} if numeric else {"linestyle": "none"}
         if coloured is None:
-            axes.plot(x, group.values, **style)
+            axes.plot(x, np.atleast_1d(group.values), **style)
             continue
         for row, colour in _scaled(dataset, group, coloured):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
     if coloured is not None:
-        _scale_beside(dataset, axes, coloured)
-    if is_numeric(dataset, along) and is_log_spaced(x):
-        log_scale(axes, "x")
+        colour_bar(dataset, axes, coloured)
+    if numeric and is_log_spaced(x):
+        axes.set_xscale("log")
     if is_wide(np.asarray(values.values, dtype=float)):
-        log_scale(axes, "y")
-    axes.set_ylabel(label(quantity(name, stated_by(dataset)), 34))
-    count = len(curves)
-    legend(axes, 2, f"the first {_NAMED} of {count}" if count > _NAMED else None)
+        axes.set_yscale("log")
+    if len(curves) > _NAMED:
+        in_grey(axes, f"the first {_NAMED} of {len(curves)}", {"linestyle": "none"})
 
 
 def _along(dataset: xr.Dataset, values: xr.DataArray) -> str:
@@ -133,22 +125,8 @@ def _different(
     ]
 
 
-def _scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
-    """Colours for the points of an axis."""
-    points = dataset[dimension].values.astype(float)
-    kind = LogNorm if is_log_spaced(points) else Normalize
-    return ScalarMappable(kind(points.min(), points.max()), colormaps["viridis"])
-
-
 def _scaled(
     dataset: xr.Dataset, group: xr.DataArray, dimension: str
 ) -> Iterator[tuple[xr.DataArray, Any]]:
     """The values at each point of an axis, with its colour."""
-    colours = _scale(dataset, dimension).to_rgba(dataset[dimension].values.astype(float))
-    return zip(_points(group, [dimension]), colours, strict=True)
-
-
-def _scale_beside(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
-    scale = _scale(dataset, dimension)
-    bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
-    bar.set_label(label(quantity(dimension, stated_by(dataset)), 34))
+    return zip(_points(group, [dimension]), colours(dataset, dimension), strict=True)

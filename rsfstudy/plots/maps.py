@@ -4,35 +4,40 @@ colours with contours; cells that end without a number are hatched, and named.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.colors import LogNorm, Normalize
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
+from scipy.spatial import cKDTree
 
-from rsfstudy.plots import Panel
-from rsfstudy.plots._axes import (
-    axis_of,
-    is_log_spaced,
-    is_number,
-    is_numeric,
-    is_wide,
-    log_scale,
-    measured,
-    place,
-)
-from rsfstudy.plots._map import colours, contours, edges, statuses
-from rsfstudy.plots._style import legend
-from rsfstudy.plots._text import label, pretty, wrapped
+from rsfstudy.declare.figure import Panel
+from rsfstudy.plots._axes import is_log_spaced, is_number, is_numeric, is_wide, measured
+from rsfstudy.plots._text import label, pretty
 from rsfstudy.reduce.base import stated_by
+from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 #: Fewest points of an axis of a map, and most maps.
 _FEWEST, _MOST = 3, 12
+#: Hatches of cells without a number, by the order in which their statuses are met.
+_HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
+#: Part of a panel that a label needs around it.
+_ROOM = 0.06
+#: Part of a panel that a line has to go through for one.
+_LONG = 0.2
+#: Fewest points of an axis along which lines of equal value are drawn.
+_DENSE = 6
+_NAMES = {int(status): status.label for status in Status}
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
@@ -46,14 +51,16 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     plane, cells = _plane(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
         return []
-    others = [d for d in values.dims if d not in plane]
+    others = [str(d) for d in values.dims if d not in plane]
     places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MOST]
-    return [_panel(names[0], plane, dict(zip(others, at, strict=True))) for at in places]
-
-
-def draw(dataset: xr.Dataset, axes: Axes) -> Axes:
-    """The first map."""
-    return panels(dataset)[0](dataset, axes)
+    panel = partial(
+        Panel,
+        x=plane[1],
+        marks=[partial(draw_map, names[0], plane, _scale(values.values.astype(float)))],
+        y_label=label(quantity(plane[0], stated_by(dataset)), 200),
+        title=None if others else pretty(dataset.attrs.get("title", "")),
+    )
+    return [panel(at=dict(zip(others, at, strict=True))) for at in places]
 
 
 def _plane(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
@@ -66,44 +73,142 @@ def _plane(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
     return (numeric[-2], numeric[-1]) if len(numeric) > 1 else None
 
 
-def _panel(name: str, plane: tuple[str, str], where: dict[Any, int]) -> Panel:
-    return lambda dataset, axes: _map(dataset, axes, name, plane, where)
-
-
-def _map(
-    dataset: xr.Dataset, axes: Axes, name: str, plane: tuple[str, str], where: dict[Any, int]
-) -> Axes:
-    here = dataset.isel(where)
-    values = here[name].astype(float).transpose(*plane).sortby(list(plane))
-    here, everywhere = here.sortby(list(plane)), dataset[name].values.astype(float)
+def draw_map(
+    name: str,
+    plane: tuple[str, str],
+    scale: tuple[Normalize, Sequence[float]] | None,
+    dataset: xr.Dataset,
+    axes: Axes,
+) -> None:
+    """A mark: one map over the axes of y and x, by a scale of colours and contours or its own."""
+    dataset = dataset.sortby(list(plane))
+    values = dataset[name].astype(float).transpose(*plane)
     y, x = (values[dimension].values.astype(float) for dimension in plane)
-    at = edges(x, is_log_spaced(x)), edges(y, is_log_spaced(y))
+    at = _edges(x, is_log_spaced(x)), _edges(y, is_log_spaced(y))
+    axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if is_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    for which, points in (("x", x), ("y", y)):
-        if is_log_spaced(points):
-            log_scale(axes, which)
-    if np.isfinite(everywhere).any():
-        norm, levels = _scale(everywhere)
-        drawn = colours(axes, at, values.values, norm=norm)
+    if found := scale or _scale(values.values):
+        drawn = _colours(axes, at, values.values, norm=found[0])
         bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
         bar.set_label(label(quantity(name, stated_by(dataset)), 34))
-        contours(axes, values, levels)
-    status = here["status"].squeeze()
+        contours(axes, values, found[1])
+    status = dataset["status"].squeeze()
     if set(status.dims) == set(plane):
         unknown = ~np.isfinite(values.values)
-        statuses(axes, at, status.transpose(*plane).values, unknown)
-    axis_of(axes, dataset, plane[1], 40)
-    axes.set_ylabel(label(quantity(plane[0], stated_by(dataset)), 34))
-    title = ", ".join(place(here, str(d)) for d in where if dataset.sizes[d] > 1)
-    axes.set_title(wrapped(title or pretty(dataset.attrs.get("title", "")), 44))
-    legend(axes)
-    return axes
+        _statuses(axes, at, status.transpose(*plane).values, unknown)
 
 
-def _scale(values: np.ndarray) -> tuple[Normalize, Sequence[float]]:
-    """A scale of colours, the same in all maps, and where contours are on it."""
+def _scale(values: np.ndarray) -> tuple[Normalize, Sequence[float]] | None:
+    """A scale of colours, and where contours are on it; none where nothing is known."""
+    if not np.isfinite(values).any():
+        return None
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if is_wide(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
         return LogNorm(low, high), LogLocator(subs=subs).tick_values(low, high)
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
+
+
+# ---- what is on a map ---------------------------------------------------------------------------
+
+
+def _edges(points: np.ndarray, log: bool = False) -> np.ndarray:
+    """Where cells end whose centres are these: halfway, on the scale they are drawn on."""
+    if points.size < 2:
+        return np.asarray(
+            [0.9 * points[0], 1.1 * points[0]] if log else [points[0] - 0.5, points[0] + 0.5]
+        )
+    at = np.log(points) if log else points.astype(float)
+    halfway = 0.5 * (at[1:] + at[:-1])
+    ends = np.concatenate([[2.0 * at[0] - halfway[0]], halfway, [2.0 * at[-1] - halfway[-1]]])
+    return np.asarray(np.exp(ends) if log else ends)
+
+
+def _colours(
+    axes: Axes, at: tuple[np.ndarray, np.ndarray], values: np.ndarray, **scale: Any
+) -> QuadMesh:
+    """Cells with their numbers in colours.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    at : tuple of array
+        Edges of the cells along x and along y.
+    values : array
+        Along y, then x.
+    **scale
+        As `matplotlib.axes.Axes.pcolormesh` takes.
+    """
+    axes.grid(False)
+    return axes.pcolormesh(*at, np.ma.masked_invalid(values), rasterized=True, **scale)
+
+
+def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
+    """Lines of equal value, labelled, where there are points enough on both axes; x and y are the
+    coordinates of the last and the first dimension.
+    """
+    y, x = (values[dimension].values for dimension in values.dims)
+    if min(values.shape) < _DENSE or not len(levels):
+        return
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "No contour levels were found")
+        found = axes.contour(x, y, values, levels, colors="white", linewidths=0.6, linestyles="-")
+    for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_clear_places(axes, found)):
+        text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
+
+
+def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
+    """Where the longest line of each level is farthest from those of other levels and from the
+    frame; nowhere where that is too close for a label, or the line too short.
+    """
+    panel = axes.transData + axes.transAxes.inverted()
+    levels = [[panel.transform(part) for part in parts if len(part)] for parts in found.allsegs]
+    places = []
+    for level in filter(None, levels):
+        others = [part for other in levels if other is not level for part in other]
+        line = max(level, key=len)
+        apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
+        room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
+        if room.max() > _ROOM and np.ptp(line, axis=0).max() > _LONG:
+            x, y = panel.inverted().transform(line[room.argmax()]).tolist()
+            places.append((x, y))
+    return places
+
+
+def _statuses(
+    axes: Axes, at: tuple[np.ndarray, np.ndarray], status: np.ndarray, unknown: np.ndarray
+) -> None:
+    """Hatch the cells without a number, each status in its own way, and name it for the legend.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    at : tuple of array
+        Edges of the cells along x and along y.
+    status : array
+        Along y, then x.
+    unknown : array of bool
+        The cells to hatch.
+    """
+    for hatch, code in zip(_HATCHES, np.unique(status[unknown]), strict=False):
+        rows = [_run(at, *run) for run in _runs(unknown & (status == code))]
+        name = _NAMES[int(code)].replace("_", " ") if code else "no number"
+        axes.add_collection(
+            PolyCollection(
+                rows, facecolor="0.93", edgecolor="0.55", linewidth=0.0, hatch=hatch, label=name
+            ),
+            autolim=False,
+        )
+
+
+def _runs(here: np.ndarray) -> list[tuple[int, int, int]]:
+    """Cells side by side: their row, and the first and the one after the last of their columns."""
+    padded = np.pad(here.astype(int), ((0, 0), (1, 1)))
+    change = np.diff(padded, axis=1)
+    first, last = np.argwhere(change == 1), np.argwhere(change == -1)
+    return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
+
+
+def _run(at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int) -> list[tuple[float, float]]:
+    (left, right), (low, high) = (at[0][a], at[0][b]), (at[1][row], at[1][row + 1])
+    return [(left, low), (right, low), (right, high), (left, high)]

@@ -8,12 +8,11 @@ import math
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 
+from rsfstudy.declare.figure import Axes
 from rsfstudy.slider.registry import kinds_with, own_named, without_meaning
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess, stress_at
-from rsfstudy.vocabulary import quantity
 
 LN10 = math.log(10.0)
 
@@ -59,15 +58,18 @@ def _stresses(scene: Scene, excesses: np.ndarray) -> np.ndarray:
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 
-def label_axes(axes: Axes) -> None:
-    """Axis labels of the plane."""
-    axes.set_xlabel(f"Slip rate, {quantity('log10_slip_rate').symbol}")
-    axes.set_ylabel(f"Frictional stress, {quantity('frictional_stress').symbol}")
+def mark_steady(dataset: xr.Dataset, axes: Axes) -> None:
+    """Steady sliding, as far as the axes reach; a mark."""
+    reach, height = axes.get_xlim(), axes.get_ylim()
+    rates = np.linspace(reach[0], reach[1], 400)
+    one = dataset.isel(dict.fromkeys(dataset["status"].dims, 0))
+    axes.plot(rates, steady_line(one, rates), ":", color="0.5", label="steady state")
+    axes.set(xlim=reach, ylim=height)
 
 
-def mark_reversed(axes: Axes) -> None:
+def mark_reversed(_dataset: xr.Dataset, axes: Axes) -> None:
     """Hatch where stress along y is below zero, if the axes reach there: friction of forward slip
-    does not apply.
+    does not apply; a mark.
     """
     lowest, highest = axes.get_ylim()
     if lowest < 0.0:
