@@ -11,17 +11,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api import cell, check, compare, open, plot, rerun, run, studies
+    from rsfstudy.api.one_scene import critical_step, limit_cycle, to_si
+    from rsfstudy.api.runs import cell, check, compare, open, plot, rerun, run, studies
+    from rsfstudy.api.trajectory import simulate
     from rsfstudy.declare.axis import Axis
     from rsfstudy.declare.study import Study
-    from rsfstudy.one_scene import critical_step, limit_cycle, to_si
     from rsfstudy.plots._motion import picture
     from rsfstudy.rig.laboratory import Laboratory
     from rsfstudy.rig.protocol_file import read_protocol
     from rsfstudy.slider.loading import Segment
     from rsfstudy.slider.protocol import protocol
     from rsfstudy.slider.scene import Scene
-    from rsfstudy.trajectory import simulate
 
 # loaded on first use, so that a worker does not import what only its driver needs
 _HOMES = {
@@ -33,18 +33,18 @@ _HOMES = {
     "picture": "plots._motion",
     "Study": "declare.study",
     "Axis": "declare.axis",
-    "run": "api",
-    "rerun": "api",
-    "cell": "api",
-    "open": "api",
-    "check": "api",
-    "compare": "api",
-    "plot": "api",
-    "studies": "api",
-    "simulate": "trajectory",
-    "critical_step": "one_scene",
-    "limit_cycle": "one_scene",
-    "to_si": "one_scene",
+    "run": "api.runs",
+    "rerun": "api.runs",
+    "cell": "api.runs",
+    "open": "api.runs",
+    "check": "api.runs",
+    "compare": "api.runs",
+    "plot": "api.runs",
+    "studies": "api.runs",
+    "simulate": "api.trajectory",
+    "critical_step": "api.one_scene",
+    "limit_cycle": "api.one_scene",
+    "to_si": "api.one_scene",
 }
 
 __all__ = [

@@ -23,7 +23,8 @@ import xarray as xr
 import rsfstudy
 
 # what prints takes its width from the environment when it is loaded: not from that of a test
-from rsfstudy import Axis, Scene, Study, cli, commands  # noqa: F401
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
@@ -164,7 +165,7 @@ def call(*words) -> SimpleNamespace:
         patch.setattr(sys, "stdout", out)
         patch.setattr(sys, "stderr", said)
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            command_line.main()
     texts = [stream.buffer.getvalue().decode() for stream in (out, said)]
     return SimpleNamespace(returncode=ended.value.code, stdout=texts[0], stderr=texts[1])
 
@@ -175,7 +176,7 @@ _COMMAND = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-from rsfstudy.cli import main
+from rsfstudy.cli.command_line import main
 main()
 """
 

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import rsfstudy
-import rsfstudy.accessor  # datasets of others have it too, whichever test is the first
+import rsfstudy.api.accessor  # datasets of others have it too, whichever test is the first
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer

@@ -20,7 +20,7 @@ from running import FAULTY, SMALL, call, called, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.console import console
+from rsfstudy.cli.console import console
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.critical_step import CriticalStep

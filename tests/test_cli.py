@@ -13,8 +13,8 @@ from running import SMALL as LATTICE
 from running import call, named_results
 
 import rsfstudy
-from rsfstudy import assignments, cli
-from rsfstudy.declare import catalogue
+from rsfstudy.cli import assignments, command_line
+from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.claims import Claim
 from rsfstudy.files import store
 from rsfstudy.motion import engines
@@ -28,7 +28,16 @@ SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
 def results(tmp_path_factory):
     """From a process of its own, as a user calls it."""
     output = tmp_path_factory.mktemp("outputs")
-    command = [sys.executable, "-m", "rsfstudy.cli", "run", NAME, *SMALL, "--output", output]
+    command = [
+        sys.executable,
+        "-m",
+        "rsfstudy.cli.command_line",
+        "run",
+        NAME,
+        *SMALL,
+        "--output",
+        output,
+    ]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     return output, ran.stdout
@@ -209,7 +218,7 @@ def test_settings(text, values):
 
 
 def test_help_needs_no_results():
-    assert CliRunner().invoke(cli.cli, ["--help"]).exit_code == 0
+    assert CliRunner().invoke(command_line.cli, ["--help"]).exit_code == 0
 
 
 def test_a_label_may_hold_commas_and_colons(tmp_path):
@@ -228,7 +237,7 @@ def catalogued(monkeypatch):
 
     def named(*studies):
         by_name = {study.name: study for study in studies}
-        monkeypatch.setattr(catalogue, "names", lambda: tuple(by_name))
+        monkeypatch.setattr(names, "names", lambda: tuple(by_name))
         monkeypatch.setattr(catalogue, "load", by_name.__getitem__)
 
     return named
@@ -267,7 +276,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     assert ran.returncode == 1
     assert "taken.cells.sqlite" in ran.stderr.replace("\n", "")
     ended = rows(ran.stdout)
-    assert {name: row[0] for name, row in ended.items() if name in catalogue.names()} == {
+    assert {name: row[0] for name, row in ended.items() if name in names.names()} == {
         "failing": "1 cell_raised",
         "moving": "C1 moved",
         "undrawn": "no figure",

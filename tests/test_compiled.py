@@ -481,7 +481,7 @@ def test_other_processes_find_equations_again(tmp_path):
     """Closures too, by which Numba's own cache would find none: it would write them anew."""
     asks = (
         "from rsfstudy import Scene\n"
-        "from rsfstudy.boundaries.touching import touching_point\n"
+        "from rsfstudy.analysis.touching import touching_point\n"
         "from rsfstudy.motion.compiled.machine import addresses\n"
         "from rsfstudy.motion.engines import compiling\n"
         "from rsfstudy.slider.equations import between_ruptures\n"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from running import SMALL, call, run
 
-from rsfstudy import cost
+from rsfstudy.cli import cost
 from rsfstudy.compute.plan import Plan
 from rsfstudy.motion.accuracy import Accuracy
 

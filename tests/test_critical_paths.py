@@ -7,9 +7,9 @@ import pytest
 from conftest import cot_phi
 
 from rsfstudy import Scene
-from rsfstudy.boundaries import shooting
-from rsfstudy.boundaries.rate_steps import RateSteps
-from rsfstudy.boundaries.touching import touching_point
+from rsfstudy.analysis import shooting
+from rsfstudy.analysis.rate_steps import RateSteps
+from rsfstudy.analysis.touching import touching_point
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow

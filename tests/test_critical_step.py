@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.boundaries import swing
-from rsfstudy.boundaries.rate_steps import RateSteps
-from rsfstudy.boundaries.touching import touching_point
+from rsfstudy.analysis import swing
+from rsfstudy.analysis.rate_steps import RateSteps
+from rsfstudy.analysis.touching import touching_point
 from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep

@@ -10,8 +10,8 @@ import pytest
 from full_equations import FullEquations
 
 from rsfstudy import Scene
-from rsfstudy.boundaries.approach import Approach
-from rsfstudy.boundaries.return_map import ReturnMap, product, section
+from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.return_map import ReturnMap, product, section
 from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy

@@ -25,7 +25,8 @@ import xarray as xr
 from running import SMALL, call, run
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, cli
+from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy.cli import command_line
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.linear_stability import LinearStability
@@ -255,7 +256,7 @@ def commands(place: Path) -> dict[str, list[str]]:
 WORDS = ["", "-", "a=b", "=", "nan", "-1", "1e400", "\x1b[31m", "ä\udcff", "a" * 300, "a/" * 3000]
 OPTIONS = [
     (name, parameter)
-    for name, command in cli.cli.commands.items()
+    for name, command in command_line.cli.commands.items()
     for parameter in command.params
     if not getattr(parameter, "is_flag", False) and parameter.name not in ("scheduler", "workers")
 ]
@@ -284,7 +285,7 @@ def test_output_that_cannot_hold_a_character(encoding, columns, tmp_path):
     run(LATTICE.with_(b_over_a=[2.0, 3.0]), output=tmp_path, command="rsfstudy run Größe ζ ✓")
     for words in (["show"], ["compare", tmp_path / "lattice.nc"]):
         ran = subprocess.run(
-            [sys.executable, "-m", "rsfstudy.cli", *words, tmp_path / "lattice.nc"],
+            [sys.executable, "-m", "rsfstudy.cli.command_line", *words, tmp_path / "lattice.nc"],
             capture_output=True,
             env={**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": columns},
             check=False,

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import rsfstudy
 from rsfstudy import Scene, protocol
-from rsfstudy.boundaries.swing import swing
+from rsfstudy.analysis.swing import swing
 from rsfstudy.errors import Incomplete, NoAnswer
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.triggers import Triggers

@@ -16,7 +16,8 @@ from faulty import declared
 from running import FAULTY, HANGS, call, run, run_with_failures
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, assignments, terminal
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.cli import assignments, terminal
 from rsfstudy.compute import clusters, runner, worker_log, workers
 from rsfstudy.compute.plan import Batches
 from rsfstudy.errors import Incomplete, InvalidValue, RunError
@@ -270,7 +271,7 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
     words = shlex.split(commands[0])
     assert words[-2:] == ["--cell", "b_over_a=2.5"]
     alone = subprocess.run(
-        [sys.executable, "-m", "rsfstudy.cli", *words[1:]],
+        [sys.executable, "-m", "rsfstudy.cli.command_line", *words[1:]],
         capture_output=True,
         text=True,
         check=False,

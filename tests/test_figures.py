@@ -14,7 +14,7 @@ from running import call, named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import names
 from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
@@ -28,7 +28,7 @@ MM = 25.4
 SLACK = 0.01
 
 
-@pytest.fixture(scope="module", params=catalogue.names())
+@pytest.fixture(scope="module", params=names.names())
 def figure(request, tmp_path_factory, cluster):
     """The figure of enough of each study."""
     dataset, _path = named_results(request.param, tmp_path_factory, client=cluster)

@@ -20,7 +20,7 @@ import rsfstudy
 from rsfstudy import Scene, plots
 from rsfstudy.compute.plan import cell_key
 from rsfstudy.compute.provenance import git_state
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents, restore, store
 from rsfstudy.files.journal import Journal, Layout
@@ -321,7 +321,7 @@ def test_a_file_says_from_which_checkout_it_comes():
 # ---- from the file alone ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", catalogue.names())
+@pytest.mark.parametrize("name", names.names())
 def test_every_declaration_restores_its_study(name):
     study = catalogue.load(name)
     described = json.loads(json.dumps(study.describe()))

@@ -14,7 +14,7 @@ from running import named_results
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.boundaries.cycles import cycles
+from rsfstudy.analysis.cycles import cycles
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.effect_cost import EffectCost

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.boundaries import held
+from rsfstudy.analysis import held
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.boundaries.swing import friction_acts_alone, neutral, orbits_may_close, swing
+from rsfstudy.analysis.swing import friction_acts_alone, neutral, orbits_may_close, swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import KINDS, CriticalStep

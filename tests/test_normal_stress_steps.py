@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rsfstudy import Laboratory, Scene, protocol, simulate
-from rsfstudy.boundaries.swing import swing
+from rsfstudy.analysis.swing import swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow

@@ -275,7 +275,7 @@ def test_parts_that_no_file_can_hold():
 
 def test_numbers_named_as_those_of_a_fit_are_only_numbers(tmp_path, capsys):
     """A run prints the slopes of its reductions, not what looks like one."""
-    from rsfstudy import terminal
+    from rsfstudy.cli import terminal
 
     class Likely(Own):
         variables = dict.fromkeys(("total", "total_stderr", "cheapest_integrator"), ())

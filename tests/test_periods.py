@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.boundaries import return_map
-from rsfstudy.boundaries.approach import Approach
-from rsfstudy.boundaries.cycles import Cycle
-from rsfstudy.boundaries.periods import course, recurrence
-from rsfstudy.boundaries.return_map import ReturnMap, product, section
+from rsfstudy.analysis import return_map
+from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.cycles import Cycle
+from rsfstudy.analysis.periods import course, recurrence
+from rsfstudy.analysis.return_map import ReturnMap, product, section
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import LimitCycle

@@ -6,7 +6,7 @@ import re
 import pytest
 from running import call
 
-from rsfstudy import progress
+from rsfstudy.api import progress
 
 RUN = ("run", "rate_step_boundary", "--serial", "--set", "case=constant normal stress")
 

@@ -12,7 +12,7 @@ import pytest
 from running import call, named_results
 
 import rsfstudy
-from rsfstudy.cli import cli
+from rsfstudy.cli.command_line import cli
 from rsfstudy.slider import laws
 from rsfstudy.slider.parts import names_of
 

@@ -13,7 +13,8 @@ from faulty import declared
 from running import HANGS, SMALL, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Scene, Study, api
+from rsfstudy import Scene, Study
+from rsfstudy.api import runs
 from rsfstudy.compute import plan, runner, workers
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Measure, Outcome
@@ -159,7 +160,7 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
 
         def ran(name, fault=""):
             study = replace(declared(fault, (3.0,) if fault else ()), name=name)
-            results = api.prepared(study, runner.Keeping(output=tmp_path), where, False)()
+            results = runs.prepared(study, runner.Keeping(output=tmp_path), where, False)()
             return [Status(code).name for code in results["status"].values]
 
         assert not started

@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from running import FAULTY, HANGS, called, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, terminal
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.cli import terminal
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, restore, store
@@ -492,8 +493,8 @@ def test_an_output_that_can_be_no_directory(output):
 @pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])
 def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    monkeypatch.setattr("rsfstudy.api.prepared", lambda _s, _k, workers, _p: workers.threads)
-    monkeypatch.setattr("rsfstudy.api.runner.failures", lambda _results: {})
+    monkeypatch.setattr("rsfstudy.api.runs.prepared", lambda _s, _k, workers, _p: workers.threads)
+    monkeypatch.setattr("rsfstudy.api.runs.runner.failures", lambda _results: {})
     assert run(workers=most) == most
     for use in (lambda: run(workers=most + 1), lambda: run(workers=10**100)):
         with pytest.raises(InvalidValue, match=f"must be at most {most} here: 4 for each core"):
@@ -550,7 +551,7 @@ def test_a_command_may_hold_bytes_that_are_no_text(tmp_path, monkeypatch):
 def test_a_full_disk_where_the_output_goes_is_told(tiny, tmp_path):
     file = sealed(tiny, tmp_path / "tiny.nc")
     with open("/dev/full", "w") as full:
-        words = [sys.executable, "-m", "rsfstudy.cli", "show", file]
+        words = [sys.executable, "-m", "rsfstudy.cli.command_line", "show", file]
         shown = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (shown.returncode, shown.stderr) == (
         1,

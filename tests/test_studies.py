@@ -19,13 +19,13 @@ from running import enough, named_results
 
 import rsfstudy
 from rsfstudy import plots, vocabulary
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.status import Status
 
 FLAGS = {"status", "regime", "inertia", "regularised"}
 
 
-@pytest.fixture(scope="module", params=catalogue.names())
+@pytest.fixture(scope="module", params=names.names())
 def result(request, tmp_path_factory, cluster):
     """What is enough of each study, on two workers, and where its file is."""
     return named_results(request.param, tmp_path_factory, client=cluster)
@@ -210,7 +210,7 @@ def test_a_plot_outside_of_the_package_is_never_imported(result):
         plots.figure(dataset)
 
 
-@pytest.mark.parametrize("result", catalogue.names()[::3], indirect=True, scope="module")
+@pytest.mark.parametrize("result", names.names()[::3], indirect=True, scope="module")
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"

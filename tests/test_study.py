@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute.plan import Batch, Plan, cell_key
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
@@ -310,7 +310,7 @@ MIXED = Study(
 )
 
 
-@pytest.mark.parametrize("name", ["mixed", *catalogue.names()])
+@pytest.mark.parametrize("name", ["mixed", *names.names()])
 def test_what_travels_in_columns_is_what_the_declaration_says(name):
     """The name of each cell, its scene, and what it changes of the measure; of large lattices, for
     a sample of their cells.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.boundaries.overdamped import levels_of_rise, rises_to_load_point
+from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggers import TRIGGERS, Triggers
 from rsfstudy.motion.accuracy import Accuracy

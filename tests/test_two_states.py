@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.boundaries import swing
+from rsfstudy.analysis import swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle

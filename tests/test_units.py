@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from running import called
 
-from rsfstudy import Laboratory, assignments, read_protocol
+from rsfstudy import Laboratory, read_protocol
+from rsfstudy.cli import assignments
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import _KNOWN, factor, in_si
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _PACKAGE = Path(__file__).parent.parent
 #: Code whose change may change a number.
-_PHYSICS = ("slider", "motion", "boundaries", "measures")
+_PHYSICS = ("slider", "motion", "analysis", "measures")
 
 
 def sources(package: Path) -> dict[str, bytes]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import difflib
 import importlib
 import importlib.util
-import pkgutil
 import sys
 import traceback
 from dataclasses import replace
@@ -14,39 +12,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.errors import InvalidValue
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
-
-#: Where the files of `studies/` are installed.
-_PACKAGE = "rsfstudy.named_studies"
-
-
-def names() -> tuple[str, ...]:
-    """Names of the studies, in alphabetical order; files that start with _ are shared by them."""
-    package = importlib.import_module(_PACKAGE)
-    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
-    return tuple(sorted(name for name in modules if not name.startswith("_")))
-
-
-def titles() -> dict[str, str]:
-    """Titles of the studies, by name, as they stand in their files: none is run, because that would
-    load all that studies are made of.
-    """
-    (place,) = importlib.import_module(_PACKAGE).__path__
-    files = {name: Path(place, f"{name}.py") for name in names()}
-    return {name: _title(file.read_bytes()) for name, file in files.items()}
-
-
-def _title(source: bytes) -> str:
-    """The text given as ``title`` to the call whose value is named `study`."""
-    # what stands before it need not be parsed, which would take as long again
-    declared = ast.parse(source[source.index(b"\nstudy = ") :]).body[0]
-    assert isinstance(declared, ast.Assign)
-    assert isinstance(declared.value, ast.Call)
-    given = {keyword.arg: keyword.value for keyword in declared.value.keywords}
-    return str(ast.literal_eval(given["title"]))
 
 
 def load(name: str) -> Study:
@@ -64,7 +34,7 @@ def load(name: str) -> Study:
         near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
         remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
         raise InvalidValue("study", name, "is unknown", choices=near, remedy=remedy)
-    study: Study = importlib.import_module(f"{_PACKAGE}.{name}").study
+    study: Study = importlib.import_module(f"{PACKAGE}.{name}").study
     return study
 
 

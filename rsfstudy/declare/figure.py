@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import check_text
+from rsfstudy.declare.names import names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 
@@ -194,6 +194,6 @@ def check_figure(plot: Any) -> None:
         rule = "must be a name, a Figure, or a function or module of yours that draws"
         raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
     name = figure_name(plot, "")
-    if not is_name(name) or name in ANY_LATTICE or name in catalogue.names():
+    if not is_name(name) or name in ANY_LATTICE or name in names():
         rule = "needs a name of its own, which no figure of rsfstudy has"
         raise InvalidValue("plot", name, rule)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.axis import check_text
 from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
@@ -65,7 +65,7 @@ def _of_study(name: str, output: Path) -> Path:
             f"{file} does not exist, but {partial} does: run the study again, or name it."
         )
     there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
-    if not there and name not in catalogue.names():
+    if not there and name not in names.names():
         rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
-        raise InvalidValue("study", name, rule, choices=catalogue.names(), remedy=remedy)
+        raise InvalidValue("study", name, rule, choices=names.names(), remedy=remedy)
     return file

@@ -11,9 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import LN10, Cycle, more_events
-from rsfstudy.boundaries.periods import Course, course
-from rsfstudy.boundaries.return_map import Orbit, ReturnMap
+from rsfstudy.analysis.cycles import LN10, Cycle, more_events
+from rsfstudy.analysis.periods import Course, course
+from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_leaves_alone

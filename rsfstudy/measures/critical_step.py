@@ -18,12 +18,12 @@ from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.boundaries.by_path import Boundary, from_touching_cycle, from_touching_path
-from rsfstudy.boundaries.displacement_steps import DisplacementSteps
-from rsfstudy.boundaries.normal_stress_steps import NormalStressSteps
-from rsfstudy.boundaries.rate_steps import RateSteps
-from rsfstudy.boundaries.sought import Steps
-from rsfstudy.boundaries.swing import Swing, neutral, orbits_may_close, ratio_after, swing
+from rsfstudy.analysis.by_path import Boundary, from_touching_cycle, from_touching_path
+from rsfstudy.analysis.displacement_steps import DisplacementSteps
+from rsfstudy.analysis.normal_stress_steps import NormalStressSteps
+from rsfstudy.analysis.rate_steps import RateSteps
+from rsfstudy.analysis.sought import Steps
+from rsfstudy.analysis.swing import Swing, neutral, orbits_may_close, ratio_after, swing
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step

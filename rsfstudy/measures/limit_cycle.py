@@ -22,10 +22,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.boundaries.approach import Approach
-from rsfstudy.boundaries.cycles import LN10, Cycle, more_events
-from rsfstudy.boundaries.periods import Course, course
-from rsfstudy.boundaries.return_map import Orbit, ReturnMap
+from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.cycles import LN10, Cycle, more_events
+from rsfstudy.analysis.periods import Course, course
+from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._recorded import recorded

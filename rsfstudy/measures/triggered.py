@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.boundaries.swing import neutral, swing
+from rsfstudy.analysis.swing import neutral, swing
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import Accuracy

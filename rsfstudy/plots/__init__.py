@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.figure import Figure as Declared
 from rsfstudy.declare.figure import Panel
 from rsfstudy.declare.study import Study
@@ -42,7 +42,7 @@ Draw = Callable[[xr.Dataset, Axes], Any]
 #: What draws any lattice.
 _ANY = ("lines", "maps")
 #: Names of figures: those, and those of the named studies.
-NAMES = (*_ANY, *catalogue.names())
+NAMES = (*_ANY, *names.names())
 
 #: Points an inch of what a notebook shows.
 _ON_SCREEN = 150
@@ -158,7 +158,7 @@ def _fitting(
     or plain lines or maps if there are more axes than that can show.
     """
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
-    study = catalogue.load(name) if name in catalogue.names() else None
+    study = catalogue.load(name) if name in names.names() else None
     if own is None and study is None and name not in _ANY:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contest.hand import Found
 from contest.problem import BUDGET, Problem, meter
-from rsfstudy.boundaries.cycles import cycles
+from rsfstudy.analysis.cycles import cycles
 from rsfstudy.motion.accuracy import Accuracy
 
 

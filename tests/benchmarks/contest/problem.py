@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.boundaries.approach import Approach
-from rsfstudy.boundaries.cycles import _asked, cycles
+from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.cycles import _asked, cycles
 from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, rise, settling

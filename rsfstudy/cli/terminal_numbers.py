@@ -14,7 +14,7 @@ import xarray as xr
 from rich import box
 from rich.table import Column, Table
 
-from rsfstudy.console import console
+from rsfstudy.cli.console import console
 from rsfstudy.declare.wording import listed, short
 from rsfstudy.errors import brief
 from rsfstudy.files import numbers

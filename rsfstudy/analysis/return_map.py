@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import NUMBERS, Cycle, cycles, orbit_of
+from rsfstudy.analysis.cycles import NUMBERS, Cycle, cycles, orbit_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.meter import Halt, Meter

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import Cycle, cycles
-from rsfstudy.boundaries.return_map import Orbit, ReturnMap, section
+from rsfstudy.analysis.cycles import Cycle, cycles
+from rsfstudy.analysis.return_map import Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.scene import Scene

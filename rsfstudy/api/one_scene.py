@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.doors import door
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import Measure, Value

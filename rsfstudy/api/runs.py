@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 import xarray as xr
 
-import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
+from rsfstudy.api.progress import compile_with_notice, shown
 from rsfstudy.compute import code_digest, provenance, runner
 from rsfstudy.compute.cells import Task, sendable, serial
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
@@ -32,7 +32,6 @@ from rsfstudy.files.comparison import (
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
-from rsfstudy.progress import compile_with_notice, shown
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
 @door
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
-    return {name: catalogue.load(name) for name in catalogue.names()}
+    return {name: catalogue.load(name) for name in names.names()}
 
 
 @door

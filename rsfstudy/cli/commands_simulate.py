@@ -7,16 +7,16 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy import assignments, terminal, terminal_numbers
-from rsfstudy.console import console
+from rsfstudy.api.trajectory import BEYOND
+from rsfstudy.api.trajectory import simulate as simulated
+from rsfstudy.cli import assignments, terminal, terminal_numbers
+from rsfstudy.cli.console import console
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.protocol_file import read_protocol
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.trajectory import BEYOND
-from rsfstudy.trajectory import simulate as simulated
 
 #: Exit status where a motion passes the instability norm with neither mass nor damping.
 _NO_PHYSICS = 3

@@ -15,10 +15,11 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from rsfstudy import api, cost, terminal_numbers
+from rsfstudy.api import runs
+from rsfstudy.cli import cost, terminal_numbers
+from rsfstudy.cli.console import console
 from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
-from rsfstudy.console import console
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
 from rsfstudy.declare.wording import settings, short
@@ -132,7 +133,7 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
     """How a run ended, in few words."""
-    claimed = api.check(dataset)
+    claimed = runs.check(dataset)
     wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
     verdicts = ""
     if len(claimed):
@@ -263,7 +264,7 @@ def checked(dataset: xr.Dataset) -> int:
     """Print the claims and the failed cells; FAILED where a verdict is not the expected one, a cell
     failed, or none of the study's claims could be held against anything.
     """
-    verdicts = api.check(dataset)
+    verdicts = runs.check(dataset)
     vacuous = len(verdicts) > 0 and bool(verdicts["verdict"].eq(NOT_APPLICABLE).all())
     status = max(claims(dataset), failures(dataset))
     if vacuous:
@@ -273,7 +274,7 @@ def checked(dataset: xr.Dataset) -> int:
 
 def claims(dataset: xr.Dataset) -> int:
     """Print the claims; FAILED where a verdict is not the expected one."""
-    table_of = api.check(dataset)
+    table_of = runs.check(dataset)
     overrides = contents.declaration(dataset).overrides
     console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
     if overrides:
@@ -286,7 +287,7 @@ def claims(dataset: xr.Dataset) -> int:
 
 def all_claims(datasets: Sequence[xr.Dataset]) -> int:
     """Print the claims of several studies in one table, in the order of their identifiers."""
-    frames = [api.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
+    frames = [runs.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
     together = pd.concat([frame for frame in frames if len(frame)] or [pd.DataFrame()])
     if together.empty:
         return OK

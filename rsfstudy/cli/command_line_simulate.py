@@ -79,6 +79,6 @@ def simulate(**given: Any) -> int:
     passes the instability norm with neither mass nor radiation damping, beyond which it is no
     physics; else 0.
     """
-    from rsfstudy import commands_simulate
+    from rsfstudy.cli import commands_simulate
 
     return commands_simulate.simulate(**given)

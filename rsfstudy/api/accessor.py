@@ -90,7 +90,7 @@ class Accessor:
         **scales
             ``normal_stress``, ``slip_distance`` and ``reference_rate`` of `rsfstudy.to_si`.
         """
-        from rsfstudy.one_scene import to_si
+        from rsfstudy.api.one_scene import to_si
 
         self._must_be_ours()
         return to_si(self._dataset, **scales)
@@ -98,11 +98,11 @@ class Accessor:
     @door
     def check(self) -> pd.DataFrame:
         """The claims of the study held against the dataset, as `rsfstudy.check` gives them."""
-        from rsfstudy import api
+        from rsfstudy.api import runs
 
         self._must_be_of_a_study()
         self._must_be_whole("claims are held against")
-        return api.check(self._dataset)
+        return runs.check(self._dataset)
 
     @door
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
@@ -114,12 +114,12 @@ class Accessor:
             As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
             `rsfstudy.picture` for a motion (`laboratory`, `against`).
         """
-        from rsfstudy import api
+        from rsfstudy.api import runs
         from rsfstudy.plots._motion import picture
 
         if self._is_study:
             self._must_be_whole("figures show")
-            return api.plot(self._dataset, *what, **how)
+            return runs.plot(self._dataset, *what, **how)
         if "load_point_displacement" not in self._dataset:
             text = "only motions have a picture: draw its variables, as in"
             raise DataError(f"{text} cycle.plot.scatter('log10_slip_rate', 'shear_stress')")
@@ -191,9 +191,9 @@ class Backend(BackendEntrypoint):
         self, filename_or_obj: str | Path, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
         """The results in a file, in memory."""
-        from rsfstudy import api
+        from rsfstudy.api import runs
 
-        return api.open(filename_or_obj).drop_vars(drop_variables or [])
+        return runs.open(filename_or_obj).drop_vars(drop_variables or [])
 
 
 def _cell_of(dataset: xr.Dataset, study: Study) -> int:

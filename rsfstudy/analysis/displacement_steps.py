@@ -6,8 +6,8 @@ import math
 import sys
 from collections.abc import Iterable, Iterator
 
-from rsfstudy.boundaries.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
-from rsfstudy.boundaries.touching import displacement_on_path
+from rsfstudy.analysis.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
+from rsfstudy.analysis.touching import displacement_on_path
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import log_rate_at

@@ -9,10 +9,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from rsfstudy.boundaries.shooting import LOOSE
-from rsfstudy.boundaries.sought import Steps
-from rsfstudy.boundaries.swing import stability_margin
-from rsfstudy.boundaries.touching import goes_beyond
+from rsfstudy.analysis.shooting import LOOSE
+from rsfstudy.analysis.sought import Steps
+from rsfstudy.analysis.swing import stability_margin
+from rsfstudy.analysis.touching import goes_beyond
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.meter import TIGHTEST, Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.boundaries.swing import settles
+from rsfstudy.analysis.swing import settles
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.equations import log_rate_at
 from rsfstudy.slider.scene import Scene

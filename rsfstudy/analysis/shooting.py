@@ -11,8 +11,8 @@ from typing import ClassVar
 
 from scipy.optimize import brentq
 
-from rsfstudy.boundaries.sought import Steps
-from rsfstudy.boundaries.touching import cycle_misfit, rate_step_misfit
+from rsfstudy.analysis.sought import Steps
+from rsfstudy.analysis.touching import cycle_misfit, rate_step_misfit
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.scene import Scene
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsfstudy.boundaries.cycles import LN10, NUMBERS, Cycle, cycles, more_events, orbit_of
-from rsfstudy.boundaries.return_map import Orbit, ReturnMap, section
+from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events, orbit_of
+from rsfstudy.analysis.return_map import Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene

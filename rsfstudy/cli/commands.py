@@ -16,18 +16,19 @@ from typing import Any
 import click
 import xarray as xr
 
-from rsfstudy import api, assignments, terminal, terminal_numbers
+from rsfstudy.api import runs
+from rsfstudy.cli import assignments, terminal, terminal_numbers
+from rsfstudy.cli.console import console, stderr
+from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import SharedProcesses, Workers
-from rsfstudy.console import console, stderr
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore
 from rsfstudy.motion.engines import lacking
-from rsfstudy.terminal import FAILED, OK, Ended
 
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 _RESULTS = (".nc", ".zarr")
@@ -38,7 +39,7 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None, output: Path)
     if Path(name).suffix in _RESULTS:
         if settings or rtol is not None:
             raise click.UsageError("a results file is shown as it is, without --set or --rtol")
-        return terminal.results(api.open(name), name)
+        return terminal.results(runs.open(name), name)
     terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol), output)
     return OK
 
@@ -77,7 +78,7 @@ def run(
             log = output / "workers.log"
             shared = stack.enter_context(SharedProcesses(where.processes, log))
             where = replace(where, shared=shared)
-        ready = [(study, api.prepared(study, keeping, where, not quiet)) for study in studies]
+        ready = [(study, runs.prepared(study, keeping, where, not quiet)) for study in studies]
         for study in studies if rtol is not None else ():
             terminal.announce(study)
         if every:
@@ -162,7 +163,7 @@ def rerun(
     if place:
         try:
             with warnings.catch_warnings(record=True) as caught:
-                scene, outcome = api.cell(file, dict(map(assignments.place, place)), study=study)
+                scene, outcome = runs.cell(file, dict(map(assignments.place, place)), study=study)
         except RsfStudyError:
             raise
         except Exception:  # it fails as it fails
@@ -170,7 +171,7 @@ def rerun(
             return FAILED
         return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
     with _client(scheduler, serial) as client:
-        table = api.rerun(
+        table = runs.rerun(
             file,
             study=study,
             workers=0 if serial else workers,
@@ -185,18 +186,18 @@ def rerun(
 def compare(first: str, second: str, output: Path) -> int:
     """Compare two results files."""
     files = [places.results(name, output) for name in (first, second)]
-    datasets = [api.open(file) for file in files]
-    return terminal_numbers.comparison(files, datasets, api.compare(*datasets))
+    datasets = [runs.open(file) for file in files]
+    return terminal_numbers.comparison(files, datasets, runs.compare(*datasets))
 
 
 def check(name: str | None, every: bool, output: Path) -> int:
     """Hold results against published values."""
     if not every:
-        return terminal.checked(api.open(_results(name, every)[0], output))
+        return terminal.checked(runs.open(_results(name, every)[0], output))
     status, datasets = OK, []
-    for what in catalogue.names():
+    for what in names.names():
         if (output / f"{what}.nc").exists():
-            datasets.append(api.open(what, output))
+            datasets.append(runs.open(what, output))
         elif why := lacking(catalogue.load(what).accuracy.engine):
             console.print(f"{what}: left out: {why}", style="yellow")
         else:
@@ -219,7 +220,7 @@ def plot(
     target = _target(output, form, every)
     for what in _results(name, every):
         results = places.results(what, OUTPUT if target else output)
-        dataset = api.open(results)
+        dataset = runs.open(results)
         place = results if output is None else output / results.name
         own = None if variable else _own_figure(dataset, study)
         drawn = _drawn(dataset, target or look.beside(place), look, own)
@@ -254,11 +255,11 @@ def _check_directory(output: Path | None) -> None:
 def _results(name: str | None, every: bool) -> list[str]:
     if every == (name is not None):
         raise click.UsageError("name one study, or say --all")
-    return list(catalogue.names()) if name is None else [name]
+    return list(names.names()) if name is None else [name]
 
 
 def _declared(study: Study, settings: tuple[str, ...], **accuracy: Any) -> Study:
-    return api.declaration(study, assignments.overrides(study, settings), **accuracy)
+    return runs.declaration(study, assignments.overrides(study, settings), **accuracy)
 
 
 @contextlib.contextmanager

@@ -17,8 +17,8 @@ from typing import Any
 
 import click
 
-from rsfstudy import cli_simulate, options
-from rsfstudy.declare import catalogue
+from rsfstudy.cli import command_line_simulate, options
+from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS
 from rsfstudy.doors import in_words
 from rsfstudy.errors import (
@@ -131,7 +131,7 @@ def _warn(message: Warning | str) -> None:
 
 
 def _say(text: str) -> None:
-    from rsfstudy.console import stderr
+    from rsfstudy.cli.console import stderr
 
     stderr.print(text)
 
@@ -141,7 +141,7 @@ def _say(text: str) -> None:
 def list_studies(context: click.Context) -> None:
     """Name the studies."""
     text = context.make_formatter()
-    text.write_dl(list(catalogue.titles().items()))
+    text.write_dl(list(names.titles().items()))
     text.write_paragraph()
     text.write_text("rsfstudy show NAME tells what one consists of, rsfstudy run NAME computes it.")
     click.echo(text.getvalue().rstrip())
@@ -159,7 +159,7 @@ def show(**given: Any) -> int:
     long as its cells took last where they are kept in OUTPUT. Of a results file: its numbers, where
     they come from, and how to reproduce each cell that failed.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.show(**given)
 
@@ -195,7 +195,7 @@ def run(**given: Any) -> int:
     Of a study, by its NAME or file: OUTPUT/NAME.nc, its figure OUTPUT/NAME.png, its reductions and
     its claims. Cells that are finished already are kept: the same command goes on where it ended.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.run(**given)
 
@@ -209,7 +209,7 @@ def check(**given: Any) -> int:
 
     Those of a named study, or of a results file. Fails where a verdict is not the one expected.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.check(**given)
 
@@ -228,7 +228,7 @@ def plot(**given: Any) -> int:
     Of a named study's results, or of a file. A figure of your own is taken from the file that
     --study names, which is run.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.plot(**given)
 
@@ -244,7 +244,7 @@ def compare(**given: Any) -> int:
     numbers held against the sum of both error estimates. Exit status 0 where nothing differs beyond
     them, 1 where a number or a status does, or no cell is in both.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.compare(**given)
 
@@ -275,12 +275,12 @@ def rerun(**given: Any) -> int:
 
     It is computed from what the file says of itself. Fails where a number is not the same.
     """
-    from rsfstudy import commands
+    from rsfstudy.cli import commands
 
     return commands.rerun(**given)
 
 
-cli.add_command(cli_simulate.simulate)
+cli.add_command(command_line_simulate.simulate)
 
 if __name__ == "__main__":
     main()

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rsfstudy.boundaries.held import excess_of_peak
-from rsfstudy.boundaries.overdamped import levels_of_rise, rises_to_load_point
-from rsfstudy.boundaries.touching import cycle_misfit
+from rsfstudy.analysis.held import excess_of_peak
+from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
+from rsfstudy.analysis.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling

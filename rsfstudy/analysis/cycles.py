@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.boundaries.swing import settles
+from rsfstudy.analysis.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling

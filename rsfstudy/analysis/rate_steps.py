@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from rsfstudy.boundaries.shooting import LOOSE, ShotSteps
-from rsfstudy.boundaries.swing import swing
+from rsfstudy.analysis.shooting import LOOSE, ShotSteps
+from rsfstudy.analysis.swing import swing
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady

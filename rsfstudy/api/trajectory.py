@@ -12,7 +12,6 @@ from typing import Any, Never
 import numpy as np
 import xarray as xr
 
-import rsfstudy.accessor  # noqa: F401  # datasets have it from now on
 from rsfstudy.doors import door
 from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy

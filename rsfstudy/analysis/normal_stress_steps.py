@@ -6,9 +6,9 @@ import math
 
 from scipy.optimize import brentq
 
-from rsfstudy.boundaries.shooting import LOOSE, ShotSteps
-from rsfstudy.boundaries.sought import RISE_OF_MASS, SMALLEST_STEP, UNSEEN, falls_behind
-from rsfstudy.boundaries.swing import orbits_may_close, stability_margin, swing
+from rsfstudy.analysis.shooting import LOOSE, ShotSteps
+from rsfstudy.analysis.sought import RISE_OF_MASS, SMALLEST_STEP, UNSEEN, falls_behind
+from rsfstudy.analysis.swing import orbits_may_close, stability_margin, swing
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import on_slow_manifold
