@@ -72,5 +72,5 @@ class Output(Quantity):
 
 
 def is_name(name: object) -> bool:
-    """Whether a text can name a variable: an identifier, as a file gives it back."""
+    """True if a text can name a variable: an identifier, as a file gives it back."""
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)

@@ -57,7 +57,7 @@ CLOSE = 0.8
 
 
 def is_beyond(softest: float, dataset: xr.Dataset) -> bool:
-    """Whether some springs are softer than that, and some stiffer."""
+    """True if some springs are softer than that, and some stiffer."""
     ratio = dataset["stiffness_ratio"]
     return not softest or bool(ratio.min() < softest < ratio.max())
 

@@ -86,7 +86,7 @@ DROPS = ("static", "dynamic")
 
 
 def is_straight(drop: str, row: xr.Dataset) -> bool:
-    """Whether a line in ln V_0 fits a stress drop."""
+    """True if a line in ln V_0 fits a stress drop."""
     values, misfit = row[f"{drop}_stress_drop"], float(row.get(f"{drop}_slope_misfit", math.nan))
     return misfit <= CURVED * float(values.max() - values.min())
 

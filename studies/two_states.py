@@ -118,7 +118,7 @@ def abscissa(magnified: bool) -> Draw:
 
 
 def has_doublings(dataset: xr.Dataset) -> bool:
-    """Whether there are springs enough to be magnified."""
+    """True if there are springs enough to be magnified."""
     ratio = dataset["stiffness_ratio"].where(dataset["peak_spread"].notnull())
     return 2 < int((ratio < ratio.min() + 0.019).sum()) < int(ratio.notnull().sum())
 

@@ -116,7 +116,7 @@ class Approach:
             self._slopes = sides[0] @ np.linalg.inv(sides[1])
 
     def _repeats(self) -> bool:
-        """Whether the next cycles would all be the same: as the derivatives say, or because the
+        """True if the next cycles would all be the same: as the derivatives say, or because the
         last two are.
         """
         numbers = self.seen[-1].numbers()
@@ -131,7 +131,7 @@ class Approach:
         return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
 
     def _may_leap(self) -> bool:
-        """Whether to leap to the fixed point: not where the next cycle comes as close, nor where
+        """True if to leap to the fixed point: not where the next cycle comes as close, nor where
         that is far, because the swings may be headed for steady sliding; and not again where the
         last leap came no closer, because leaps may go round in a circle.
         """

@@ -70,7 +70,7 @@ class Cycle(NamedTuple):
 
     @property
     def swing(self) -> float:
-        """How far ln V swings."""
+        """Range of ln V."""
         return self.fastest - self.slowest
 
     def numbers(self) -> np.ndarray:
@@ -122,12 +122,12 @@ def cycles(
 
 
 def more_events(events: int, name: str = "events") -> str:
-    """How to wait for more events, to be added to a message."""
+    """Remedy of waiting for more events, to be added to a message."""
     return f"--set {name}={2 * events} ({name}=) waits for more"
 
 
 def orbit_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
-    """What was recorded along cycles that follow each other; their ends, where nothing was."""
+    """Record of cycles that follow each other; their ends, where nothing was."""
     begin, end = seen[0].begin, seen[-1].end
     passed = math.fsum(cycle.interval for cycle in seen)
     slip = scene.load_velocity * passed - (end.spring - begin.spring) / scene.stiffness
@@ -141,7 +141,7 @@ def orbit_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -
 
 @lru_cache(maxsize=256)
 def _asked(load: float) -> tuple[Watch, ...]:
-    """What a motion has to tell for its cycles to be seen, at ln(V_0/V_*)."""
+    """Event specifications by which cycles of a motion are seen, at ln(V_0/V_*)."""
     return (
         maximum("log_rate", waits=True),
         minimum("log_rate", waits=True),
@@ -152,7 +152,7 @@ def _asked(load: float) -> tuple[Watch, ...]:
 
 
 def _dies_down(swings: list[float]) -> bool:
-    """Whether swings that shrink, time after time, are headed for nothing rather than for a cycle.
+    """True if swings that shrink, time after time, are headed for nothing rather than for a cycle.
 
     Geometrically extrapolated from the last three; near the onset of stick-slip cycles shrink
     slowly to a finite limit.
@@ -201,7 +201,7 @@ class _Watch:
         )
 
     def _landed(self) -> Point | None:
-        """Where slip is slower than V_0 after the rupture, and friction balances the spring."""
+        """Point where slip is slower than V_0 after the rupture, and friction balances the spring."""
         for fallen, event in enumerate(self._seen):
             if event.kind is Kind.FALL:
                 after = self._seen[fallen:]

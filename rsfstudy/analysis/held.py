@@ -1,4 +1,4 @@
-"""How high the slip rate of a motion rises under a load point at rest.
+"""Highest slip rate of a motion under a load point at rest.
 
 Spring stress can only fall there. With one state the first peak of ln V is the last: where ln V is
 stationary slip weakens, and goes on to weaken less, so that ln V has no minimum. Several states may
@@ -69,7 +69,7 @@ def _watches(scene: Scene, norm: float, *, heavy: bool) -> list[Watch]:
 
 
 def _was_last(scene: Scene, event: Event) -> bool:
-    """Whether no peak comes after an event, or none that reaches the norm."""
+    """True if no peak comes after an event, or none that reaches the norm."""
     slows = event.kind is Kind.START and event.point.growth <= 0.0
     if scene.states == 1:
         return slows or event.kind is Kind.MAXIMUM
@@ -79,7 +79,7 @@ def _was_last(scene: Scene, event: Event) -> bool:
 
 
 def _stays_below_norm(scene: Scene, point: Point) -> bool:
-    """Whether it can be proved that ln V, which falls, will not reach the norm.
+    """True if it can be proved that ln V, which falls, will not reach the norm.
 
     A state that strengthens tends to where it would rest at the present slip rate, and goes on to
     strengthen while that rises, which it does with falling ln V where b > 0. Pore pressure may

@@ -135,7 +135,7 @@ class NormalStressSteps(ShotSteps):
         return min(_LARGEST_CHANGE, (1.0 - 1e-6) * -math.log(self.scene.mu_star * follows))
 
     def _may_slide(self, size: float) -> bool:
-        """Whether sliding can be steady after a step, or needs not because the load point rests."""
+        """True if sliding can be steady after a step, or needs not because the load point rests."""
         scene = self.scene_at(size)
         load = scene.log_load_rate
         return load == -math.inf or steady.steady_sliding(scene, load) is not None

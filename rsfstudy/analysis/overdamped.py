@@ -32,8 +32,8 @@ _SLOW = 0.02
 
 
 def levels_of_rise(scene: Scene) -> list[Watch]:
-    """What to be told of to ask `rises_to_load_point`: nothing where the motion is not slow there,
-    or there are several states or mass, of which it knows nothing.
+    """Event specifications that are needed to ask `rises_to_load_point`: nothing where the motion
+    is not slow there, or there are several states or mass, of which it knows nothing.
     """
     load = scene.log_load_rate
     if scene.states > 1 or scene.has_mass:
@@ -44,7 +44,7 @@ def levels_of_rise(scene: Scene) -> list[Watch]:
 
 
 def rises_to_load_point(scene: Scene, point: Point) -> bool:
-    """Whether ln V rises from a point to that of the load point and not beyond, as far as places on
+    """True if ln V rises from a point to that of the load point and not beyond, as far as places on
     the way tell.
     """
     change, load = _changes(scene), scene.log_load_rate

@@ -27,7 +27,7 @@ _REPELS, _OFF = 1.01, 0.02
 
 @dataclass(frozen=True)
 class Course:
-    """Where a motion has come to.
+    """State of a motion in its course.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def course(
 
 
 def _on_its_way(seen: Sequence[Cycle]) -> bool:
-    """Whether events are too few to say anything of them, or still grow or shrink all the time."""
+    """True if events are too few to say anything of them, or still grow or shrink all the time."""
     growth = np.diff([cycle.swing for cycle in seen[len(seen) // 2 :]])
     return len(seen) < _FIRST_LOOK or bool((growth > 0.0).all() or (growth < 0.0).all())
 

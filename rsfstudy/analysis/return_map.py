@@ -77,7 +77,7 @@ class Orbit:
 
     @property
     def period(self) -> int:
-        """How many events it has."""
+        """Number of its events."""
         return len(self.events)
 
     @property
@@ -87,7 +87,7 @@ class Orbit:
 
     @property
     def implied(self) -> np.ndarray:
-        """What the numbers of its first event lack, because its events do not close."""
+        """Corrections of the numbers of its first event, because its events do not close."""
         return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
 
     @property
@@ -103,12 +103,12 @@ class Orbit:
 
     @property
     def attracts(self) -> bool:
-        """Whether motions close to it come closer."""
+        """True if motions close to it come closer."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @property
     def from_largest(self) -> Orbit:
-        """The same, beginning with the event that has the fastest peak."""
+        """This course, beginning with the event that has the fastest peak."""
         at = max(range(self.period), key=lambda place: self.events[place].fastest)
         if not at:
             return self
@@ -168,7 +168,7 @@ class ReturnMap:
         return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
 
     def _acts(self, point: Point) -> bool:
-        """Whether mass acts beyond what the slow manifold holds of it."""
+        """True if mass acts beyond what the slow manifold holds of it."""
         if not self.scene.has_mass:
             return False
         missing = point.spring - point.friction

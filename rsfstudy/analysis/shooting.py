@@ -138,7 +138,7 @@ class ShotSteps(Steps):
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
     def _way(self, misfit: float) -> int:
-        """Whether a misfit tells that the critical size is larger (1) or smaller (-1); 0 where it
+        """True if a misfit tells that the critical size is larger (1) or smaller (-1); 0 where it
         does not.
         """
         if self.sign != self.triggers or math.isnan(misfit):

@@ -1,4 +1,4 @@
-"""What the kinds of steps among which a critical one is sought have in common."""
+"""Base of the kinds of steps among which a critical one is sought."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Steps:
         return iter(())
 
     def mass_delays(self, size: float, rtol: float) -> bool:
-        """Whether the critical size is not that of the critical path's start, because slip rate
+        """True if the critical size is not that of the critical path's start, because slip rate
         takes time to rise to that after the step.
         """
         return False
@@ -102,7 +102,7 @@ class Steps:
         return 0.0
 
     def smaller_ones_decay(self, size: float) -> bool:
-        """Whether steady sliding is linearly stable after every smaller step.
+        """True if steady sliding is linearly stable after every smaller step.
 
         Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
         stiffness falls with the load point velocity, so the ends of the range decide, unless the

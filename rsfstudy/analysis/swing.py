@@ -43,7 +43,7 @@ _TOP = maximum("log_rate")
 
 @dataclass(frozen=True)
 class Swing:
-    """How the motion after a step went.
+    """Motion after a step, and its outcome.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
 
 
 def friction_acts_alone(scene: Scene) -> bool:
-    """Whether effective normal stress is constant once the loading has changed it, and only
+    """True if effective normal stress is constant once the loading has changed it, and only
     friction damps.
     """
     varies = scene.parts.normal_stress.follows_friction or scene.parts.fluid.effects
@@ -132,7 +132,7 @@ def friction_acts_alone(scene: Scene) -> bool:
 
 
 def orbits_may_close(scene: Scene) -> bool:
-    """Whether every orbit closes at critical stiffness."""
+    """True if every orbit closes at critical stiffness."""
     law = scene.parts.law
     return law.orbits_close and not law.feels_stress and friction_acts_alone(scene)
 
@@ -145,7 +145,7 @@ def ratio_after(scene: Scene) -> float:
 
 
 def neutral(scene: Scene, within: float) -> bool:
-    """Whether stiffness is so close to the critical one, both at V_* and at the load point
+    """True if stiffness is so close to the critical one, both at V_* and at the load point
     velocity, that growth and decay cannot be told apart: by most laws it is critical at every rate
     or at none, where friction acts alone. Where all orbits close at critical stiffness, that is
     known; with the load point held there are none.
@@ -157,7 +157,7 @@ def neutral(scene: Scene, within: float) -> bool:
 
 
 def settles(scene: Scene) -> bool:
-    """Whether steady sliding at the scene's load point velocity is linearly stable; a held load
+    """True if steady sliding at the scene's load point velocity is linearly stable; a held load
     point is.
     """
     return stability_margin(scene) >= -_NEUTRAL
@@ -191,7 +191,7 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
 
 
 def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
-    """Whether the orbit that touches the norm peaks lower the next time: paths cannot cross, so
+    """True if the orbit that touches the norm peaks lower the next time: paths cannot cross, so
     that none inside of it ever reaches the norm.
     """
     misfit = cycle_misfit(scene, accuracy.solver, meter)
@@ -270,7 +270,7 @@ def _orbit(
 
 
 class _Repeating:
-    """Whether a motion of several states has come to a cycle that repeats, or as close to rest as
+    """True if a motion of several states has come to a cycle that repeats, or as close to rest as
     the tolerance lets it: at some peaks in a row its unknowns are the same, as far as numbers tell.
     Where steady sliding is unstable, and growth too small to be measured, the motion goes on.
     """
@@ -280,7 +280,7 @@ class _Repeating:
         self._before, self._same = (math.inf,) * (1 + scene.states), 0
 
     def has(self, peak: Point) -> bool:
-        """Whether it has at this peak."""
+        """True if it has at this peak."""
         now = (peak.spring, *peak.psis)
         change = max(abs(x - y) for x, y in zip(now, self._before, strict=True))
         linear = peak.log_rate - self._steady.log_rate < _LINEAR and not self._steady.stable
@@ -290,7 +290,7 @@ class _Repeating:
 
 
 def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) -> bool:
-    """Whether the last peak is no higher than the one before, as far as numbers tell. Too small to
+    """True if the last peak is no higher than the one before, as far as numbers tell. Too small to
     be measured, growth has the sign that linear theory gives it.
     """
     slack = 100.0 * accuracy.solver
@@ -299,7 +299,7 @@ def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) 
 
 
 def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
-    """What changes sign at the boundary, as far as this orbit shows it."""
+    """Excess that changes sign at the boundary, as far as this orbit shows it."""
     if heavy:
         highest = max((orbit.top_at_start, *orbit.peaks))
         return highest - norm if highest > -math.inf else -norm
@@ -325,7 +325,7 @@ def _steady(scene: Scene) -> _Steady:
 
 
 def _decays(scene: Scene) -> bool:
-    """Whether small changes of steady sliding decay, which those of several states may do below the
+    """True if small changes of steady sliding decay, which those of several states may do below the
     critical stiffness.
     """
     return bool(stability.growth_rates(scene, scene.log_load_rate)[0].real < -_NEUTRAL)

@@ -160,7 +160,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
 
 
 def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
-    """How much higher in ln V than the norm the motion peaks one orbit after it has touched the
+    """Height in ln V above the norm of the peak of the motion one orbit after it has touched the
     norm; zero where a limit cycle touches it.
 
     None where the motion does not come back.
@@ -175,7 +175,7 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
 
 
 def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
-    """Whether the motion that touches the norm goes beyond it when it comes back, so that others
+    """True if the motion that touches the norm goes beyond it when it comes back, so that others
     may reach it by their second peak; by laws whose orbits close at critical stiffness none does.
     """
     if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:

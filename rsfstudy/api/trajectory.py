@@ -232,5 +232,5 @@ def _increasing(times: Any, duration: float | None) -> np.ndarray | None:
 
 
 def _is_positive(value: object) -> bool:
-    """Whether it is a number that can be a duration."""
+    """True if it is a number that can be a duration."""
     return isinstance(value, int | float | np.number) and bool(0.0 < value < math.inf)

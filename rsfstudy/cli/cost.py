@@ -56,7 +56,7 @@ def clock(seconds: float) -> str:
 
 
 def _alike(plan: Plan, took: journal.Timed) -> bool:
-    """Whether cells were computed as accurately as they are to be now, and by the same engine."""
+    """True if cells were computed as accurately as they are to be now, and by the same engine."""
     asked = plan.study.accuracy
     return took.fingerprint.get("rtol") == asked.rtol and took.fingerprint.get("engine") == (
         asked.engine

@@ -166,14 +166,14 @@ class _Walk:
 
 
 def _is_documented(code: CodeType) -> bool:
-    """Whether the first constant is a docstring, or has its place."""
+    """True if the first constant is a docstring, or has its place."""
     if sys.version_info >= (3, 13):
         return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
 
 
 def _inits_itself(kind: type) -> bool:
-    """Whether a class is a dataclass whose ``__init__`` was made for it."""
+    """True if a class is a dataclass whose ``__init__`` was made for it."""
     params = vars(kind).get("__dataclass_params__")
     return params is not None and params.init
 
@@ -195,7 +195,7 @@ def _is_filled(cell: Any) -> bool:
 
 
 def _is_own(name: str | None) -> bool:
-    """Whether a module is neither Python's nor installed nor of rsfstudy."""
+    """True if a module is neither Python's nor installed nor of rsfstudy."""
     top = (name or "").partition(".")[0]
     if not top or top == _PACKAGE or (top in sys.stdlib_module_names and top != "__main__"):
         return False

@@ -264,11 +264,11 @@ def _hopeless(cells: int, status: str, message: str) -> RunError:
 
 
 def counts(dataset: xr.Dataset) -> Mapping[str, int]:
-    """How many cells ended with each status."""
+    """Number of cells that ended with each status."""
     status = np.asarray(dataset["status"].values)
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
 
 
 def failures(dataset: xr.Dataset) -> Mapping[str, int]:
-    """How many cells failed with each status."""
+    """Number of cells that failed with each status."""
     return {label: n for label, n in counts(dataset).items() if label.upper() not in _ANSWERS}

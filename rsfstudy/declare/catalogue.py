@@ -78,7 +78,7 @@ def _run(given: Path) -> ModuleType:
 
 
 def _is_beside(name: str, path: Path) -> bool:
-    """Whether a module is a file, or in a package, in the same directory."""
+    """True if a module is a file, or in a package, in the same directory."""
     top = sys.modules.get(name.partition(".")[0])
     places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
     return any(Path(place).parent == path.parent for place in places if place)

@@ -182,12 +182,12 @@ def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, A
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value is a number that a float can hold."""
+    """True if a value is a number that a float can hold."""
     return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
 
 
 def _keeps(dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]) -> bool:
-    """Whether a variable still has every dimension that was changed."""
+    """True if a variable still has every dimension that was changed."""
     changed = {str(d) for n in overrides if n in dataset.coords for d in dataset[n].dims}
     return variable not in dataset or changed <= set(dataset[variable].dims)
 

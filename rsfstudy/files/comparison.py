@@ -72,7 +72,7 @@ def _finished(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
-    """Whether two variables have the same shape, and both or neither hold real numbers."""
+    """True if two variables have the same shape, and both or neither hold real numbers."""
     return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
 
 

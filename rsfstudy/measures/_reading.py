@@ -37,7 +37,7 @@ class Reading(Measure):
 
     @property
     def points(self) -> int:
-        """How many points of the record are kept."""
+        """Number of points of the record that are kept."""
         return int(self.plain_fields["phases"])
 
     @property

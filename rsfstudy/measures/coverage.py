@@ -1,4 +1,4 @@
-"""Whether error estimates cover: a random scene, measured as asked and a hundred times tighter."""
+"""True if error estimates cover: a random scene, measured as asked and a hundred times tighter."""
 
 from __future__ import annotations
 

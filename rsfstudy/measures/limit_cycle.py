@@ -204,7 +204,7 @@ def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
 def judged(
     accuracy: Accuracy, one: Orbit, again: Orbit, places: Sequence[int]
 ) -> tuple[Status, str]:
-    """Whether the headline numbers of a cycle at these places are known well enough to be ok, from
+    """True if the headline numbers of a cycle at these places are known well enough to be ok, from
     two runs, and why not.
     """
     errors = cycle_errors(accuracy, one, again) / _scales(one)

@@ -148,7 +148,7 @@ class _Record(NamedTuple):
         return complex(spring[self.periods] / imposed[self.periods])
 
     def is_as(self, other: _Record) -> bool:
-        """Whether spring stress is the same: in the median, for where it jumps an instant may come
+        """True if spring stress is the same: in the median, for where it jumps an instant may come
         before or after.
         """
         apart = np.abs(self.spring - other.spring)

@@ -121,7 +121,7 @@ class StepResponse(Measure):
 
 
 def _tops_at_start(scene: Scene, event: Event) -> bool:
-    """Whether mass rises to a maximum at the start: as a jump where the motion begins on the slow
+    """True if mass rises to a maximum at the start: as a jump where the motion begins on the slow
     manifold, and the tolerance does not ask to follow the rise.
     """
     return _jumps(scene) and event.kind is Kind.START and event.point.growth <= 0.0
@@ -134,5 +134,5 @@ def _left_out(scene: Scene, accuracy: Accuracy) -> float:
 
 
 def _jumps(scene: Scene) -> bool:
-    """Whether slip rate rises from V_* to another one against mass."""
+    """True if slip rate rises from V_* to another one against mass."""
     return scene.has_mass and (scene.begins_elsewhere or scene.spring_stress_step > 0.0)

@@ -1,4 +1,4 @@
-"""Whether the step of a scene triggers instability: yes or no."""
+"""True if the step of a scene triggers instability: yes or no."""
 
 from __future__ import annotations
 

@@ -255,7 +255,7 @@ class VelocityStep(Reading):
         return next((event for event in events if event.watch == watch), None)
 
     def _shown(self, scene: Scene, step: _Step, record: _Record) -> dict[str, float | np.ndarray]:
-        """Whether friction has settled, how far it departs from that of a stiff slider, and the
+        """True if friction has settled, how far it departs from that of a stiff slider, and the
         record itself.
         """
         rows, friction = record.rows, friction_of(record.rows)
@@ -312,7 +312,7 @@ def _departure(scene: Scene, step: _Step, record: _Record) -> float:
 
 
 def _has_closed_form(scene: Scene, step: _Step, record: _Record) -> bool:
-    """Whether friction alone acts, and slides steadily before the step, at a rate from which the
+    """True if friction alone acts, and slides steadily before the step, at a rate from which the
     law counts.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid

@@ -141,7 +141,7 @@ def error_between(
 
 
 def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:
-    """What an accuracy costs over what the default one does, from measured costs by digits."""
+    """Cost of an accuracy over that of the default one, from measured costs by digits."""
     known = sorted(by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)
     above = next((d for d in known[1:] if d >= digits), known[-1])

@@ -1,4 +1,4 @@
-"""What the loop of motions asks of its arrays and equations, in plain Python.
+"""Calls of the loop of motions on its arrays and equations, in plain Python.
 
 Uncompiled, arrays are memoryviews, and an equation is a function that fills one. The compiler has
 pointers and addresses in their place (`compiled.calls`).

@@ -71,7 +71,7 @@ def _filling(
 
 
 def rates_into(rate_of: Function, unknowns: Function, numbers: Function, count: int) -> Function:
-    """What fills in the rates of so many unknowns."""
+    """Function that fills in the rates of so many unknowns."""
 
     def fill_rates(y, rates, p, result):  # type: ignore[no-untyped-def]
         for i in range(count):
@@ -84,7 +84,7 @@ def rates_into(rate_of: Function, unknowns: Function, numbers: Function, count: 
 
 
 def point_into(point_of: Function, unknowns: Function, numbers: Function, states: int) -> Function:
-    """What fills in the columns of a point, of unknowns and their rates."""
+    """Function that fills in the columns of a point, of unknowns and their rates."""
 
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_RATE] = math.nan
@@ -108,7 +108,9 @@ def point_into(point_of: Function, unknowns: Function, numbers: Function, states
 
 
 def balance_into(balance_of: Function, psis_of: Function, numbers: Function) -> Function:
-    """What fills in ln(V/V_*) and friction on the slow manifold, at a spring stress and states."""
+    """Function that fills in ln(V/V_*) and friction on the slow manifold, at a spring stress and
+    states.
+    """
 
     def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[0] = result[1] = math.nan

@@ -104,8 +104,8 @@ def follow(
 def _begun(
     event: Event, before: tuple[Point, Numbers], acting: Scene, watches: Sequence[Watch]
 ) -> Iterator[Event]:
-    """That a later segment has begun, and what happened where it did, after a point with the
-    numbers of the segment before.
+    """Events where a later segment begins: that it does, and what happens there, after a point with
+    the numbers of the segment before.
     """
     yield event._replace(kind=Kind.SEGMENT)
     for watch, point in happening(*before, event.point, acting.numbers, watches):

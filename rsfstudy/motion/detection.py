@@ -51,7 +51,7 @@ NOWHERE, BEFORE, AFTER = range(3)
 
 
 def quantity(watch, columns, p):
-    """What changes sign where it happens: a slope, or the distance from a level."""
+    """Quantity that changes sign where it happens: a slope, or the distance from a level."""
     if watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM:
         if watch[OF] == LOG_RATE:
             return columns[GROWTH]
@@ -67,7 +67,7 @@ def watch_of(space, number):
 
 
 def waits(space):
-    """Whether the asker can wait for anything; for the beginning then, too."""
+    """True if the asker can wait for anything; for the beginning then, too."""
     found = False
     for w in range(space.watched):
         found = found or watch_of(space, w)[WAITS] != 0.0
@@ -83,7 +83,7 @@ def excess(motion, columns, limits):
 
 
 def happens(watch, before, after, direction):
-    """Whether a quantity that changes so has done what is watched for."""
+    """True if a quantity that changes so has done what is watched for."""
     upwards = watch[KIND] == RISE or watch[KIND] == MINIMUM
     # against the clock, slopes change sign the other way round
     if direction < 0.0 and (watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM):
@@ -168,7 +168,7 @@ def report_beginning(motion, space, last, events, limits):
 
 
 def between(watch: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
-    """Whether what is watched for happens where a motion jumps from the last point of one regime or
+    """True if what is watched for happens where a motion jumps from the last point of one regime or
     segment to the first of another: `NOWHERE`, or at the more extreme one, or the first beyond the
     level, which is `BEFORE` or `AFTER` the jump.
     """

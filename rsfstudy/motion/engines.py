@@ -1,4 +1,6 @@
-"""What integrates motions: SciPy, steps of our own in plain Python, or those compiled by Numba."""
+"""Engines that integrate motions: SciPy, steps of our own in plain Python, or those compiled by
+Numba.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,7 @@ def know(steppers: Iterable[type]) -> None:
 
 
 def _origin(stepper: type) -> tuple[str, str]:
-    """Where a stepper is defined: what it has in common with an earlier definition of it."""
+    """Module and name of a stepper, which an earlier definition of it shares."""
     return stepper.__module__, stepper.__qualname__
 
 
@@ -72,7 +74,7 @@ def _unknown(engine: Any) -> InvalidValue:
 
 @dataclass
 class Compiling:
-    """What has been compiled in this process; found in the cache, it does not count.
+    """Record of what has been compiled in this process; found in the cache, it does not count.
 
     Attributes
     ----------
@@ -92,7 +94,7 @@ compiling = Compiling()
 
 
 def lacking(name: str) -> str:
-    """What has to be installed for an engine, in words; empty where nothing has."""
+    """Packages that an engine lacks, in words; empty where none."""
     try:
         check_engine(name)
     except InvalidValue:
@@ -111,12 +113,12 @@ def check_engine(name: str) -> None:
 
 
 def is_installed(name: str) -> bool:
-    """Whether an engine can be used here, as far as one can tell without loading it."""
+    """True if an engine can be used here, as far as one can tell without loading it."""
     return name != COMPILED or importlib.util.find_spec("numba") is not None
 
 
 def stepper_of(name: str, systems: Any, methods: Mapping[str, str]) -> Any:
-    """What takes the steps of a motion through regimes with these systems of equations; 0, which
+    """Stepper of a motion through regimes with these systems of equations; 0, which
     stands for it, where it is compiled.
     """
     if name == COMPILED:

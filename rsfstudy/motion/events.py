@@ -1,4 +1,4 @@
-"""What a motion tells: a table of events in order, each with its time, slip and point.
+"""Events of a motion: a table in order, each with its time, slip and point.
 
 Who measures a motion asks to be told of
 
@@ -42,7 +42,7 @@ class Kind(StrEnum):
 
 
 class Watch(NamedTuple):
-    """What to be told of; whether the motion ends there; and whether whoever asks can wait for it,
+    """Event specification; whether the motion ends there; and whether whoever asks can wait for it,
     and for the beginning, until something else has happened: an engine may then tell several events
     at once.
     """

@@ -69,7 +69,7 @@ def norm_at(log_rate: float, given: Limits) -> float:
 
 
 def weight_of_mass(log_rate: float, missing: float, given: Limits) -> float:
-    """How much mass matters where friction differs from spring stress by what is `missing`: 1 where
+    """Weight of mass where friction differs from spring stress by what is `missing`: 1 where
     the slow manifold has to be left.
     """
     correction = abs(missing) / given.a / given.correction
@@ -85,7 +85,7 @@ def slip_of_rise(log_rate: float, after: float, given: Limits) -> float:
 
 
 def begins_slow(log_rate: float, below: float, missing: float, given: Limits) -> bool:
-    """Whether a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
+    """True if a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
     `below`, and friction differs from spring stress by what is `missing` there.
     """
     rate = norm_at(log_rate, given) / given.norm
@@ -94,7 +94,7 @@ def begins_slow(log_rate: float, below: float, missing: float, given: Limits) ->
 
 
 def may_return(log_rate: float, given: Limits) -> bool:
-    """Whether ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
+    """True if ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
     straight back in its turn.
     """
     return norm_at(log_rate, given) < 0.5 * given.norm
@@ -103,7 +103,7 @@ def may_return(log_rate: float, given: Limits) -> bool:
 def has_returned(
     log_rate: float, growth: float, below: float, missing: float, given: Limits
 ) -> bool:
-    """Whether the full equations have done their work at ln(V/V_*) and its growth, where the slow
+    """True if the full equations have done their work at ln(V/V_*) and its growth, where the slow
     manifold has ln(V/V_*) `below`, and friction differs from spring stress by what is `missing`.
 
     The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
@@ -126,7 +126,7 @@ def has_returned(
 
 
 def termination_of(log_rate: float, normal_stress: float, load_velocity: float) -> int:
-    """Whether a motion goes on: not where normal stress vanishes, or normal stress or slip rate
+    """True if a motion goes on: not where normal stress vanishes, or normal stress or slip rate
     grow without bound, or slip stops.
 
     Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
@@ -143,7 +143,7 @@ def termination_of(log_rate: float, normal_stress: float, load_velocity: float) 
 
 
 def margin(log_rate: float, normal_stress: float, load_velocity: float) -> float:
-    """How far ln V and the logarithm of normal stress are from where a motion ends: positive where
+    """Margin of ln V and of the logarithm of normal stress to where a motion ends: positive where
     it goes on.
     """
     stress = math.log(max(normal_stress, LEAST_STRESS))

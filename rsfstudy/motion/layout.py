@@ -1,4 +1,4 @@
-"""Where the loop of motions finds and leaves its numbers: the state of a motion, and its tables."""
+"""Layout of the numbers of the loop of motions: the state of a motion, and its tables."""
 
 from __future__ import annotations
 

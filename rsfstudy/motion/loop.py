@@ -133,7 +133,7 @@ def advance(memory, y, last, block, plan, watches, samples, events, rows, steppe
 
 
 def is_full(motion, watched, events, rows):
-    """Whether the tables have no room for all that one more step may add to them."""
+    """True if the tables have no room for all that one more step may add to them."""
     full = len(events) - motion.events < 2 * watched + 4
     return full or (len(rows) > 0 and len(rows) - motion.recorded < 2 * SAMPLES)
 
@@ -213,7 +213,7 @@ def through_regime(motion, space, last, samples, events, rows, limits):
 
 
 def goes_on(motion, space, limits):
-    """Whether a motion does, if only through this step: that then ends where the motion does."""
+    """True if a motion does, if only through this step: that then ends where the motion does."""
     columns, velocity = space.after, space.p[LOAD_VELOCITY]
     motion.stress = columns[RATIO]
     motion.termination = termination_of(columns[LOG_RATE], motion.stress, velocity)
@@ -256,7 +256,7 @@ def end_in_time(motion, space, clock, limits):
 
 
 def returns(motion, space, limits):
-    """Whether the full equations have done their work."""
+    """True if the full equations have done their work."""
     if motion.regime == SLOW or not may_return(space.after[LOG_RATE], limits):
         return False
     columns, below = space.after, space.between

@@ -1,4 +1,4 @@
-"""What a motion spends, the tolerances that bound its steps, and why it may end early."""
+"""Work that a motion spends, the tolerances that bound its steps, and why it may end early."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TIGHTEST = 5e-14
 
 
 def more_work(budget: int) -> str:
-    """How to allow more than a budget, to be added to a message."""
+    """Remedy of allowing more than a budget, to be added to a message."""
     return f"; --budget {4 * budget} (budget=) allows more"
 
 
@@ -30,8 +30,8 @@ class Halt(Exception):
 
 @dataclass
 class Meter:
-    """What one measurement spends, by regime, with which integrators; ends it when its budget is
-    spent.
+    """Work that one measurement spends, by regime, with which integrators; ends it when its budget
+    is spent.
 
     Attributes
     ----------

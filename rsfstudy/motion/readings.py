@@ -1,4 +1,4 @@
-"""What a rig reads of a motion: friction coefficient and load point displacement."""
+"""Readings of a rig along a motion: friction coefficient and load point displacement."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ LOAD_POINT = Quantity(
 
 
 def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
-    """How far a point is from steady sliding at a load point velocity, in ln V or in the state over
-    b.
+    """Distance of a point from steady sliding at a load point velocity, in ln V or in the state
+    over b.
     """
     size = scene.a * scene.parts.law.size_over_a
     return max(
@@ -34,8 +34,8 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
 
 
 def watched(scene: Scene) -> tuple[str, float]:
-    """What an engine watches to tell extrema and levels of the friction coefficient that is read,
-    and what it is above it: spring stress itself where nothing changes normal stress.
+    """Quantity that an engine watches to tell extrema and levels of the friction coefficient that
+    is read, and what it is above it: spring stress itself where nothing changes normal stress.
     """
     parts = scene.parts
     if parts.normal_stress.normal_stress is None and not parts.loading.unknowns:

@@ -1,4 +1,4 @@
-"""What is recorded along a motion: where each regime begins, and within each step."""
+"""Recording along a motion: where each regime begins, and within each step."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Recording:
         return self.regimes.index(regime)
 
     def left(self) -> np.ndarray:
-        """What is still to be recorded of what was asked for."""
+        """Times that are still to be recorded."""
         assert self.at is not None
         return np.asarray(self.at, dtype=float)[sum(map(len, self._rows)) :]
 
@@ -78,7 +78,7 @@ class Recording:
         self._rows.append(rows)
 
     def ends_at(self, time: float) -> None:
-        """What was taken in since the last such time, or the start, has ended at this one."""
+        """End at this time what was taken in since the last such time, or the start."""
         if self.at is not None:
             return
         for rows in self._rows[self._ended :]:
@@ -103,8 +103,8 @@ class Recording:
 
 
 def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
-    """What is recorded of a point: the quantities of `READ`, less scales and offsets, the regime,
-    the place within a step, and the states.
+    """Row that is recorded of a point: the quantities of `READ`, less scales and offsets, the
+    regime, the place within a step, and the states.
     """
     stresses = point.spring, point.friction, point.normal_stress
     return (
@@ -154,9 +154,9 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
 def along_path(
     table: np.ndarray, points: int, names: Sequence[str] = OBSERVED
 ) -> dict[str, np.ndarray]:
-    """What was seen, by the names of the first columns, at points spread evenly along the path,
-    half by its length in time, ln V and stress, half by the steps the integrator took, which are
-    short where the path bends. Each extreme of slip rate and of stress is one of the points.
+    """Columns of a record, by the names of the first columns, at points spread evenly along the
+    path, half by its length in time, ln V and stress, half by the steps the integrator took, which
+    are short where the path bends. Each extreme of slip rate and of stress is one of the points.
     """
     if not len(table):
         return {name: np.full(points, np.nan) for name in names}

@@ -125,7 +125,7 @@ def _point_of(rate: Function, point: Function) -> Function:
 
 
 def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
-    """Whether mass matters up to the instability norm, beyond what the slow manifold holds of
+    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
     it.
     """
     return scene.has_mass and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol

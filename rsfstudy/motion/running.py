@@ -65,10 +65,10 @@ _NO_MASS = (math.nan,) * len(Limits._fields)
 
 
 class Machine(Protocol):
-    """What runs the loop: as it stands, or compiled."""
+    """Machine that runs the loop: as it stands, or compiled."""
 
     def initial(self, fields: tuple[tuple[str, float], ...]) -> Any:
-        """What motions begin with that have these numbers in their state, and others 0."""
+        """Initial state of motions that have these numbers in their state, and others 0."""
 
     def state(self, initial: Any, called_with: tuple[float, ...]) -> Any:
         """The state of a motion: its `memory`, and what it `says` of itself."""
@@ -134,7 +134,7 @@ class PlainState:
 
 
 class _Plan(NamedTuple):
-    """What all motions by the same equations begin and are called with.
+    """Plan that motions by the same equations share: their beginning and arguments.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ def path(
 
 
 def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> _Plan:
-    """What all motions of a scene at an accuracy have in common; found once."""
+    """Plan that motions of a scene at an accuracy share; made once."""
     key = "plan", meter.engine == COMPILED, accuracy, clock
     if key not in scene.made:
         both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
@@ -214,13 +214,13 @@ def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> 
 
 
 def _machine(meter: Meter) -> Machine:
-    """What runs the loop."""
+    """Machine that runs the loop."""
     machine: Machine = compiled_engine().Compiled() if meter.engine == COMPILED else Plain()
     return machine
 
 
 def _fields(tolerance: float, slow: Equations, both: Regimes | None = None) -> dict[str, float]:
-    """What the state of a motion holds at first, by an integrator of that tolerance."""
+    """Fields of the state of a motion at first, by an integrator of that tolerance."""
     tolerance = max(tolerance, TIGHTEST)
     return {
         "tolerance": tolerance,
@@ -302,7 +302,7 @@ def _events(
 
 
 class _Account:
-    """What a motion has spent in its regimes, and a meter has been told of."""
+    """Work of a motion in its regimes that a meter has been told of."""
 
     def __init__(self, meter: Meter, regimes: Sequence[str]) -> None:
         self._meter, self._regimes = meter, regimes
@@ -360,7 +360,7 @@ class _Keeper:
 def happening(
     before: Point, p_before: Numbers, after: Point, p_after: Numbers, watches: Sequence[Watch]
 ) -> Iterator[tuple[Watch, Point]]:
-    """What is watched for and happens where a motion jumps from a point to another, with the
+    """Events that are watched for and happen where a motion jumps from a point to another, with the
     numbers of the scene at both; and at which of them.
     """
     last, first = _columns_of(before).tolist(), _columns_of(after).tolist()

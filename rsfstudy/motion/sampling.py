@@ -1,4 +1,4 @@
-"""What is recorded along a motion: evenly within its steps, or at clocks or times asked for."""
+"""Sampling along a motion: evenly within its steps, or at clocks or times asked for."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def take_step(motion, space):
 
 
 def halve_unresolved(motion, space):
-    """Where a motion is recorded, halve the step until what lies within it is known as well as its
+    """Halve the step of a recorded motion until what lies within it is known as well as its
     end: where stability limits steps, and not accuracy, dense output is far less accurate.
     """
     for _ in range(MOST_HALVINGS):
@@ -77,7 +77,7 @@ def halve_unresolved(motion, space):
 
 
 def is_resolved(motion, space):
-    """Whether the slopes of dense output are the rates there, as well as is wanted.
+    """True if the slopes of dense output are the rates there, as well as is wanted.
 
     With an error e of dense output, they differ by its own slope, a few times e over the length of
     the step, and by what the rates make of e, as much where stability limits the step.

@@ -1,4 +1,4 @@
-"""Where one regime of a motion finds and leaves its numbers."""
+"""Workspace of one regime of a motion: the places of its numbers."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Workspace(NamedTuple):
 
 
 def size(unknowns: int, states: int, watches: int) -> int:
-    """How many numbers it takes."""
+    """Length of a workspace."""
     of_unknowns = 1 + ROWS + 1 + ALL_STAGES + 1 + 1 + 1
     return SIZES + of_unknowns * unknowns + 3 * (PSIS + states) + watches
 

@@ -31,13 +31,13 @@ _NOUNS = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load po
 
 
 def is_numeric(dataset: xr.Dataset, dimension: str) -> bool:
-    """Whether the points of a dimension are numbers, not names or flags."""
+    """True if the points of a dimension are numbers, not names or flags."""
     points = dataset[dimension]
     return points.dtype.kind in "fiu" and "flag_values" not in points.attrs
 
 
 def is_number(values: xr.DataArray) -> bool:
-    """Whether a variable holds numbers to be drawn."""
+    """True if a variable holds numbers to be drawn."""
     return values.dtype.kind in "fiub" and "flag_values" not in values.attrs
 
 
@@ -64,7 +64,7 @@ def varied(dataset: xr.Dataset) -> list[str]:
 
 
 def is_log_spaced(points: np.ndarray) -> bool:
-    """Whether points are spaced by factors rather than by differences."""
+    """True if points are spaced by factors rather than by differences."""
     at = np.sort(points.astype(float))
     if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
         return False
@@ -73,7 +73,7 @@ def is_log_spaced(points: np.ndarray) -> bool:
 
 
 def is_wide(values: np.ndarray) -> bool:
-    """Whether values are positive and span decades."""
+    """True if values are positive and span decades."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > _WIDE * known.min())
 

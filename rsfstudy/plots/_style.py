@@ -158,7 +158,7 @@ def _slot(axes: Axes) -> tuple[float, float]:
 
 
 def _is_drawn(handle: Any) -> bool:
-    """Whether there is anything of it to be seen."""
+    """True if there is anything of it to be seen."""
     if isinstance(handle, ErrorbarContainer):
         handle = handle.lines[0]
     if isinstance(handle, Line2D):

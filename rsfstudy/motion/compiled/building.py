@@ -56,7 +56,7 @@ _log = logging.getLogger(__name__)
 
 
 def cache_folder() -> Path:
-    """Where compiled motions are kept: in the folder that the system has for such things."""
+    """Folder where compiled motions are kept: the one that the system has for such things."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "rsfstudy" / "compiled"
 
@@ -170,7 +170,7 @@ def _addressed(function: Any, *, kept: bool) -> Any:
 
 
 def _kept(name: str, compile_for: Callable[[str], Any]) -> Any:
-    """What is compiled, from the folder of that name where it is there and whole."""
+    """Compiled functions, from the folder of that name where it is there and whole."""
     folder = _place(name)
     if folder is not None:
         if folder.exists():
@@ -214,7 +214,7 @@ def _say_not_private(folder: Path) -> None:
 
 
 def _is_private(folder: Path) -> bool:
-    """Whether nobody else owns a folder, or a link to it, or may write to it."""
+    """True if nobody else owns a folder, or a link to it, or may write to it."""
     if not hasattr(os, "geteuid"):  # Windows: no owners, no modes
         return True
     found = folder.stat()
@@ -271,7 +271,7 @@ def _is_function(value: Any) -> bool:
 
 
 def _compilable(value: Any) -> Any:
-    """What the compiler is given for a value that a function names."""
+    """Value that the compiler is given for one that a function names."""
     return IN_PLACE.get(value, value) if _is_function(value) else value
 
 

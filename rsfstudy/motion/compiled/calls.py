@@ -1,4 +1,4 @@
-"""What the compiler has in place of functions of the loop: pointers to numbers, calls of equations
+"""Compiled forms of functions of the loop: pointers to numbers, calls of equations
 by their addresses, and the steps of order eight.
 
 The loop is compiled once, for all equations; the equations once for each combination of parts.

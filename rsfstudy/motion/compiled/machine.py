@@ -131,7 +131,7 @@ def _of_floats(function: Function, *lengths: int) -> Any:
 
 
 def addresses(equations: Equations) -> tuple[int, ...]:
-    """Where the compiled functions of a system of equations are, in the order of `Filling`.
+    """Addresses of the compiled functions of a system of equations, in the order of `Filling`.
 
     Raises
     ------

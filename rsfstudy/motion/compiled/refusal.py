@@ -39,7 +39,7 @@ def check_raises_nothing(function: Function, seen: set[Function] | None = None) 
 
 
 def refused(error: Exception) -> InvalidValue:
-    """What Numba says, with the part and the line: its text begins with the innermost function."""
+    """Error of Numba, with the part and the line: its text begins with the innermost function."""
     text = str(error)
     places = list(_PLACE.finditer(text))
     for place in places:

@@ -1,4 +1,4 @@
-"""What the loop of motions asks of a stepper: to begin, to attempt a step, and values within it.
+"""Interface of steppers for the loop of motions: to begin, to attempt a step, and values within it.
 
 A stepper of one's own is a class derived from `Stepper`. The compiler has the functions of
 `order_eight` in place of those below.

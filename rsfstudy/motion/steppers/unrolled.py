@@ -49,7 +49,7 @@ def attempt(rate: Function, unknowns: int, numbers: Function) -> Function:
 
 @cache
 def _source(unknowns: int) -> Function:
-    """What makes such steps of ``rate_of`` and ``numbers``."""
+    """Source of such steps of ``rate_of`` and ``numbers``."""
     n, scales = range(unknowns), SIZES + unknowns
     lines = [
         f"step[{ERROR}] = math.nan",
@@ -94,7 +94,7 @@ def _call(name: str, unknown: int) -> str:
 
 
 def _rates(name: str) -> str:
-    """What a sum is of."""
+    """Terms of a sum."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_WEIGHTS[name]))
 
 
