@@ -201,7 +201,7 @@ class _Watch:
         )
 
     def _landed(self) -> Point | None:
-        """Point where slip is slower than V_0 after the rupture, and friction balances the spring."""
+        """Point where slip is below V_0 after the rupture, and friction balances the spring."""
         for fallen, event in enumerate(self._seen):
             if event.kind is Kind.FALL:
                 after = self._seen[fallen:]

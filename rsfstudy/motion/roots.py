@@ -54,7 +54,7 @@ def root_of(function: Function) -> Function:
 def guess(
     latest: float, best: float, other: float, at_latest: float, at_best: float, at_other: float
 ) -> float:
-    """Distance of the root from the best point: by a line, or by inverse quadratic interpolation."""
+    """Distance of the root from the best point, by a line or inverse quadratic interpolation."""
     if latest == other:
         return -at_best * (best - latest) / (at_best - at_latest)
     to_latest = (at_latest - at_best) / (latest - best)
