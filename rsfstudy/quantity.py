@@ -1,9 +1,17 @@
-"""A named quantity: symbol, units and what it is, wherever it is stated."""
+"""Named quantities: symbol, units and what each is, wherever it is stated; and tables of them, in
+HTML.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 import unicodedata
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
+from html.entities import html5
+from typing import Any
 
 from rsfstudy.errors import InvalidValue
 
@@ -74,3 +82,101 @@ class Output(Quantity):
 def is_name(name: object) -> bool:
     """True if a text can name a variable: an identifier, as a file gives it back."""
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
+
+
+# ---- tables, as notebooks show them --------------------------------------------------------------
+
+#: Of a table of quantities.
+HEADINGS = ("field", "symbol", "value", "unit", "meaning")
+_FUNCTIONS = ("ln", "log", "exp")
+_RAISED = {"_": "sub", "^": "sup"}
+_CELL = 'style="text-align: left; vertical-align: top"'
+
+
+class Markup(str):
+    """A text that is HTML already."""
+
+    __slots__ = ()
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> Markup:
+    """A table; texts are escaped, unless they are `Markup`.
+
+    Parameters
+    ----------
+    headings : sequence of str
+    rows : iterable of sequence
+        Texts and numbers, as many in each row as there are headings.
+    caption : str
+        What stands above it.
+    """
+    above = f"<p><b>{_cell(caption)}</b></p>" if caption else ""
+    head = "".join(f"<th {_CELL}>{_cell(text)}</th>" for text in headings)
+    lines = ("".join(f"<td {_CELL}>{_cell(value)}</td>" for value in row) for row in rows)
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return Markup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+
+
+def quantities_table(rows: Iterable[tuple[Quantity, object]], caption: str = "") -> Markup:
+    """A table of quantities with their values."""
+    return table(HEADINGS, (described(about, value) for about, value in rows), caption)
+
+
+def described(about: Quantity, value: object) -> tuple[object, ...]:
+    """The row of a quantity, under `HEADINGS`."""
+    return about.name, symbol(about.symbol), value, unit(about), about.long_name
+
+
+class ShownAsTable:
+    """What a notebook shows as a table of quantities."""
+
+    def shown(self) -> Iterable[tuple[Quantity, object]]:
+        """The quantities, with their values."""
+        raise TypeError(f"{type(self).__name__} shows no quantities")
+
+    def _repr_html_(self) -> str:
+        return quantities_table(self.shown(), type(self).__name__)
+
+
+def folded(caption: str, content: Markup) -> Markup:
+    """What is shown once its caption is clicked."""
+    return Markup(f"<details><summary>{escape(caption)}</summary>{content}</details>")
+
+
+def symbol(formula: str) -> Markup:
+    """A symbol as `Quantity` states it, without the need of MathJax."""
+    if "$" not in formula:
+        return Markup(escape(formula))
+    text = escape(formula.strip("$"))
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _command(found[1]), text)
+    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _raised, text)
+    bare = re.sub(r"[{}]|\\.", "", text)
+    return Markup(f"<i>{bare}</i>")
+
+
+def unit(about: Quantity) -> Markup:
+    """What 1 is of a quantity: its unit, or its scale where it is dimensionless; empty for 1."""
+    if about.scale:
+        scale = about.scale.replace("sigma", r"\sigma")
+        return symbol(f"${scale}$")
+    return Markup(escape(about.units if about.units != "1" else ""))
+
+
+def _command(name: str) -> str:
+    """Letters and signs have the same names in HTML."""
+    return name if name in _FUNCTIONS else html5.get(f"{name};", "")
+
+
+def _raised(found: re.Match[str]) -> str:
+    tag = _RAISED[found[1]]
+    return f"<{tag}>{found[2] if found[2] is not None else found[3]}</{tag}>"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, Markup):
+        return value
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.6g}"
+    return escape(str(value))

@@ -21,7 +21,6 @@ FLOORS = {
     "defaults": 0,
     "status": 0,
     "quantity": 0,
-    "markup": 0,
     "slider": 1,
     "vocabulary": 2,
     "motion": 2,

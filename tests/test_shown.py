@@ -11,8 +11,8 @@ import xarray as xr
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
-from rsfstudy.markup import symbol, table
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.quantity import symbol, table
 
 
 def rows(html):

@@ -7,8 +7,10 @@ from typing import Any
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.wording import listed
-from rsfstudy.markup import (
+from rsfstudy.measures import Measure
+from rsfstudy.quantity import (
     HEADINGS,
+    Quantity,
     described,
     folded,
     quantities_table,
@@ -16,8 +18,6 @@ from rsfstudy.markup import (
     table,
     unit,
 )
-from rsfstudy.measures import Measure
-from rsfstudy.quantity import Quantity
 from rsfstudy.slider import registry
 from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import quantity

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from rsfstudy.markup import Markup, table
+from rsfstudy.quantity import Markup, table
 
 _SIGNS = {"equals": "", "below": "< ", "above": "> "}
 #: Of a line of a terminal, and of an identifier on it, in characters.

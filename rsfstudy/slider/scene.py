@@ -12,8 +12,7 @@ from inspect import Parameter, Signature
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.markup import ShownAsTable
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.slider import (
     assembly,
     dynamics,
