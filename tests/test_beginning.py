@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import run
-from scipy.integrate import solve_ivp
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.triggered import Triggered
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.regimes import starting
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
@@ -62,34 +60,6 @@ def test_steps_come_on_top():
     assert after.log_rate == pytest.approx(begin.log_rate, abs=1e-12)
     assert after.spring == scene.stiffness * 0.5
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)
-
-
-@pytest.mark.parametrize("engine", [SCIPY, COMPILED])
-def test_the_motion_is_that_of_time(engine):
-    """Healed contact under a moving load point, by LSODA in time: unknowns tau and ln V."""
-    scene = Scene(
-        law="slowness",
-        normal_stress="constant",
-        stiffness_ratio=1.3,
-        initial_stress=-0.02,
-        initial_state=0.08,
-    )
-    a, b, stiffness = scene.a, scene.b, scene.stiffness
-
-    def rates(_time: float, state: np.ndarray) -> list[float]:
-        stress, x = state
-        theta = stress - a * x
-        loading = stiffness * (1.0 - math.exp(x))
-        healing = b * (math.exp(-theta / b) - math.exp(x))
-        return [loading, (loading - healing) / a]
-
-    begin = [-0.02, (-0.02 - 0.08) / a]
-    motion = rsfstudy.simulate(scene, duration=60.0, rtol=1e-9, engine=engine)
-    times = motion.time.values
-    truth = solve_ivp(rates, (0.0, times[-1]), begin, "LSODA", times, rtol=1e-11, atol=1e-12)
-    stress, log_rate = truth.y
-    assert np.abs(motion.shear_stress - scene.mu_star - stress).max() < 1e-8
-    assert np.abs(motion.log10_slip_rate - log_rate / math.log(10.0)).max() < 1e-7
 
 
 def test_the_limit_cycle_is_the_same_from_wherever_it_is_come_to():

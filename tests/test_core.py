@@ -3,6 +3,7 @@ formulation.
 """
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from conftest import EACH_STEP, cot_phi, follow
 from hypothesis import given
 from hypothesis import strategies as st
+from in_time import InTime
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
@@ -257,77 +259,41 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
-def test_rupture_agrees_with_a_second_formulation(law, effects):
-    """One rupture in the variables (f, ln V, Theta), integrated implicitly, against ours in (f, ln
-    V, g).
-
-    K eps**2 v dx/dt = f - (a x + Theta)/(1 - F c), dTheta/dt = (G - A a dx/dt)/(1 + A), A = alpha
-    c/(1 - F c).
+def test_a_rupture_is_that_of_inertial_time(law, effects):
+    """Through its arrest, by the equations of `in_time`, at a mass that a clock of slow slip cannot
+    follow.
     """
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True, **effects)
-    a, b, mu, c, alpha = (
-        scene.a,
-        scene.b,
-        scene.mu_star,
-        cot_phi(scene),
-        scene.alpha or 0.0,
-    )
-    stiffness, eps = scene.stiffness, scene.inertial_time
-    points = []
+    inside = []
 
     def until(event):
-        if event.regime == "inertial":
-            points.append(event.point)
-        return len(points) > 3
+        inside.extend([event.point] if event.regime == "inertial" else [])
+        return len(inside) > 3
 
     follow(scene, 1e-9, until)
     # begun anew, at the end of a step, for a time that is no difference of large ones
-    stretch = []
     again = course.follow(
-        scene, Accuracy(1e-9), Meter(10**6), [EACH_STEP], start=points[3], clock=True
+        scene, Accuracy(1e-9), Meter(10**6), [EACH_STEP], start=inside[3], clock=True
     )
-    for event in again:
-        if event.regime != "inertial":
-            break
-        stretch.append(event)
+    stretch = list(itertools.takewhile(lambda event: event.regime == "inertial", again))
     first, last = stretch[0].point, stretch[-1].point
-
-    def rate(_tau, y):
-        f, x, theta = y
-        friction = a * x + theta
-        weight = 1.0 - (mu + friction) * c
-        growth = (f - friction / weight) / (stiffness * math.exp(x) * eps)
-        slip = math.exp(x)
-        if law == "slip":
-            evolution = -slip * (theta + b * x)
-        else:
-            evolution = b * (math.exp(-theta / b) - slip)
-        share = alpha * c / weight
-        return [
-            stiffness * eps * (2.0 - slip),
-            growth,
-            (eps * evolution - share * a * growth) / (1.0 + share),
-        ]
-
-    theta = first.imbalance - b * first.log_rate
-    duration = stretch[-1].time / eps
-    theirs = solve_ivp(
-        rate,
-        (0.0, duration),
-        [first.spring, first.log_rate, theta],
+    theirs, eps = InTime(scene), scene.inertial_time
+    ran = solve_ivp(
+        lambda _tau, y: eps * np.array(theirs.both(0.0, y, 0.0)[0]),
+        (0.0, stretch[-1].time / eps),
+        [first.spring, first.state, first.log_rate],
         method="Radau",
         rtol=1e-10,
         atol=1e-13,
     )
-    assert theirs.success
-    f, x, theta = theirs.y[:, -1]
+    end = theirs.both(0.0, ran.y[:, -1], 0.0)[1]
     # Radau at 1e-10 over a thousand steps; ln V at arrest falls so fast that a time off by 1e-8
     # shows
-    assert f == pytest.approx(last.spring, abs=3e-9)
-    falls = by_inertial_time(scene).rates((last.spring, last.log_rate, last.friction))[1]
-    assert x == pytest.approx(last.log_rate, abs=1e-8 * duration * abs(falls))
-    ratio = 1.0 + c * (a * x + theta) / (1.0 - (mu + a * x + theta) * c)
-    assert theta + alpha * math.log(ratio) == pytest.approx(last.psi, abs=1e-6 * a)
+    assert ran.success
+    assert end.f == pytest.approx(last.spring, abs=3e-9)
+    assert end.x == pytest.approx(last.log_rate, abs=1e-8 * stretch[-1].time * abs(end.growth))
+    psi = end.theta + theirs.alpha * math.log(end.s)
+    assert psi == pytest.approx(last.psi, abs=1e-6 * scene.a)
 
 
 def test_inertia_is_integrated_only_where_it_acts():

@@ -2,13 +2,11 @@
 stress by linear theory.
 """
 
-import itertools
 import json
 import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from rsfstudy import Axis, Scene, Study, simulate
 from rsfstudy.errors import InvalidValue
@@ -23,8 +21,8 @@ from rsfstudy.measures.triggered import Triggered
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Kind, maximum, settling
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.events import Kind, settling
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
@@ -43,21 +41,6 @@ SLIDERS = {
 OSCILLATES = {"oscillation_amplitude": 0.02, "oscillation_period": 8.0, "stiffness_ratio": 2.0}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("slider", SLIDERS)
-def test_normal_stress_is_the_sine_that_was_asked_for(slider, engine):
-    """And what an inclined driving stress adds to it, along a whole motion."""
-    scene = Scene(**SLIDERS[slider], **OSCILLATES)
-    motion = simulate(scene, duration=30.0, engine=engine)
-    imposed = 1.0 + 0.02 * np.sin(2.0 * np.pi * motion.time / 8.0)
-    cotangent = 1.0 / math.tan(math.radians(60.0)) if "inclined" in slider else 0.0
-    expected = imposed + cotangent * (motion.frictional_stress - scene.mu_star)
-    assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-9)
-    assert set(motion.data_vars) == set(
-        simulate(Scene(load_velocity_ratio=2.0), duration=1.0).data_vars
-    )
-
-
 def test_a_rupture_feels_it_too():
     """Stick-slip: normal stress is on its sine in all regimes."""
     scene = Scene(
@@ -68,6 +51,7 @@ def test_a_rupture_feels_it_too():
     )
     motion = simulate(scene, duration=150.0, engine=COMPILED)
     assert set(np.unique(motion.regime)) == {1, 2}
+    assert set(motion) == set(simulate(Scene(load_velocity_ratio=2.0), duration=1.0))
     expected = 1.0 + 0.02 * np.sin(2.0 * np.pi * motion.time / 30.0)
     assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-8)
 
@@ -86,30 +70,6 @@ def test_the_amplitude_does_not_drift(rtol):
         assert abs(relief / 0.02) < 2.0 * math.pi * periods * rtol
     assert max(off) < 0.5 * rtol
     assert off[1] < 3.0 * off[0] + 1e-12
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-def test_by_a_second_formulation(law):
-    """LSODA in time, with the sine and Linker and Dieterich's effect written out."""
-    scene = Scene(law=law, **CASES["imposed"], **{**OSCILLATES, "oscillation_amplitude": 0.05})
-    a, b, mu, alpha = scene.a, scene.b, scene.mu_star, scene.alpha
-    frequency = 2.0 * math.pi / 8.0
-
-    def rates(time, state):
-        f, theta = state
-        ratio = 1.0 + 0.05 * math.sin(frequency * time)
-        change = 0.05 * frequency * math.cos(frequency * time)
-        v = math.exp(((mu + f) / ratio - mu - theta) / a)
-        if law == "slip":
-            evolution = -v * (theta + b * math.log(v))
-        else:
-            evolution = b * (math.exp(-theta / b) - v)
-        return scene.stiffness * (1.0 - v), evolution - alpha * change / ratio
-
-    known = solve_ivp(rates, (0.0, 20.0), (0.0, 0.0), method="LSODA", rtol=1e-11, atol=1e-14)
-    *_earlier, end = follow(scene, Accuracy(1e-8), Meter(10**5), until=20.0)
-    assert end.point.spring == pytest.approx(known.y[0, -1], abs=1e-8)
-    assert end.point.state == pytest.approx(known.y[1, -1], abs=1e-8)
 
 
 def test_none_is_the_scene_without_it():
@@ -157,33 +117,11 @@ def _end(scene: Scene):
 
 
 @pytest.mark.parametrize("slider", SLIDERS)
-def test_engines_tell_the_same_events(slider):
-    """Maxima of slip rate; and never that it settles."""
-    scene = Scene(**SLIDERS[slider], **OSCILLATES)
-    rows = []
-    for engine in ENGINES:
-        watches = [maximum("log_rate"), maximum("reading"), settling(0.9, ends=True)]
-        meter = Meter(10**5, engine=engine)
-        accuracy = Accuracy(1e-8, engine=engine)
-        rows.append(list(follow(scene, accuracy, meter, watches, until=40.0)))
-    kinds = [[e.kind for e in events] for events in rows]
-    assert kinds[0] == kinds[1] == kinds[2]
-    assert kinds[0].count(Kind.MAXIMUM) > 8
-    assert Kind.SETTLED not in kinds[0]
-    for one, other in itertools.chain(*(zip(rows[0], events, strict=True) for events in rows[1:])):
-        assert other.time == pytest.approx(one.time, rel=1e-6)
-        assert other.point.spring == pytest.approx(one.point.spring, abs=1e-8)
-        assert other.point.psis == pytest.approx(one.point.psis, abs=1e-8)
-
-
-def test_under_a_load_point_at_rest_it_goes_on():
-    """Slip dies out; time does not."""
-    scene = Scene(**SLIDERS["imposed"], **OSCILLATES, load_velocity_ratio=0.0)
-    for engine in ENGINES:
-        motion = simulate(scene, duration=100.0, rtol=1e-8, engine=engine)
-        assert float(motion.time[-1]) == pytest.approx(100.0, rel=1e-12)
-        expected = 1.0 + 0.02 * np.sin(2.0 * np.pi * motion.time / 8.0)
-        assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-8)
+def test_it_never_settles(slider):
+    scene, watches = Scene(**SLIDERS[slider], **OSCILLATES), [settling(0.9, ends=True)]
+    accuracy, meter = Accuracy(1e-6, engine=COMPILED), Meter(10**5, engine=COMPILED)
+    *_earlier, end = follow(scene, accuracy, meter, watches, until=40.0)
+    assert (end.kind, end.time) == (Kind.END, 40.0)
 
 
 def test_it_is_an_axis_and_a_file_holds_it():

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi, follow
+from conftest import cot_phi
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
@@ -15,8 +14,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.slider.equations import between_ruptures, evolution_of, relation_of
+from rsfstudy.slider.equations import between_ruptures, relation_of
 from rsfstudy.status import Status
 
 #: Impedance of spring and mass of the paper's slider, K T V_*/(2 pi D_c).
@@ -65,52 +63,6 @@ def test_critical_stiffness_at_the_reference_rate():
     )
     found = LinearStability()(scene, Accuracy()).values["critical_stiffness"]
     assert found == pytest.approx(expected, rel=1e-13)
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
-def test_a_second_formulation_in_time_agrees(law, effects):
-    """Through a rupture and its arrest: time as the clock, ln V as an unknown, Radau.
-
-    a dx + dPsi = strength'(g) dg with g = f - eta (V - 1), df = K (V_0 - V) dt.
-    """
-    scene = Scene(
-        law=law,
-        stiffness_ratio=0.8,
-        load_velocity_ratio=2.0,
-        radiation_damping=1e-4,
-        **effects,
-    )
-    strength, evolution = relation_of(scene), evolution_of(scene)
-    damping = scene.radiation_damping
-
-    def rate(_time, y):
-        spring, x = y
-        v = math.exp(x)
-        value, slope, shift, _shift_slope = strength(spring - damping * (v - 1.0))
-        loading = scene.stiffness * (scene.load_velocity - v)
-        weakening = v * evolution(x, value - scene.a * x - shift)
-        return [loading, (slope * loading - weakening) / (scene.a + slope * damping * v)]
-
-    highest = []
-
-    def until(event):
-        highest.append(event.point)
-        return event.kind is Kind.MAXIMUM
-
-    follow(scene, 1e-9, until, watches=[maximum("log_rate")])
-    peak = highest[-1]
-
-    def turning(_time, y):
-        return rate(_time, y)[1]
-
-    turning.direction, turning.terminal = -1, True
-    found = solve_ivp(
-        rate, (0.0, 1e3), (0.0, 0.0), "Radau", rtol=1e-10, atol=1e-12, events=turning
-    ).y_events[0]
-    spring, x = found[0]
-    assert peak.log_rate == pytest.approx(x, abs=1e-7)
-    assert peak.spring == pytest.approx(spring, abs=1e-8)
 
 
 def test_stronger_damping_makes_slower_ruptures():

@@ -1,0 +1,223 @@
+"""Motions by equations written once more, in time, with slip rate and state variable themselves:
+nothing of the package but the fields of a scene, and SciPy's `solve_ivp`.
+
+With g the frictional and e the imposed normal stress, c = cot(phi), p pore pressure, and N the
+stress dependence:
+
+    (mu_* + g) = s mu,  mu = mu_* + a ln V + Theta,  s = 1 + e(t) + c g - p
+    df = K (V_0 - V) dt
+    f = g + eta (V - 1), or K eps**2 V d(ln V) = (f - g) dt with mass
+    dTheta = V b h(u) dt - (alpha ds + N dg)/s,  u = Theta/b + ln V
+    dphi = V (dilatancy ln V - phi) dt,  dp = -drainage p dt - dphi
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from rsfstudy import Scene
+
+#: h(u) of d(Theta)/d(slip) = b h(u), by law, the exponent of the family beside it.
+LAWS: Mapping[str, Callable[[float, float], float]] = {
+    "slip": lambda u, _eps: -u,
+    "slowness": lambda u, _eps: math.expm1(-u),
+    "perrin_rice_zheng": lambda u, _eps: -math.sinh(u),
+    "family": lambda u, eps: math.expm1(-eps * u) / eps,
+}
+
+
+class Now(NamedTuple):
+    """What there is to know at an instant: V with its sign, ln |V| and its rate, spring stress,
+    frictional stress, normal stress, and the state variable (the sum, of several).
+    """
+
+    v: float
+    x: float
+    growth: float
+    f: float
+    g: float
+    s: float
+    theta: float
+
+
+class InTime:
+    """The motion of a scene in time.
+
+    Unknowns are f, the states, porosity and pressure of a dilatant fault, and last ln V where waves
+    or mass make it one.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a law in `LAWS`, or of two states of which each evolves by one.
+    velocity_ramp : float, optional
+        What the load velocity gains in a time of 4: the limit of stairs.
+    """
+
+    def __init__(self, scene: Scene, velocity_ramp: float = 0.0) -> None:
+        of = {name: value or 0.0 for name, value in scene.as_dict().items()}
+        if scene.load_velocity_ratio is None and not of["displacement_step"]:
+            of["load_velocity_ratio"] = 1.0
+        self.of, self.mass, self.velocity_ramp = of, bool(of["inertia"]), velocity_ramp
+        self.a, self.mu, self.stiffness = scene.a, scene.mu_star, scene.stiffness
+        self.cot = 1.0 / math.tan(math.radians(of["phi"])) if of["phi"] else 0.0
+        self.alpha, self.damping = of["alpha"], of["radiation_damping"]
+        self.eps = of["period"] * of["reference_rate"] / (2.0 * math.pi)
+        name = scene.law
+        self.bs, self.lengths = [of["b_over_a"] * self.a], [1.0]
+        if name.startswith("two_"):
+            name = name.split("_")[1]
+            self.bs = [of["b1_over_a"] * self.a, of["b2_over_a"] * self.a]
+            self.lengths = [1.0, of["length_ratio"]]
+        self.h = LAWS[name]
+        self.wet, self.has_rate = scene.fluid == "dilatant", self.mass or self.damping > 0.0
+        stiff = self.has_rate or bool(of["regularised"])
+        self.method = "LSODA" if stiff else "DOP853"
+        # what shear and normal stress take is shared by several states in ways not written here
+        assert len(self.bs) == 1 or not (self.alpha or of["stress_dependence"])
+
+    # ---- loading ---------------------------------------------------------------------------------
+
+    @property
+    def breaks(self) -> list[float]:
+        """Instants at which the load changes other than smoothly."""
+        found = [self.of["ramp_duration"]] if self.of["normal_stress_ramp"] else []
+        found += [self.of["hold_time"]] if self.of["hold_time"] else []
+        return found + ([4.0] if self.velocity_ramp else [])
+
+    def load(self, time: float, middle: float) -> tuple[float, float, float]:
+        """Load velocity, imposed change of normal stress and its rate; `middle` is a time between
+        the same two breaks.
+        """
+        of, velocity = self.of, self.of["load_velocity_ratio"]
+        e, change = of["normal_stress_step"], 0.0
+        if of["hold_time"]:
+            velocity = 0.0 if middle < of["hold_time"] else 1.0
+        if self.velocity_ramp:
+            velocity = 1.0 + self.velocity_ramp * (time / 4.0 if middle < 4.0 else 1.0)
+        if of["normal_stress_ramp"]:
+            lasts, over = of["ramp_duration"], middle > of["ramp_duration"]
+            change = 0.0 if over else of["normal_stress_ramp"] / lasts
+            e = of["normal_stress_ramp"] * (1.0 if over else time / lasts)
+        if of["oscillation_amplitude"]:
+            often = 2.0 * math.pi / of["oscillation_period"]
+            e = of["oscillation_amplitude"] * math.sin(often * time)
+            change = of["oscillation_amplitude"] * often * math.cos(often * time)
+        return velocity, e, change
+
+    def start(self) -> list[float]:
+        """The unknowns after steps at time 0, of which the state feels those of normal stress."""
+        of, (_velocity, e, _change) = self.of, self.load(0.0, 0.0)
+        f, theta = of["initial_stress"], of["initial_state"]
+        before = 1.0 + self.cot * f
+        x = ((self.mu + f) / before - self.mu - theta) / self.a
+        f += self.stiffness * of["displacement_step"]
+
+        def missing(x: float) -> float:
+            g = f - self.damping * math.expm1(x)
+            s = 1.0 + e + self.cot * g
+            if s <= 0.0:  # far too fast
+                return -1.0
+            state = theta - self.alpha * math.log(s / before)
+            return self.mu + g - s * (self.mu + self.a * x + state)
+
+        if self.has_rate and not self.mass:
+            x = brentq(missing, -60.0, 60.0, xtol=1e-15)
+        s = 1.0 + e + self.cot * (f - self.damping * math.expm1(x) * (not self.mass))
+        states = [theta - self.alpha * math.log(s / before), *[0.0] * (len(self.bs) - 1)]
+        return [f, *states, *[0.0, 0.0][: 2 * self.wet], *[x][: self.has_rate]]
+
+    # ---- equations -------------------------------------------------------------------------------
+
+    def both(self, time: float, y: Sequence[float], middle: float) -> tuple[list[float], Now]:
+        """The rates of the unknowns, and what follows from them."""
+        of, a, mu, cot, count = self.of, self.a, self.mu, self.cot, len(self.bs)
+        velocity, e, change = self.load(time, middle)
+        f, states, theta = y[0], y[1 : 1 + count], sum(y[1 : 1 + count])
+        pores, pressure = y[1 + count : 3 + count] if self.wet else (0.0, 0.0)
+        if self.has_rate:
+            x = y[-1]
+            v = math.exp(x)
+        elif of["regularised"]:
+            # V = 2 exp[-(mu_* + Theta)/a] sinh(mu/a)
+            coefficient = (mu + f) / (1.0 + e + cot * f) / a
+            held = abs(coefficient) - (mu + theta) / a
+            v = math.copysign(-math.exp(held) * math.expm1(-2.0 * abs(coefficient)), coefficient)
+            x = math.log(max(abs(v), 1e-300))
+        else:
+            x = ((mu + f) / (1.0 + e + cot * f - pressure) - mu - theta) / a
+            v = math.exp(x)
+        friction = mu + a * x + theta
+        g = f - self.damping * (v - 1.0)
+        if self.mass:
+            g = ((1.0 + e - pressure) * friction - mu) / (1.0 - cot * friction)
+        s = 1.0 + e + cot * g - pressure
+        coefficient = (mu + g) / s
+        evolving = [
+            abs(v) * b / length * self.h(state / b + x, of["law_exponent"])
+            for b, length, state in zip(self.bs, self.lengths, states, strict=True)
+        ]
+        opening = v * (of["dilatancy"] * x - pores) if self.wet else 0.0
+        draining = -of["drainage"] * pressure - opening if self.wet else 0.0
+        df, nagata = self.stiffness * (velocity - v), of["stress_dependence"]
+        # dg [1 + N - c (mu - alpha)] = s (a dx + evolution) + (mu - alpha)(de - dp)
+        yields = 1.0 + nagata - cot * (coefficient - self.alpha)
+        pushed = s * sum(evolving) + (coefficient - self.alpha) * (change - draining)
+        if self.mass:
+            dx = (f - g) / (self.stiffness * self.eps**2 * v)
+            dg = (s * a * dx + pushed) / yields
+        else:
+            dx = (df * yields - pushed) / (s * a + self.damping * v * yields)
+            dg = df - self.damping * v * dx
+        ds = change - draining + cot * dg
+        evolving[0] -= (self.alpha * ds + nagata * dg) / s
+        fluid = [opening, draining] if self.wet else []
+        rates = [df, *evolving, *fluid, *([dx] if self.has_rate else [])]
+        return rates, Now(v, x, dx, f, g, s, theta)
+
+    def solved(
+        self,
+        times: Sequence[float],
+        events: Sequence[Callable[[Now], float]] = (),
+        directions: Sequence[float] = (),
+    ) -> tuple[list[Now], list[list[tuple[float, Now]]]]:
+        """The motion at increasing times up to the last, and where functions vanish in a direction,
+        but for the beginning.
+        """
+        rows, told, y = [], [[] for _ in events], self.start()
+        cuts = [0.0, *(cut for cut in self.breaks if cut < times[-1]), times[-1]]
+        for begin, end in itertools.pairwise(cuts):
+            middle = 0.5 * (begin + end)
+
+            def known(time, y, middle=middle):
+                return self.both(time, y, middle)[1]
+
+            asked = []
+            for event, direction in zip(events, directions, strict=True):
+                asked.append(lambda t, y, event=event, known=known: event(known(t, y)))
+                asked[-1].direction = direction
+            within = [t for t in times if begin < t <= end or t == begin == 0.0]
+            ran = solve_ivp(
+                lambda t, y, middle=middle: self.both(t, y, middle)[0], (begin, end), y,
+                self.method, t_eval=sorted({*within, end}),
+                events=asked or None, rtol=1e-12, atol=1e-14,
+            )  # fmt: skip
+            assert ran.success
+            y = ran.y[:, -1]
+            rows += [known(t, at) for t, at in zip(within, ran.y.T, strict=False)]
+            found = zip(told, ran.t_events or (), ran.y_events or (), strict=False)
+            for of_event, ts, ys in found:
+                of_event += [(t, known(t, at)) for t, at in zip(ts, ys, strict=True) if t > 0.0]
+        return rows, told
+
+
+def columns(rows: Sequence[Now]) -> dict[str, np.ndarray]:
+    """Rows by name."""
+    return dict(zip(Now._fields, np.array(rows).T, strict=True))
