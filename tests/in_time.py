@@ -32,6 +32,9 @@ LAWS: Mapping[str, Callable[[float, float], float]] = {
     "family": lambda u, eps: math.expm1(-eps * u) / eps,
 }
 
+#: Trial steps go beyond all numbers; ln V stays below this.
+FASTEST = 300.0
+
 
 class Now(NamedTuple):
     """What there is to know at an instant: V with its sign, ln |V| and its rate, spring stress,
@@ -144,7 +147,7 @@ class InTime:
         pores, pressure = y[1 + count : 3 + count] if self.wet else (0.0, 0.0)
         if self.has_rate:
             x = y[-1]
-            v = math.exp(x)
+            v = math.exp(min(x, FASTEST))
         elif of["regularised"]:
             # V = 2 exp[-(mu_* + Theta)/a] sinh(mu/a)
             coefficient = (mu + f) / (1.0 + e + cot * f) / a
@@ -153,7 +156,7 @@ class InTime:
             x = math.log(max(abs(v), 1e-300))
         else:
             x = ((mu + f) / (1.0 + e + cot * f - pressure) - mu - theta) / a
-            v = math.exp(x)
+            v = math.exp(min(x, FASTEST))
         friction = mu + a * x + theta
         g = f - self.damping * (v - 1.0)
         if self.mass:

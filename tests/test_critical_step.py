@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from in_time import InTime
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -183,60 +183,26 @@ def test_a_large_step_that_motions_find_is_as_accurate_as_asked_for():
 # ---------------------------------------------------------------------------
 
 
-def peak_in_time(scene: Scene, load: float, displacement: float = 0.0) -> float:
-    """Highest ln V after a step, from the paper's own equations in time: eqs. 1 or 4, 5 and 15.
-
-    Unknowns are slip and the state variable Theta (or ln theta); nothing is shared with the
+def peak_in_time(scene: Scene) -> float:
+    """Highest ln V after a step up to the norm, from equations in time: nothing is shared with the
     package.
     """
-    a, b, mu, c, alpha = (
-        scene.a,
-        scene.b,
-        scene.mu_star,
-        cot_phi(scene),
-        scene.alpha or 0.0,
-    )
-    k, norm = scene.stiffness, scene.log_norm_rate
-
-    def stresses(t, slip):
-        tau = mu + k * (load * t + displacement - slip)
-        return tau, 1.0 + c * (tau - mu)
-
-    def slip_rate(t, y):
-        tau, sigma = stresses(t, y[0])
-        return math.exp(min((tau / sigma - mu - y[1]) / a, 60.0)), sigma
-
-    def rate(t, y):
-        v, sigma = slip_rate(t, y)
-        if scene.law == "slip":
-            evolution = -v * (y[1] + b * math.log(v))
-        else:
-            evolution = b * (math.exp(-y[1] / b) - v)
-        return [v, evolution - alpha * c * k * (load - v) / sigma]
+    theirs, norm = InTime(scene), scene.log_norm_rate
 
     def at_norm(t, y):
-        return math.log(slip_rate(t, y)[0]) - norm
+        return theirs.both(t, y, 0.0)[1].x - norm
 
     def slowing(t, y):
-        v, sigma = slip_rate(t, y)
-        tau, _sigma = stresses(t, y[0])
-        friction_rate = k * (load - v) / sigma * (1.0 - tau / sigma * c)
-        return friction_rate - rate(t, y)[1]
+        return theirs.both(t, y, 0.0)[1].growth
 
     at_norm.terminal = slowing.terminal = True
     slowing.direction = -1.0
-    start_sigma = 1.0 + c * k * displacement
     motion = solve_ivp(
-        rate,
-        (0.0, 1e3),
-        [0.0, -alpha * math.log(start_sigma)],
-        method="DOP853",
-        rtol=1e-12,
-        atol=1e-15,
-        events=(at_norm, slowing),
-    )
+        lambda t, y: theirs.both(t, y, 0.0)[0], (0.0, 1e3), theirs.start(), "DOP853",
+        rtol=1e-12, atol=1e-15, events=(at_norm, slowing),
+    )  # fmt: skip
     assert motion.status == 1
-    return math.log(slip_rate(motion.t[-1], motion.y[:, -1])[0])
+    return float(theirs.both(motion.t[-1], motion.y[:, -1], 0.0)[1].x)
 
 
 @pytest.mark.parametrize(
@@ -249,9 +215,10 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
     held = scene.load_velocity_ratio or 0.0
     for side, reaches in ((-2e-7, False), (2e-7, True)):
         if of == RATE:
-            peak = peak_in_time(scene, 1.0 + (value - 1.0) * (1.0 + side))
+            stepped = {RATE: 1.0 + (value - 1.0) * (1.0 + side)}
         else:
-            peak = peak_in_time(scene, held, value * (1.0 + side))
+            stepped = {of: value * (1.0 + side), RATE: held}
+        peak = peak_in_time(scene.with_(**stepped))
         # where it reaches the norm it stops there, to rounding
         assert (peak >= scene.log_norm_rate - 1e-9) is reaches
 
