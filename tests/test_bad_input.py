@@ -105,29 +105,6 @@ def test_overrides_make_a_study_or_are_refused(overrides):
     assert len(scenes) == study.size
 
 
-@pytest.mark.parametrize(
-    ("values", "complaint"),
-    [
-        ([], "has no values"),
-        ([2.0, 2.0], "stands twice"),
-        ([2.0, np.nan], "must be finite"),
-        ([np.inf], "must be finite"),
-        (3.0, "must be a list"),
-        ([[2.0]], "must be a number"),
-        (["two"], "must be a number"),
-        ([None], "must be"),
-    ],
-)
-def test_values_of_an_axis(values, complaint):
-    def scenes():
-        axes = [Axis("b_over_a", values)]
-        study = Study(name="n", title="t", base=Scene(), axes=axes, measure=CriticalStep())
-        return list(study.scenes())
-
-    with pytest.raises(InvalidValue, match=complaint):
-        scenes()
-
-
 def test_an_axis_may_be_unsorted():
     """The values stay in the order they were given, and fits do not depend on it."""
     down = run(SMALL.with_(b_over_a=[3.0, 2.0, 2.5]))

@@ -11,7 +11,6 @@ from running import run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.regimes import starting
@@ -84,31 +83,3 @@ def test_it_may_be_an_axis():
         )
     )
     assert found.unstable.values.tolist() == [0.0, 1.0]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: Scene(initial_stress=-0.8), "must exceed -mu_star = -0.76"),
-        (lambda: Scene(law="two_slip_states", initial_state=0.1), "whose states share it"),
-        (
-            lambda: rsfstudy.critical_step(Scene(initial_state=0.1, stiffness_ratio=2.0)),
-            "from which critical steps start.*triggered",
-        ),
-        (
-            lambda: run(
-                Study(
-                    name="lattice",
-                    title="Stress at the beginning",
-                    base=Scene(),
-                    axes=[Axis("initial_stress", [0.0, -0.9])],
-                    measure=Triggered(),
-                )
-            ),
-            "must exceed -mu_star",
-        ),
-    ],
-)
-def test_what_is_wrong(wrong, message):
-    with pytest.raises(InvalidValue, match=message):
-        wrong()

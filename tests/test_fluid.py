@@ -19,7 +19,6 @@ from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
 from rsfstudy.declare.axis import Axis
-from rsfstudy.errors import InvalidValue
 from rsfstudy.files.restore import study_of
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -369,29 +368,6 @@ def test_several_states_and_a_fluid():
 
 
 # ---- scenes --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("fields", "text"),
-    [
-        ({"dilatancy": 0.1}, "dilatancy = 0.1: has no meaning while the fault is drained.*Leave"),
-        ({"drainage": 0.1}, "drainage = 0.1: has no meaning while the fault is drained.*fluid="),
-        ({"fluid": "dilatant", "dilatancy": -0.1}, "dilatancy = -0.1: must be 0 or greater"),
-        (
-            {"fluid": "dilatant", "drainage": 0.0},
-            "drainage = 0.0: must be greater than 0.*undrained",
-        ),
-        ({"fluid": "dilatant", "drainage": math.inf}, "drainage = inf: must be finite"),
-        ({"fluid": "wet"}, "fluid = 'wet': is unknown.*dilatant"),
-        (
-            {"fluid": "dilatant", "dilatancy": 0.1, "drainage": 1e-14, **CONSTANT},
-            "leaves no critical stiffness.*Give stiffness",
-        ),
-    ],
-)
-def test_what_makes_no_fluid_is_refused(fields, text):
-    with pytest.raises(InvalidValue, match=text):
-        Scene(**fields)
 
 
 def test_a_scene_with_a_fluid_is_a_scene():

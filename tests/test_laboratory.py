@@ -115,24 +115,6 @@ def test_mass_and_radiation():
     assert radiating.scene().radiation_damping == pytest.approx(impedance * V / SIGMA, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("stated", "complaint"),
-    [
-        ({"normal_stress": "-5 MPa"}, "normal_stress = '-5 MPa': must be positive. Give it in Pa"),
-        ({"slip_distance": "10 um/s"}, "slip_distance = .*another kind than m"),
-        ({"mass": 1e4}, "mass = 10000.0: needs a stiffness to oscillate"),
-        (
-            {"mass": 1e4, "stiffness": 5e10, "period": 1e-2},
-            "give mass or period .here 0.01 s., not both",
-        ),
-        ({"density": 2700.0}, "density = 2700.0: goes with shear_modulus"),
-    ],
-)
-def test_what_makes_no_rig(stated, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Laboratory(**{**THREE, **stated})
-
-
 def test_a_scale_that_is_unusual_is_told():
     with pytest.warns(UserWarning, match="slip_distance is 1 m: unusual for a rig. Is the unit"):
         Laboratory(**{**THREE, "slip_distance": 1.0})

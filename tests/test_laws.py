@@ -199,28 +199,6 @@ def test_steps_to_either_side_mirror_one_another_by_symmetric_laws_alone():
         assert (abs(found / other - 1.0) < 1e-5) is symmetric, scene.law
 
 
-# ---- bad input -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("given", "complaint"),
-    [
-        ({"law": "family", "law_exponent": 1.1}, "law_exponent = 1.1: must lie between 0 and 1"),
-        ({"law": "family", "law_exponent": -0.1}, "law_exponent = -0.1: must lie .* the slowness"),
-        ({"stress_dependence": -1}, "stress_dependence = -1.0: must be 0 or greater.*leaves the"),
-        ({"law": "composite", "cutoff_velocity_ratio": 0}, "ratio = 0.0: must be greater than 0"),
-        ({"law": "cut_off", "cutoff_velocity_ratio": -2}, "must be greater than 0.*set law"),
-        ({"cutoff_velocity_ratio": 1.0}, "cutoff_velocity_ratio = 1.0: has no meaning for slip"),
-        ({"law": "cut_off", "cutoff_velocity_ratio": 1.0}, "b_over_a = 2.0: must exceed 2: .*give"),
-        ({"law": "composite", "b_over_a": 0.9}, "b_over_a = 0.9: must exceed 0.99[0-9]+: without"),
-    ],
-    ids=str,
-)  # fmt: skip
-def test_what_is_refused(given, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**given)
-
-
 def steadfast(log_rate, state, p):
     return -state
 

@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 
 from rsfstudy import Laboratory, Scene, protocol, simulate
 from rsfstudy.analysis.swing import swing
-from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.meter import Meter
@@ -131,27 +130,3 @@ def test_units_of_the_rig():
     rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
     kind = rig.protocol([{"velocity": "1 um/s", "normal_stress": "5.5 MPa"}])
     assert kind.history[0].normal_stress == pytest.approx(0.1, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: Scene(normal_stress_step=-1.0), "must be greater than -1"),
-        (
-            lambda: Scene(normal_stress="constant", normal_stress_step=0.1),
-            "is changed by the loading.*normal_stress='imposed'",
-        ),
-        (
-            lambda: Scene(normal_stress="imposed", normal_stress_step=0.1, stress_dependence=0.5),
-            "not for normal stress that the loading changes",
-        ),
-        (lambda: Scene(normal_stress="imposed", phi=60.0), "set normal_stress='variable'"),
-        (
-            lambda: protocol([{"velocity": 1.0, "normal_stress": 0.0}]),
-            "normal_stress.*must be greater than 0",
-        ),
-    ],
-)
-def test_what_is_wrong(wrong, message):
-    with pytest.raises(InvalidValue, match=message):
-        wrong()

@@ -138,42 +138,6 @@ def test_it_is_an_axis_and_a_file_holds_it():
     assert Scene(**told) == scenes[1]
 
 
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"oscillation_amplitude": 1.0}, "must be less than 1. Normal stress stays positive"),
-        ({"oscillation_amplitude": -0.1}, "must be 0 or greater. 0 is no oscillation"),
-        ({"oscillation_amplitude": 0.1, "oscillation_period": 0.0}, "must be greater than 0"),
-        (
-            {"oscillation_amplitude": 0.1, "oscillation_period": 5e-8},
-            "below the period of free oscillation, .* = 5.85e-08: mass.*Set inertia=True",
-        ),
-        (
-            {"oscillation_amplitude": 0.1, "normal_stress": "constant"},
-            "is changed by the loading.*normal_stress='imposed'",
-        ),
-        (
-            {"oscillation_amplitude": 0.1, "fluid": "dilatant"},
-            "no meaning for fluid='dilatant', whose pore pressure",
-        ),
-        (
-            {"oscillation_amplitude": 0.1, "stress_dependence": 0.5},
-            "not for normal stress that the loading changes",
-        ),
-        (
-            {"oscillation_amplitude": 0.1, "regularised": True},
-            "regularised = True: has no meaning for oscillation",
-        ),
-        ({"oscillation_period": 5.0}, "no meaning for step.*state oscillation_amplitude too"),
-        ({"oscillation_amplitude": 0.1, "hold_time": 5.0}, "has no meaning"),
-        ({"oscillation_amplitude": 0.1, "displacement_step": 5.0}, "no meaning for oscillation"),
-    ],
-)
-def test_what_is_wrong(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**fields)
-
-
 def test_faster_than_free_oscillation_with_mass():
     fast = {"oscillation_amplitude": 0.1, "oscillation_period": 5e-8, "inertia": True}
     motion = simulate(Scene(**CASES["imposed"], **fast), duration=2e-7)

@@ -3,7 +3,6 @@
 import copy
 import cProfile
 import json
-import math
 import pickle
 import pstats
 
@@ -109,57 +108,6 @@ def test_work_grows_with_the_number_of_segments():
         work.append(motion.attrs["rhs_evaluations"])
     assert work[2] == pytest.approx(10.0 * work[1], rel=0.05)
     assert calls[2] == pytest.approx(10.0 * calls[1], rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"hold_time": -1.0}, r"hold_time = -1.0: must be 0 or greater. 0 is no hold"),
-        ({"hold_time": math.inf}, "hold_time = inf: must be finite"),
-        ({"hold_time": math.nan}, "hold_time = nan: must be finite"),
-        ({"velocity_steps": 1.5}, "velocity_steps = 1.5: must be a whole number"),
-        ({"velocity_steps": -1}, "velocity_steps = -1.0: must be 0 or greater. 0 is no step"),
-        ({"velocity_steps": 1, "velocity_ratio": 0.0}, "velocity_ratio = 0.0.*hold_time holds"),
-        ({"velocity_steps": 1, "velocity_ratio": -2.0}, "velocity_ratio = -2.0: must be greater"),
-        ({"velocity_ratio": 2.0}, "no meaning for step.*state velocity_steps too"),
-        ({"hold_time": 1.0, "displacement_step": 1.0}, "no meaning for slide_hold_slide"),
-        ({"hold_time": 1.0, "velocity_steps": 1}, "velocity_steps = 1: has no meaning"),
-        (
-            {"loading": "slide_hold_slide"},
-            "called for by oscillation_amplitude, .*hold_time, velocity_ramp, velocity_steps",
-        ),
-    ],
-)
-def test_fields_that_make_no_protocol(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**fields)
-
-
-@pytest.mark.parametrize(
-    ("rows", "complaint"),
-    [
-        ([], "protocol = .*has no segments. State one at least"),
-        ("steps.csv", "must be a list of segments. Read a file by rsfstudy.read_protocol"),
-        ([3.0], 'segment 1: segment = 3.0: is no segment. Write {"velocity"'),
-        ([{"duration": 1.0}], "segment 1: velocity = None: must be stated"),
-        ([{"velocity": 1.0, "durations": 1.0}], "'durations': is unknown. Did you mean 'duration'"),
-        ([{"velocity": -1.0}], "velocity = -1.0: must be 0 or greater.*forward slip; 0 holds"),
-        ([{"velocity": math.nan}], "velocity = nan: must be 0 or greater, and finite"),
-        ([{"velocity": "fast"}], "velocity = 'fast': must be"),
-        ([{"velocity": 1.0, "duration": 0.0}], "duration = 0.0: must be positive. Leave out"),
-        ([{"velocity": 1.0, "duration": math.nan}], "duration = nan: must be positive"),
-        (
-            [{"velocity": 1.0, "duration": 1.0, "distance": 1.0}],
-            "give duration or distance .here 1.0., not both",
-        ),
-        ([{"velocity": 0.0, "distance": 1.0}], "must be positive where a distance is stated"),
-        ([{"velocity": 1.0}, {"velocity": 2.0}], "segment 1: duration = inf: never ends. State"),
-        ([{"velocity": 1.0, "step": math.inf}], "step = inf: must be a finite number"),
-    ],
-)
-def test_segments_that_make_no_protocol(rows, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        protocol(rows)
 
 
 def test_protocols_differ_by_their_segments(tmp_path):

@@ -9,7 +9,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
@@ -85,16 +84,3 @@ def test_damped_cycles_do_not_overshoot():
         for effect in ({"inertia": True}, {"radiation_damping": IMPEDANCE})
     ]
     assert 0.4 < cycles[1] / cycles[0] < 0.65
-
-
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"radiation_damping": -1.0}, "must be 0 or greater"),
-        ({"radiation_damping": 0.1, "inertia": True}, "stands in for mass"),
-        ({"radiation_damping": math.nan}, "must be finite"),
-    ],
-)
-def test_wrong_scenes_are_refused(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**fields)

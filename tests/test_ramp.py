@@ -101,24 +101,6 @@ def test_it_settles_once_over(slider):
     assert float(motion.time[-1]) == pytest.approx(12.0, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"normal_stress_ramp": -1.0}, "must be greater than -1. Normal stress stays positive"),
-        ({**RAMP, "ramp_duration": 0.0}, "must be greater than 0. A sudden change is normal_st"),
-        ({**RAMP, "normal_stress": "constant"}, "is changed by the loading"),
-        ({**RAMP, "fluid": "dilatant"}, "no meaning for fluid='dilatant'"),
-        ({**RAMP, "stress_dependence": 0.5}, "not for normal stress that the loading changes"),
-        ({**RAMP, "regularised": True}, "regularised = True: has no meaning for ramp"),
-        ({"ramp_duration": 5.0}, "no meaning for step.*state normal_stress_ramp too"),
-        ({**RAMP, "normal_stress_step": 0.1}, "no meaning for ramp"),
-    ],
-)
-def test_what_is_wrong(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**fields)
-
-
 def test_what_is_not_asked_of_it():
     with pytest.raises(InvalidValue, match="ramp': changes normal stress all along"):
         LimitCycle()(Scene(**IMPOSED, **RAMP), Accuracy())
@@ -152,17 +134,3 @@ def test_the_load_point_is_where_it_should_be():
     assert moved == pytest.approx(2.0, rel=1e-15)
     assert scene.load_velocity == 0.0
     assert Scene(**PLAIN, velocity_ramp=0.0) == Scene(**PLAIN)
-
-
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"velocity_ramp": -1.5}, "must be -1 or greater. -1 ends with a load point at rest"),
-        ({"velocity_ramp": 1.0, "velocity_ramp_duration": 0.0}, "must be greater than 0"),
-        ({"velocity_ramp": 1.0, "velocity_ramp_stairs": 1.5}, "must be a whole number"),
-        ({"velocity_ramp_stairs": 5.0}, "no meaning for step.*state velocity_ramp too"),
-    ],
-)
-def test_what_is_no_ramp_of_velocity(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(**PLAIN, **fields)

@@ -6,7 +6,7 @@ import pytest
 from in_time import InTime
 
 from rsfstudy import Scene, simulate
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.errors import Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
@@ -65,16 +65,8 @@ def test_friction_is_odd_in_slip_rate():
     assert value / scene.a == pytest.approx(linear, rel=1e-9)
 
 
-def test_what_reversal_is_refused_for():
+def test_a_step_that_reverses_all_stress_ends_the_motion():
     step = {"displacement_step": -200.0, **CONSTANT}
-    with pytest.raises(InvalidValue, match="regularised = True.*inertia.*Leave one"):
-        Scene(regularised=True, inertia=True, **CONSTANT)
-    with pytest.raises(InvalidValue, match="regularised = True.*radiation_damping"):
-        Scene(regularised=True, radiation_damping=1e-9, **CONSTANT)
-    with pytest.raises(InvalidValue, match="regularised = True.*dilatant"):
-        Scene(regularised=True, fluid="dilatant", **CONSTANT)
-    with pytest.raises(InvalidValue, match="stress_dependence = 1.*not for dilatant"):
-        Scene(stress_dependence=1.0, fluid="dilatant", **CONSTANT)
     for scene in (Scene(**step, **BACK), Scene(regularised=True, **step)):
         with pytest.warns(Incomplete, match="shear_stress_reversed"):
             ran = simulate(scene)

@@ -3,7 +3,6 @@ starts.
 """
 
 import json
-import math
 import re
 from dataclasses import dataclass
 from typing import ClassVar
@@ -21,7 +20,7 @@ from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import ProportionalFit, Spread
+from rsfstudy.reduce import Spread
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
 
@@ -36,29 +35,6 @@ def study(*axes: Axis, **fields) -> Study:
     return Study(
         name="trial", title="Trial", base=Scene(), axes=axes, measure=CriticalStep(), **fields
     )
-
-
-@pytest.mark.parametrize(
-    ("dimension", "values", "message"),
-    [
-        ("b_over_a", [], "b_over_a.*has no values"),
-        ("b_over_a", [2.0, 2.0], "stands twice"),
-        ("b_over_a", [2.0, math.nan], "must be finite"),
-        ("b_ovr_a", [2.0], "Did you mean 'b_over_a'"),
-        ("case", [2.0], "is not a field"),
-        ("law", {"x": {"law": "slip"}}, "needs a name of its own"),
-        ("case", {"x": {"alfa": 0.1}}, "Did you mean 'alpha'"),
-        ("direction", {"x": {"direction": "up"}}, "needs a name of its own"),
-        ("directoin", ["up"], "Did you mean 'direction'"),
-        ("direction", ["up", "left"], "direction = 'left': is unknown"),
-        ("direction", ["up", 2.0], "direction = 2.0: must be a text, as 'up' is"),
-        ("direction", ["up", "\0"], "must be a text"),
-        ("of", ["load_velocity_ratio", "displacement_step"], "'of': decides which numbers"),
-    ],
-)
-def test_meaningless_axes_are_refused(dimension, values, message):
-    with pytest.raises(InvalidValue, match=message):
-        study(Axis(dimension, values))
 
 
 def test_axes_must_not_vary_the_same_field():
@@ -133,37 +109,6 @@ def test_points_keep_their_labels_where_they_keep_their_values():
     assert [s.alpha for s in both.scenes()] == [None, 0.25, 0.4, 0.56]
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"base": {"law": "slip"}}, "base.*must be made of Scene objects"),
-        ({"measure": "critical_step"}, "measure = 'critical_step': must be made of Measure"),
-        ({"measure": CriticalStep}, "must be made of Measure"),
-        ({"axes": []}, "must hold at least one axis"),
-        ({"axes": ["b_over_a"]}, "must be made of Axis"),
-        ({"reductions": ["zeta"]}, "must be made of Reduction"),
-        ({"claims": ["C6"]}, "must be made of Claim"),
-        (
-            {"reductions": [ProportionalFit(name="z", of="critical_displacement", on="x")]},
-            "critical_displacement'.*is not measured.*Did you mean",
-        ),
-        (
-            {"axes": [Axis("load_velocity_ratio", [2.0])]},
-            "solves for load_velocity_ratio; it cannot be an axis",
-        ),
-    ],
-)
-def test_studies_put_together_wrongly_are_refused_at_once(fields, message):
-    parts = {"base": Scene(), "axes": [Axis("b_over_a", [2.0])], "measure": CriticalStep()}
-    with pytest.raises(InvalidValue, match=message):
-        Study(name="trial", title="Trial", **{**parts, **fields})
-
-
-def test_what_the_measure_looks_for_cannot_be_set():
-    with pytest.raises(InvalidValue, match="solves for load_velocity_ratio; it cannot be an axis"):
-        study(Axis("b_over_a", [2.0])).with_(load_velocity_ratio=3.0)
-
-
 def test_an_axis_no_cell_uses_is_refused():
     unused = Study(
         name="trial",
@@ -174,11 +119,6 @@ def test_an_axis_no_cell_uses_is_refused():
     )
     with pytest.raises(InvalidValue, match="phi.*has no effect in any cell"):
         list(unused.scenes())
-
-
-def test_unknown_overrides_suggest():
-    with pytest.raises(InvalidValue, match="Did you mean 'stiffness_ratio'"):
-        study(Axis("b_over_a", [2.0])).with_(stifness_ratio=1.0)
 
 
 @given(st.lists(st.floats(1.01, 50.0), min_size=1, max_size=5, unique=True), st.booleans())

@@ -204,21 +204,3 @@ def test_values_at_times_that_were_asked_for(engine):
         ends = rsfstudy.simulate(scene, duration=at, rtol=1e-9, engine=engine).shear_stress[-1]
         assert float(stress) == pytest.approx(float(ends), abs=1e-8)
     assert motion.load_point_displacement[-1] == pytest.approx(16.0, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("times", "complaint"),
-    [
-        ([1.0, 1.0], "must increase"),
-        ([], "must increase"),
-        ([-1.0, 2.0], "must increase from 0"),
-        ([1.0, math.inf], "be finite"),
-        ([[1.0, 2.0]], "must increase"),
-        (["a"], "must be numbers"),
-    ],
-)
-def test_times_that_cannot_be_told(times, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        rsfstudy.simulate(Scene(), times=times)
-    with pytest.raises(InvalidValue, match="give duration or times, not both"):
-        rsfstudy.simulate(Scene(), times=[1.0, 2.0], duration=3.0)

@@ -95,24 +95,6 @@ def test_two_of_one_length_are_one(law, stress):
     agree(Triggered(), *both(law, stiffness_ratio=1.3, load_velocity_ratio=30.0, **stress), 1e-4)
 
 
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"b_over_a": 2.0}, r"b_over_a = 2.0: is b1_over_a \+ b2_over_a.*Give those"),
-        ({"length_ratio": 0.0}, "length_ratio = 0.0: must be greater than 0"),
-        ({"b1_over_a": 0.2, "b2_over_a": 0.1}, "no critical stiffness.*give stiffness itself"),
-        ({"b1_over_a": 0.0, "b2_over_a": 0.0}, "no state has an effect"),
-    ],
-)
-def test_what_means_nothing_is_refused(fields, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        Scene(law="two_slip_states", **fields)
-    with pytest.raises(InvalidValue, match="b2_over_a = 0.0: must not be 0"):
-        Scene(law="two_slowness_states", b2_over_a=0.0)
-    with pytest.raises(InvalidValue, match="b1_over_a = 1.0: has no meaning for slip"):
-        Scene(b1_over_a=1.0)
-
-
 @pytest.mark.parametrize("law", LAWS.values())
 @pytest.mark.parametrize("effect", [{}, {"stress_dependence": 2.0, **CONSTANT}])
 def test_what_stress_takes_is_shared_within_bounds(law, effect):

@@ -1,0 +1,139 @@
+"""What is refused, and in which words. Each field is held to its rule by what declares it; the
+messages that a person should read once stand in `wordings.txt`, each below the call that it answers
+(`python tests/test_wordings.py` writes it anew: read the difference).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.reduce import ProportionalFit
+from rsfstudy.slider.numbers import Slider
+from rsfstudy.slider.parts import RULES, is_flag, names_of
+from rsfstudy.slider.registry import OWNERS, SLOTS
+
+WORDINGS = Path(__file__).with_name("wordings.txt")
+
+# ---- each field by its declaration ---------------------------------------------------------------
+
+#: Numbers that break a rule.
+BREAKING = {
+    "": (),
+    "must be greater than 0": (0.0, -1.0),
+    "must be 0 or greater": (-1.0,),
+    "must be greater than -1": (-1.0,),
+    "must be -1 or greater": (-1.5,),
+    "must lie between 0 and 1": (-0.1, 1.1),
+}
+#: What is no number at all.
+NO_NUMBERS = {"0.01": "must be a number", True: "must be a number", math.nan: "must be finite",
+              math.inf: "must be finite"}  # fmt: skip
+
+
+def calling(part: type) -> dict[str, Any]:
+    """Fields that call a part into a scene."""
+    if part is Slider:
+        return {}
+    if part.called_by:
+        return {part.called_by: True if is_flag(part, part.called_by) else 0.01}
+    slot = next(slot for slot in SLOTS if part in slot.choices.values())
+    return {slot.name: part.name} if slot.is_named and part.name != slot.default else {}
+
+
+def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
+    """A scene with one wrong value, the field, and the rule that it breaks."""
+    for name, part in OWNERS.items():
+        wrong = {"yes": "must be true or false"}
+        if not is_flag(part, name):
+            rule = part.__dataclass_fields__[name].metadata["rule"]
+            wrong = NO_NUMBERS | dict.fromkeys(BREAKING[rule], rule)
+        for value, rule in wrong.items():
+            yield {**calling(part), name: value}, name, rule
+
+
+def test_every_rule_is_broken_here():
+    assert set(BREAKING) == set(RULES)
+
+
+@pytest.mark.parametrize(("fields", "name", "rule"), list(broken()), ids=str)
+def test_each_field_is_held_to_its_rule(fields, name, rule):
+    with pytest.raises(InvalidValue) as refused:
+        Scene(**fields)
+    value = fields[name]
+    shown = repr(float(value)) if type(value) is float else repr(value)
+    assert str(refused.value).startswith(f"{name} = {shown}: {rule}.")
+
+
+def foreign() -> Iterator[tuple[dict[str, Any], str]]:
+    """A field that another part of its slot brings, beside one that does without."""
+    for slot in SLOTS:
+        for part in slot.choices.values():
+            for other in slot.choices.values():
+                calls = calling(other)
+                for name in set(names_of(part)) - set(names_of(other)) - {part.called_by}:
+                    if OWNERS[name] is part:
+                        yield {**calls, name: 0.5}, name
+
+
+@pytest.mark.parametrize(("fields", "name"), list(foreign()), ids=str)
+def test_no_field_is_taken_for_nothing(fields, name):
+    with pytest.raises(InvalidValue, match=rf"^{name} = 0.5: .*(meaning|follows from)"):
+        Scene(**fields)
+
+
+# ---- wordings ------------------------------------------------------------------------------------
+
+
+def study(*axes, **fields) -> rsfstudy.Study:
+    parts = {"base": Scene(), "axes": axes, "measure": CriticalStep()}
+    return rsfstudy.Study(**{"name": "trial", "title": "Trial", **parts, **fields})
+
+
+#: What calls are made of, beside what is public.
+MORE = {"study": study, "inf": math.inf, "nan": math.nan, "CriticalStep": CriticalStep,
+        "LimitCycle": LimitCycle, "Triggered": Triggered, "ProportionalFit": ProportionalFit,
+        "Accuracy": Accuracy}  # fmt: skip
+
+
+def answered(call: str) -> str:
+    """The message with which a call is refused."""
+    names = {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
+    with contextlib.ExitStack() as stack:
+        for slot in SLOTS:  # other tests have named parts of their own
+            stack.enter_context(mock.patch.dict(slot.own, clear=True))
+        refused = stack.enter_context(pytest.raises(InvalidValue))
+        eval(call, names | MORE)
+    return str(refused.value)
+
+
+def kept() -> dict[str, str]:
+    """Messages by call."""
+    blocks = WORDINGS.read_text(encoding="utf-8").strip().split("\n\n")
+    parts = (block.partition("\n    ") for block in blocks if not block.startswith("#"))
+    return {call: message for call, _between, message in parts}
+
+
+@pytest.mark.parametrize(("call", "message"), kept().items())
+def test_a_message_is_worded_as_it_was_read(call, message):
+    assert answered(call) == message
+
+
+if __name__ == "__main__":
+    head, *blocks = WORDINGS.read_text(encoding="utf-8").strip().split("\n\n")
+    calls = [block.split("\n")[0] for block in blocks]
+    texts = [call if call.startswith("#") else f"{call}\n    {answered(call)}" for call in calls]
+    WORDINGS.write_text("\n\n".join([head, *texts]) + "\n", encoding="utf-8")
