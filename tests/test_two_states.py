@@ -218,8 +218,6 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
 
 # ---- three states --------------------------------------------------------------------------------
 
-SHARES = (0.5, 0.2, 0.3)
-
 
 def evolutions(log_rate, psis, shift, share, p):
     """Three states, each with its share of b; the second and third over lengths of their own."""
