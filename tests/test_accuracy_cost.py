@@ -4,7 +4,6 @@ before a run.
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,7 +45,7 @@ CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio
 def test_every_right_hand_side_is_counted(method, monkeypatch):
     """By the meter as by the equations themselves: Jacobians and interpolants included."""
     system, calls = between_ruptures(SCENE, clock=False), []
-    counted = replace(system, rate=lambda state, p: (calls.append(state), system.rate(state, p))[1])
+    counted = system._replace(rate=lambda state, p: (calls.append(state), system.rate(state, p))[1])
     meter = Meter(10**6, {"quasi_static": method})
     # within each step it is recorded, which asks for interpolants
     path = along(counted, (0.0, 0.0), 1e-6, meter, [EACH_STEP], recording=Recording())

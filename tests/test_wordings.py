@@ -84,7 +84,7 @@ def foreign() -> Iterator[tuple[dict[str, Any], str]]:
         for part in slot.choices.values():
             for other in slot.choices.values():
                 calls = calling(other)
-                for name in set(names_of(part)) - set(names_of(other)) - {part.called_by}:
+                for name in sorted({*names_of(part)} - {*names_of(other), part.called_by}):
                     if OWNERS[name] is part:
                         yield {**calls, name: 0.5}, name
 
