@@ -61,7 +61,7 @@ def shade(exponent: float) -> Any:
 
 def line_of_law(row: xr.Dataset) -> dict[str, Any]:
     """The family solid, from dark to light and with markers; others in other colours and dashed."""
-    from rsfstudy.plots._style import look, marker
+    from rsfstudy.plots import look, marker
 
     name, exponent = str(row["evolution"].item()), float(row.get("law_exponent", math.nan))
     if math.isnan(exponent):

@@ -129,7 +129,7 @@ DEFAULT = "DOP853"
 
 def mark_lost(dataset: xr.Dataset, axes: Axes) -> None:
     """The best that the answer is known to, and runs whose accuracy was out of reach."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     floor = max(float(dataset["measured_error_error"].max()), 1e-16)
     level(floor, linestyle=":")(dataset, axes)

@@ -74,7 +74,7 @@ SHOWN = (1e-3, 10.0)
 
 def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
     """One outline an accuracy."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     for number, digits in enumerate(dataset["requested_digits"].values):
         values = dataset["error_over_estimate"].isel(requested_digits=number).values.ravel()

@@ -61,7 +61,7 @@ def weakening(dataset: xr.Dataset) -> float:
 
 def mark_limits(dataset: xr.Dataset, axes: Axes) -> None:
     """The drained limit across, and at the left those without drainage."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     drained = weakening(dataset)
     axes.axhline(drained, color="0.75", linewidth=2.2, zorder=1, label="drained, $b-a$")

@@ -49,8 +49,7 @@ def bars(variable: str, digits: int) -> Draw:
     """Bars of a number: one row a combination, and one bar a law."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
-        from rsfstudy.plots._axes import name_points
-        from rsfstudy.plots._style import look
+        from rsfstudy.plots import look, name_points
 
         values = dataset[variable].stack(row=("coupling", "dynamics")).transpose("law", "row")
         for number, law in enumerate(values["law"].values):

@@ -310,7 +310,7 @@ ends(
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
     """Rows with the names of cases."""
-    from rsfstudy.plots._axes import name_points
+    from rsfstudy.plots import name_points
 
     name_points(axes.yaxis, [str(name) for name in dataset["hard_case"].values], 60)
     axes.tick_params(axis="y", labelsize=5.5)
@@ -329,7 +329,7 @@ def mark_errors(dataset: xr.Dataset, axes: Axes) -> None:
     """Measured errors (filled) and their estimates (open); names of statuses, and "exact" where
     there is no error.
     """
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     rows, numbers = np.arange(dataset.sizes["hard_case"]), dataset["answer"].notnull().values
     labels = {int(status): status.label.replace("_", " ") for status in Status}

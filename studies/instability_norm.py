@@ -54,8 +54,7 @@ def mark_norm(_dataset: xr.Dataset, axes: Axes) -> None:
 
 def mark_published(dataset: xr.Dataset, axes: Axes) -> None:
     """The norms that published values imply."""
-    from rsfstudy.plots._style import look, marker
-    from rsfstudy.plots._text import number
+    from rsfstudy.plots import look, marker, number
 
     for place in range(dataset.sizes["boundary"]):
         row = dataset.isel(boundary=place)

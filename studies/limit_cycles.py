@@ -30,7 +30,7 @@ STATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
 
 def orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
     """The cycles that exist and differ, over all axes of the lattice, each with a name."""
-    from rsfstudy.plots._axes import place
+    from rsfstudy.plots import place
 
     found: dict[bytes, tuple[xr.Dataset, str]] = {}
     dims = dataset["status"].dims
@@ -47,7 +47,7 @@ def mark_orbits(dataset: xr.Dataset, axes: Axes) -> None:
     """Stress against slip rate, with lines of steady state and of constant state, for each coupling
     of stress and slip that there is.
     """
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     cells = [cell for cell, _name in orbits(dataset)]
     for number, (cell, name) in enumerate(orbits(dataset)):
@@ -102,7 +102,7 @@ def _numbered(
 
 def mark_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
     """Two cycles, one after the other, against slip; what the spring carries in the first."""
-    from rsfstudy.plots._style import look, marker
+    from rsfstudy.plots import look, marker
 
     for number, (cell, name) in enumerate(orbits(dataset)):
         slip, stress = cell["slip"].values, cell["frictional_stress"].values

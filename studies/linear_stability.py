@@ -72,7 +72,7 @@ def curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def mark_slowest(dataset: xr.Dataset, axes: Axes) -> None:
     """Dotted lines where slower sliding has no steady state."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     for number in range(dataset.sizes["phi"]):
         row = dataset.isel(phi=number, load_velocity_ratio=-1)
@@ -87,7 +87,7 @@ def mark_slowest(dataset: xr.Dataset, axes: Axes) -> None:
 
 def angle(row: xr.Dataset) -> str:
     """The angle, and from which slip rate on a spring of 0.8 k_cr(V_*) is stable."""
-    from rsfstudy.plots._text import number
+    from rsfstudy.plots import number
 
     text = rf"$\phi = {float(row['phi']):g}°$"
     velocity = float(row.get("stabilising_velocity", math.nan))

@@ -146,7 +146,7 @@ def settled(variable: str, row: xr.Dataset) -> xr.DataArray:
 
 def mark_theory(dataset: xr.Dataset, axes: Axes) -> None:
     """Gains of linear theory."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     for number in range(dataset.sizes["stiffness_ratio"]):
         gain = float(dataset["linear_gain"].isel(stiffness_ratio=number).max())

@@ -49,7 +49,7 @@ def decade(row: xr.Dataset) -> int | None:
 
 def line(row: xr.Dataset) -> dict[str, Any]:
     """Steps up solid, and steps down dashed."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     decades = decade(row) or 1
     colour = look(abs(decades) - 1)["color"]

@@ -101,7 +101,7 @@ def fit(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 
 def name(drop: str, row: xr.Dataset) -> str:
     """The case, and its slope if a line fits."""
-    from rsfstudy.plots._text import slope_with_error
+    from rsfstudy.plots import slope_with_error
 
     text, slope = str(row["case"].item()), row.get(f"{drop}_slope", xr.DataArray(math.nan))
     if not bool(np.isfinite(slope)):

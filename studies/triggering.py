@@ -110,7 +110,7 @@ def beside(variable: str, name: str, style: dict[str, Any], over: str | None = N
     """What is drawn beside falls of normal stress, in their colours; over a number of the scene."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
-        from rsfstudy.plots._style import in_grey, look
+        from rsfstudy.plots import in_grey, look
 
         values = dataset[variable] / (dataset[over] if over else 1.0)
         for number in range(values.sizes["case"]):

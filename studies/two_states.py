@@ -47,7 +47,7 @@ SPRINGS = np.round(
 
 def mark_peaks(dataset: xr.Dataset, axes: Axes) -> None:
     """Peaks of the events that are kept, and the cycle of one event."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     ratio, peaks = dataset["stiffness_ratio"], dataset["peak_log10_slip_rate"]
     chaotic = dataset["status"] == int(Status.NOT_PERIODIC)
@@ -65,7 +65,7 @@ def mark_peaks(dataset: xr.Dataset, axes: Axes) -> None:
 
 def mark_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
     """Floquet multipliers of the cycle of one event, and growth of departures by each event."""
-    from rsfstudy.plots._style import look
+    from rsfstudy.plots import look
 
     imaginary = dataset["floquet_multiplier_imaginary"]
     for number, (values, style, label) in enumerate(

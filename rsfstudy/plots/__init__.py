@@ -29,9 +29,16 @@ from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
 from rsfstudy.plots import _panel
+from rsfstudy.plots._axes import name_points as name_points
+from rsfstudy.plots._axes import place as place
 from rsfstudy.plots._style import hold_ticks, letter, make_room, settle, share_legends, size
+from rsfstudy.plots._style import in_grey as in_grey
+from rsfstudy.plots._style import look as look
+from rsfstudy.plots._style import marker as marker
 from rsfstudy.plots._style import styled as styled
+from rsfstudy.plots._text import number as number
 from rsfstudy.plots._text import pretty, symbol, wrapped
+from rsfstudy.plots._text import slope_with_error as slope_with_error
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.status import Status
