@@ -318,7 +318,7 @@ def rerun(
 
 @door
 def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
-    """What differs between two datasets (or named studies' results, or files): in declaration, in
+    """Differences between two datasets (or named studies' results, or files): in declaration, in
     what made them, and in numbers, cell by cell where both have the same place on every axis.
 
     Parameters

@@ -52,7 +52,7 @@ _TRIES = 2
 
 @dataclass(frozen=True)
 class Workers:
-    """Where cells are computed.
+    """A place where cells are computed.
 
     Parameters
     ----------

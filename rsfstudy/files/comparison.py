@@ -33,7 +33,7 @@ Pair = tuple[Any, Any]
 
 
 def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
-    """How two datasets of one study agree, variable by variable, in the cells that both have.
+    """Agreement of two datasets of one study, variable by variable, in the cells that both have.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def _agreement(
 
 @dataclass(frozen=True)
 class Comparison:
-    """What differs between two results datasets.
+    """Differences between two results datasets.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ def _left_out(both: Sequence[xr.Dataset]) -> dict[str, str]:
 
 
 def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """How the numbers agree; a headline without an error estimate is held to be exact."""
+    """Agreement of the numbers; a headline without an error estimate is held to be exact."""
     frame = compared(*shared)
     about = headline(shared[0])
     exact = (frame["variable"] == about) & frame["beyond_errors"].isna()

@@ -254,7 +254,7 @@ def provenance(dataset: xr.Dataset) -> Provenance:
 
 
 def from_json(dataset: xr.Dataset, name: str) -> Any:
-    """What an attribute of a dataset holds as JSON; raises DataError where it does not."""
+    """Value that an attribute of a dataset holds as JSON; raises DataError where it does not."""
     if name not in dataset.attrs:
         raise refused(name, "is missing")
     try:

@@ -287,7 +287,7 @@ def _fill(columns: Columns, places: list[int], rows: list[Any]) -> None:
 
 @dataclass(frozen=True)
 class Timed:
-    """How long cells took.
+    """Times that cells took.
 
     Attributes
     ----------
@@ -302,7 +302,7 @@ class Timed:
 
 
 def timed(path: Path) -> Timed | None:
-    """How long the cells of a journal took; None where there is none that can be read just now."""
+    """Times of the cells of a journal; None where there is none that can be read just now."""
     try:
         uri = f"{path.resolve().as_uri()}?mode=ro"
         with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:

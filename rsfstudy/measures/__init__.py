@@ -40,7 +40,7 @@ Plain = int | float | str | bool
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a measure found in one scene.
+    """Findings of a measure in one scene.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Measure:
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """What its numbers, inner dimensions and fields mean, with their units: those that the
+        """Meaning of its numbers, inner dimensions and fields, with their units: those that the
         vocabulary does not hold.
         """
         return (*(about for about in self.outputs if about.long_name), *self.dimensions)

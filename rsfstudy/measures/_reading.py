@@ -1,4 +1,4 @@
-"""What the measures have in common that read numbers off a record, as an experimenter does."""
+"""Shared by the measures that read numbers off a record, as an experimenter does."""
 
 from __future__ import annotations
 

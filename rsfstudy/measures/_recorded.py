@@ -1,4 +1,4 @@
-"""What the measures have in common that keep points of a motion."""
+"""Shared by the measures that keep points of a motion."""
 
 from __future__ import annotations
 

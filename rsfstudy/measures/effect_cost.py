@@ -1,4 +1,4 @@
-"""What the effects of a scene cost in a limit cycle: unknowns, right-hand sides, and how much
+"""Cost of the effects of a scene in a limit cycle: unknowns, right-hand sides, and how much
 longer one takes than in the plainest scene.
 """
 

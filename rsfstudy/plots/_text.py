@@ -102,7 +102,7 @@ def _length(text: str) -> int:
 
 
 def label(about: Quantity, width: int = 45) -> str:
-    """What a quantity is, its symbol and its units, for an axis."""
+    """Label of an axis: name of a quantity, its symbol and its units."""
     words = _SHORT.get(about.name, about.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
