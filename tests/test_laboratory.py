@@ -412,3 +412,40 @@ def test_wrong_usage_of_the_command(words, complaint, tmp_path, monkeypatch):
     ran = call("simulate", *words)
     assert ran.returncode == 2
     assert complaint in " ".join(ran.stderr.split())
+
+
+def test_a_stiffness_of_friction_is_multiplied_by_normal_stress() -> None:
+    """k D_c/sigma_* does not depend on sigma_* then; one of stress is read as before."""
+    for stress in ("5 MPa", "20 MPa"):
+        stated = {"normal_stress": stress, "slip_distance": "10 um", "reference_velocity": 1e-6}
+        rig = Laboratory(**stated, stiffness="0.01 1/um")
+        # a product and quotient of a few numbers: some roundings of 1e-16 each
+        assert rig.scene(**LAW).stiffness == pytest.approx(0.1, rel=1e-14)
+        asked = Laboratory(**stated).scene(**LAW, stiffness="0.02 1/um")
+        assert asked.stiffness == pytest.approx(0.2, rel=1e-14)
+    with pytest.raises(InvalidValue, match="another kind than Pa/m"):
+        Laboratory(**stated, stiffness="1 um")
+
+
+def test_a_change_of_units_leaves_every_dimensionless_number() -> None:
+    stated = {
+        "normal_stress": ("5 MPa", "50 bar", 5e6),
+        "slip_distance": ("10 um", "0.01 mm", 1e-5),
+        "reference_velocity": ("1 um/s", "3.6 mm/h", 1e-6),
+        "stiffness": ("0.05 MPa/um", "0.01 1/um", 5e10),
+        "shear_modulus": ("30 GPa", "30000 MPa", 3e10),
+        "density": ("2700 kg/m^3", "2.7e-6 kg/mm^3", 2700.0),
+    }
+    held = {"hold_time": ("1000 s", "1e6 ms", 1000.0)}
+    first, *others = (
+        Laboratory(**{name: texts[n] for name, texts in stated.items()})
+        .scene(**LAW, hold_time=held["hold_time"][n])
+        .as_dict()
+        for n in range(3)
+    )
+    for other in others:
+        assert other.keys() == first.keys()
+        for name, value in first.items():
+            # conversions are a few products, of 1e-16 each: far within 1e-12
+            same = pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
+            assert other[name] == same, name

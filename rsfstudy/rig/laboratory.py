@@ -59,7 +59,8 @@ class Laboratory:
     reference_velocity : quantity
         V_* (m/s): that of the load point before the test.
     stiffness : quantity, optional
-        Of the machine with its sample, as stress over displacement (Pa/m).
+        Of the machine with its sample, as stress over displacement (Pa/m); or as friction over
+        displacement (a text in 1/um, say), which is multiplied by normal stress.
     period : quantity, optional
         Period of free oscillation T (s), where mass acts; or
     mass : quantity, optional
@@ -88,7 +89,10 @@ class Laboratory:
     def __post_init__(self) -> None:
         for name, (units, least, most) in _STATED.items():
             if getattr(self, name) is not None:
-                value = _positive(name, getattr(self, name), units)
+                value = self._si(name, getattr(self, name), units)
+                if not value > 0.0:
+                    rule, remedy = "must be positive", f"Give it in {units}."
+                    raise InvalidValue(name, getattr(self, name), rule, remedy=remedy)
                 object.__setattr__(self, name, value)
                 if not least <= value <= most:
                     text = f"{name} is {value:g} {units}: unusual for a rig. Is the unit right?"
@@ -113,7 +117,7 @@ class Laboratory:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
         ``sigma_*/D_c`` is asked for.
         """
-        return float(in_si(name, value, _UNITS[scale]) / self.scales[scale].factor)
+        return float(self._si(name, value, _UNITS[scale]) / self.scales[scale].factor)
 
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
@@ -171,6 +175,19 @@ class Laboratory:
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in stated.items() if value is not None}
 
+    def _si(self, name: str, value: Any, units: str) -> float:
+        """A quantity in SI units; a stiffness may be of friction, over the normal stress."""
+        try:
+            return in_si(name, value, units)
+        except InvalidValue:
+            if units != "Pa/m":
+                raise
+            try:
+                return in_si(name, value, "1/m") * float(self.normal_stress)
+            except InvalidValue:
+                pass
+            raise
+
     def _of_rig(self) -> dict[str, float]:
         """The fields of a scene that the rig decides."""
         found = {"reference_rate": self.reference_velocity / self.slip_distance}
@@ -209,10 +226,3 @@ class Laboratory:
             }
         except InvalidValue as error:
             raise error.at(f"segment {number}") from error
-
-
-def _positive(name: str, value: Any, units: str) -> float:
-    number = in_si(name, value, units)
-    if not number > 0.0:
-        raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")
-    return number
