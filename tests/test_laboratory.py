@@ -449,3 +449,22 @@ def test_a_change_of_units_leaves_every_dimensionless_number() -> None:
             # conversions are a few products, of 1e-16 each: far within 1e-12
             same = pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
             assert other[name] == same, name
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        ("b", "Write b_over_a"),
+        ("k", "Write stiffness_ratio"),
+        ("V_0", "Write load_velocity_ratio"),
+        ("D_c", "state D_c as slip_distance"),
+        ("sigma", "state sigma_. as normal_stress"),
+    ],
+)
+def test_names_of_others_are_answered_by_one_line(name: str, remedy: str) -> None:
+    about = {"name": "named", "title": "Names", "base": Scene(), "measure": LimitCycle()}
+    study = Study(**about, axes=[Axis("a", [0.01])])
+    with pytest.raises(InvalidValue, match=remedy):
+        study.with_(**{name: 1.0})
+    with pytest.raises(InvalidValue, match=remedy):
+        Study(**about, axes=[Axis(name, [1.0])])

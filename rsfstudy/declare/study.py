@@ -38,6 +38,7 @@ from rsfstudy.slider.registry import (
     without_meaning,
 )
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.synonyms import instead_of_field
 from rsfstudy.vocabulary import QUANTITIES
 
 
@@ -180,7 +181,7 @@ class Study:
                         "is not a field of a scene, nor a number, flag or text of the measure "
                         f"{self.measure.name}"
                     )
-                    raise InvalidValue("field", name, rule, choices=known)
+                    raise _unknown("field", name, rule, known)
         varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self._of_scene]
         given = _given(self.measure)
         for rows in itertools.product(*varied):
@@ -349,7 +350,7 @@ class Study:
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
         if name not in known and not own_named([name], _rows(name, values)):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise InvalidValue("override", name, rule, choices=known)
+            raise _unknown("override", name, rule, known)
         self._check_sought([name])
         if is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
@@ -379,6 +380,11 @@ class Study:
     def _repr_html_(self) -> str:
         caption = f"{self.name}: {self.title} ({self.size:,} cells)"
         return study_html(caption, self.axes, self.base, self.measure, self.quantities)
+
+
+def _unknown(of: str, name: str, rule: str, known: Collection[str]) -> InvalidValue:
+    remedy = instead_of_field(name)
+    return InvalidValue(of, name, rule, remedy=remedy, choices=() if remedy else known)
 
 
 def _given(measure: Measure) -> str:
