@@ -49,6 +49,8 @@ class Approach:
         #: Derivatives of the section at the end of a cycle, and of its numbers below that, by the
         #: section at its beginning; and whether they are known.
         self._slopes, self._known = np.zeros((2 + NUMBERS, 2)), False
+        #: From the section where the last cycle begins to that of the limit cycle.
+        self._ahead = np.zeros(2)
         #: What was left to go along the map where the motion leapt last.
         self._left_at_leap = np.inf
 
@@ -93,27 +95,27 @@ class Approach:
         """Part of its distance to the limit cycle that a cycle keeps: of two directions, the motion
         forgets one.
         """
-        return float(np.trace(self._slopes[:2]))
-
-    @property
-    def _ahead(self) -> np.ndarray:
-        """From the section where the last cycle begins to that of the limit cycle."""
-        off = section(self.seen[-1].end) - section(self.seen[-1].begin)
-        return np.asarray(off + self._slopes[:2] @ off / (1.0 - min(self._return, _DIVERGES)))
+        return float(self._slopes[0, 0] + self._slopes[1, 1])
 
     def _learn(self) -> None:
-        """Take the derivatives from the last two cycles, as long as numerical errors allow."""
-        if len(self.seen) < 2:
-            return
-        before, now = self.seen[-2:]
-        apart = section(now.begin) - section(before.begin)
-        if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
-            self._known = True
-            ends = section(now.end) - section(before.end)
-            changes = np.append(ends, now.numbers() - before.numbers())
-            way, passed = self._by.along(now.begin)
-            sides = np.column_stack([changes, passed]), np.column_stack([apart, way])
-            self._slopes = sides[0] @ np.linalg.inv(sides[1])
+        """Take the derivatives from the last two cycles, as long as numerical errors allow, and
+        what is ahead from the last.
+        """
+        now = self.seen[-1]
+        begin, end = section(now.begin), section(now.end)
+        if len(self.seen) > 1:
+            before = self.seen[-2]
+            apart = begin - section(before.begin)
+            if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
+                self._known = True
+                changes = np.append(end, now.numbers())
+                changes -= np.append(section(before.end), before.numbers())
+                # the motion passes a section without a change of spring stress
+                (_none, way), passed = self._by.along(now.begin)
+                self._slopes[:, 1] = passed / way
+                self._slopes[:, 0] = (changes - apart[1] * self._slopes[:, 1]) / apart[0]
+        off = end - begin
+        self._ahead = off + self._slopes[:2] @ off / (1.0 - min(self._return, _DIVERGES))
 
     def _repeats(self) -> bool:
         """True if the next cycles would all be the same: as the derivatives say, or because the

@@ -297,7 +297,9 @@ class Measure:
         estimated = (name for name in self.estimated if name not in left_out)
         pairs = ((name, f"{name}_error") for name in estimated)
         for name in (self.headline, *(name for pair in pairs for name in pair)):
-            if not np.isfinite(values.get(name, math.nan)).any():
+            value = values.get(name, math.nan)
+            finite = math.isfinite(value) if isinstance(value, float) else np.isfinite(value).any()
+            if not finite:
                 return name
         return None
 

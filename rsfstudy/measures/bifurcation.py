@@ -190,16 +190,16 @@ def _of_one_event(
         return Status.OK, "", {}
     (first, *_), (same, *_) = one.multipliers, again.multipliers
     chance = _BY_CHANCE * accuracy.rtol
-    peak, error = float(one.numbers[PEAK]), float(cycle_errors(accuracy, one, again)[PEAK])
+    errors = cycle_errors(accuracy, one, again)
     values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
         "floquet_multiplier_error": error_between(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": peak,
-        "one_event_log10_peak_error": error,
+        "one_event_log10_peak": float(one.numbers[PEAK]),
+        "one_event_log10_peak_error": float(errors[PEAK]),
     }
-    return *judged(accuracy, one, again, [PEAK]), values
+    return *judged(accuracy, one, errors, slice(PEAK, PEAK + 1)), values
 
 
 def _growth_of_cycle(orbit: Orbit) -> float:

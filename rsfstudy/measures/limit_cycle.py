@@ -16,7 +16,7 @@ of one event, the one with the fastest peak, and no mean; the orbit is that of t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -176,7 +176,7 @@ class LimitCycle(Measure):
         values["period_events"] = float(one.period)
         values["events_until_repeat"] = float(events)
         values["work_per_cycle"] = one.work / one.period
-        status, why = judged(accuracy, one, again, range(len(_HEADLINES)))
+        status, why = judged(accuracy, one, errors)
         return Outcome(status, values | along_path(again.path, self.phases), why)
 
 
@@ -202,13 +202,12 @@ def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
 
 
 def judged(
-    accuracy: Accuracy, one: Orbit, again: Orbit, places: Sequence[int]
+    accuracy: Accuracy, one: Orbit, errors: np.ndarray, places: slice = slice(None)
 ) -> tuple[Status, str]:
-    """True if the headline numbers of a cycle at these places are known well enough to be ok, from
-    two runs, and why not.
+    """The status that the errors of the headline numbers of a cycle at these places leave: ok, or
+    `unverified`, and why.
     """
-    errors = cycle_errors(accuracy, one, again) / _scales(one)
-    worst = float(errors[list(places)].max())
+    worst = float((errors / _scales(one))[places].max())
     if worst <= MUCH_WORSE * accuracy.rtol:
         return Status.OK, ""
     why = f"the cycle is known to {worst:.1e} only, where {accuracy.rtol:g} was asked for"

@@ -98,7 +98,8 @@ class Recording:
             last = row(until.time, until.slip, until.point, self.number(until.regime))
             table = up_to(table, np.array(last[:columns]))
         table[:, 2] /= math.log(10.0)
-        table[:, 3:5] += scene.mu_star
+        for stress in 3, 4:
+            table[:, stress] += scene.mu_star
         return table
 
 
@@ -141,14 +142,14 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
         return np.vstack([table[:after], last])
     part, times = float(place), table[begin : begin + SAMPLES + 1, 0]
     if times[place] > last[0] > times[place - 1]:
-        late = np.polynomial.Polynomial(_COEFFICIENTS @ (times - last[0]))
+        late = (_COEFFICIENTS @ (times - last[0])).tolist()
         sides = (place - 1.0) / _HALF - 1.0, place / _HALF - 1.0
-        if late(sides[0]) < 0.0 < late(sides[1]):
-            part = _HALF * (1.0 + brentq(late, *sides))
-    within = begin + part / SAMPLES * np.arange(1.0, SAMPLES)
-    rows, last = _at_rows(table, table[:, PLACE], within), last.copy()
+        if _polynomial(sides[0], late) < 0.0 < _polynomial(sides[1], late):
+            part = _HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
+    within = part / SAMPLES * np.arange(1.0, SAMPLES)
+    rows, last = _weights(within).T @ table[begin : begin + SAMPLES + 1], last.copy()
     rows[:, REGIME], rows[:, PLACE], last[PLACE] = last[REGIME], range(1, SAMPLES), SAMPLES
-    return np.vstack([table[: begin + 1], rows, last])
+    return np.concatenate([table[: begin + 1], rows, last[None]])
 
 
 def along_path(
@@ -174,32 +175,52 @@ def along_path(
             at[1:-1][np.argmin(np.abs(at[1:-1] - extreme))] = extreme
     found = _at_rows(table[:, : len(names)], table[:, PLACE], at)
     # times of a rupture may differ by less than rounding
-    found[:, 0] = np.maximum.accumulate(found[:, 0])
-    return dict(zip(names, found.T, strict=True))
+    found[0] = np.maximum.accumulate(found[0])
+    return dict(zip(names, found, strict=True))
 
 
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
 _HALF = 0.5 * SAMPLES
 _COEFFICIENTS = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
+#: The same of its first and second derivative.
+_DERIVATIVES = np.zeros((2, SAMPLES, SAMPLES + 1))
+_DERIVATIVES[0] = np.arange(1.0, SAMPLES + 1.0)[:, None] * _COEFFICIENTS[1:]
+_DERIVATIVES[1, :-1] = np.arange(1.0, SAMPLES)[:, None] * _DERIVATIVES[0, 1:]
+
+
+def _polynomial(at: float, coefficients: Sequence[float]) -> float:
+    """Value of a polynomial, by the coefficients of rising powers."""
+    value = 0.0
+    for coefficient in reversed(coefficients):
+        value = coefficient + at * value
+    return value
+
+
+def _weights(parts: np.ndarray) -> np.ndarray:
+    """Weights of the values at the places of a step, a row each, at parts of it in places."""
+    powers = np.ones((SAMPLES + 1, len(parts)))
+    for power in range(1, SAMPLES + 1):
+        powers[power] = powers[power - 1] * (parts / _HALF - 1.0)
+    return np.asarray(_COEFFICIENTS.T @ powers)
 
 
 def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values between rows, at numbers of rows and parts: of the polynomial through those of the
-    step.
+    """Values between rows, of each column a row, at numbers of rows and parts: of the polynomial
+    through those of the step.
     """
     after = np.minimum(np.ceil(at).astype(int), len(values) - 1)
     # from one regime to the next there is a straight line
     jumps = (places[after] == 0.0) & (at > 0.0)
     begin = np.where(jumps, after - 1, after - places[after]).astype(int)
-    part = at - begin
-    powers = (part[:, None] / _HALF - 1.0) ** np.arange(SAMPLES + 1.0)
-    rows = np.minimum(begin[:, None] + np.arange(SAMPLES + 1), len(values) - 1)
-    found = np.asarray(np.einsum("ij,ijk->ik", powers @ _COEFFICIENTS, values[rows]))
+    part, columns = at - begin, np.ascontiguousarray(values.T)
+    found = np.zeros((len(columns), len(at)))
+    for place, weight in enumerate(_weights(part)):
+        found += weight * columns.take(begin + place, axis=1, mode="clip")
     at_a_row = part == np.rint(part)
-    found[at_a_row] = values[(begin + part.astype(int))[at_a_row]]
-    line, share = begin[jumps], part[jumps, None]
-    found[jumps] = (1.0 - share) * values[line] + share * values[line + 1]
+    found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
+    line, share = begin[jumps], part[jumps]
+    found[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
     return found
 
 
@@ -212,12 +233,12 @@ def _extreme(values: np.ndarray, places: np.ndarray) -> float:
         begin = after - int(places[after])
         if begin + SAMPLES >= len(values):
             continue
-        c = (_COEFFICIENTS @ values[begin : begin + SAMPLES + 1]).tolist()
+        slopes = _DERIVATIVES @ values[begin : begin + SAMPLES + 1]
+        slope, bend = slopes[0].tolist(), slopes[1].tolist()
         at = (top - begin) / _HALF - 1.0
         for _ in range(4):
-            slope = sum(n * c[n] * at ** (n - 1) for n in range(1, len(c)))
-            bend = sum(n * (n - 1) * c[n] * at ** (n - 2) for n in range(2, len(c)))
-            at -= slope / bend if bend else 0.0
+            curvature = _polynomial(at, bend)
+            at -= _polynomial(at, slope) / curvature if curvature else 0.0
         place = _HALF * (1.0 + at)
         if abs(place - (top - begin)) < 1.0 and 0.0 <= place <= SAMPLES:
             return begin + place
