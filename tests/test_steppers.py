@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import EACH_STEP
-from scipy.integrate import BDF, DOP853, Radau, solve_ivp
+from scipy.integrate import BDF, DOP853, RK45, Radau, solve_ivp
 
 from rsfstudy import Scene, simulate
 from rsfstudy.motion import layout
@@ -23,7 +23,7 @@ from rsfstudy.motion.loop import move_on
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.steppers import Stepper, unrolled
 from rsfstudy.motion.steppers.order_eight import OrderEight
-from rsfstudy.motion.steppers.scipy import METHODS, SciPyStepper
+from rsfstudy.motion.steppers.scipy import METHODS, SciPyStepper, _by_floats
 from rsfstudy.motion.workspace import Workspace, size, workspace
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, rigid
 from rsfstudy.status import Status
@@ -202,6 +202,20 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
     assert tuple(space.within[:2]) == pytest.approx(new, rel=1e-12)
     stepper.unknowns_at(motion, space, began)
     assert tuple(space.within[:2]) == pytest.approx(start, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", [DOP853, RK45, Radau])
+def test_values_within_a_step_are_those_of_scipy(method):
+    """Dense output of order eight is read on floats: operation by operation what SciPy does."""
+
+    def rate(_t, y):
+        return np.array([y[1], -y[0] * y[0], np.cos(y[2])])
+
+    solver = method(rate, 0.0, np.array([1.0, 0.3, -2.0]), 10.0, rtol=1e-6)
+    solver.step()
+    dense = solver.dense_output()
+    for clock in np.linspace(solver.t_old, solver.t, 7).tolist():
+        assert list(_by_floats(dense)(clock)) == pytest.approx(dense(clock).tolist(), rel=1e-14)
 
 
 @pytest.mark.parametrize("method", [Radau, BDF])
