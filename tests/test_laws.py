@@ -5,22 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsfstudy import Scene
+from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along
-from rsfstudy.motion.events import Kind
+from rsfstudy.motion.course import along, follow
+from rsfstudy.motion.events import Kind, settling
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.slider import laws, steady
 from rsfstudy.slider.equations import evolution_of, evolutions_of, rigid, steady_states_of
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.slider.system import functions, velocity_ratios
+from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
 CUT_OFFS = ("composite", "cut_off")
@@ -222,3 +224,47 @@ def test_the_composite_law_weakens_at_its_cut_off_without_b_above_a():
     scene = Scene(law="composite", b_over_a=0.95, cutoff_velocity_ratio=1.0)
     assert 0.0 < scene.critical_stiffness < 0.3 * scene.a
     assert CriticalStep()(scene, Accuracy(1e-4)).status.is_answer
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness", "family"])
+@pytest.mark.parametrize("engine", ["scipy", "compiled"])
+def test_without_b_a_step_is_relaxed_as_by_the_direct_effect_alone(law, engine):
+    """``a dx/dt = K (V_0 - exp(x))`` has ``1/V = 1/V_0 + (1 - 1/V_0) exp(-K V_0 t/a)``. Tolerance:
+    ten times rtol, of ln V.
+    """
+    scene = Scene(
+        law=law, b_over_a=0.0, normal_stress="constant", stiffness=0.02, load_velocity_ratio=3.0
+    )
+    times = np.linspace(0.0, 2.0, 9)
+    motion = simulate(scene, times=times, rtol=1e-8, engine=engine)
+    slowness = 1.0 / 3.0 + (1.0 - 1.0 / 3.0) * np.exp(-0.02 * 3.0 / scene.a * times)
+    expected = scene.mu_star - scene.a * np.log(slowness)
+    np.testing.assert_allclose(motion.shear_stress, expected, rtol=0.0, atol=1e-7 * scene.a)
+
+
+@pytest.mark.parametrize("law", ["slip", "slowness", "composite", "cut_off", "perrin_rice_zheng"])
+@given(b=st.floats(-3.0, 0.9))
+@settings(max_examples=5, deadline=None)
+def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
+    """At ``mu_* + (a - b) ln(V_0/V_*)``, where the law has that; no cycle, and no critical
+    stiffness.
+    """
+    scene = Scene(
+        law=law, b_over_a=b, normal_stress="constant", stiffness=0.02, load_velocity_ratio=3.0
+    )
+    accuracy = Accuracy(engine="compiled")
+    assert scene.critical_stiffness == 0.0
+    assert LimitCycle()(scene, accuracy).status is Status.NO_LIMIT_CYCLE
+    end = steady.steady_sliding(scene, scene.log_load_rate)
+    assert end is not None
+    if law in ("slip", "slowness", "perrin_rice_zheng"):
+        assert end.friction == pytest.approx(scene.a * (1.0 - b) * math.log(3.0), rel=1e-12)
+    motion = follow(scene, accuracy, Meter(10**6, engine="compiled"), [settling(1e-6)])
+    settled = next(event for event in motion if event.kind is Kind.SETTLED)
+    assert settled.point.spring == pytest.approx(end.friction, abs=1e-5 * scene.a)
+
+
+def test_b_of_zero_is_refused_where_stress_acts_on_the_state_by_alpha_over_b():
+    with pytest.raises(InvalidValue, match=r"b_over_a = 0\.0.*alpha"):
+        Scene(b_over_a=0.0, stiffness=0.02)
+    assert Scene(b_over_a=0.0, alpha=0.0, stiffness=0.02).critical_stiffness == 0.0

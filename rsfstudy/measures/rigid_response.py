@@ -116,6 +116,8 @@ class RigidResponse(Measure):
         sliding = steady_sliding(scene, log_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
+        if scene.states == 1 and scene.b == 0.0:
+            return Outcome(Status.NOT_APPLICABLE, message="without b friction does not evolve")
         start, steady = friction_after_step(scene, log_rate), sliding.friction
         level = steady + (start - steady) / math.e
         distance, left, rows = self._follow(scene, start, level, accuracy, meter)

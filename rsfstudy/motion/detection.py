@@ -190,7 +190,8 @@ def detect(motion, space, limits):
         watch = watch_of(space, w)
         space.when[w] = math.nan
         if watch[KIND] == SETTLED:
-            away = max(abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE]), space.after[DISTANCE] / p[B])
+            apart = abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE])
+            away = max(apart, space.after[DISTANCE] / abs(p[B]))
             watch[FARTHEST] = max(watch[FARTHEST], away)
             if away < watch[LEVEL] * watch[FARTHEST]:
                 space.when[w] = motion.end

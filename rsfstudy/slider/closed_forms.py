@@ -73,7 +73,7 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     """Effective friction, which makes of a small change of normal stress one of Coulomb stress:
     ``mu' = mu_* - alpha (1 - a/b)``, because a fall of normal stress also strengthens the state.
     """
-    return mu_star - alpha * (1.0 - 1.0 / b_over_a)
+    return mu_star - alpha * (1.0 - 1.0 / b_over_a) if alpha else mu_star
 
 
 def threshold(exponent: float, pull: float) -> float:

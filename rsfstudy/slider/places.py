@@ -45,7 +45,8 @@ def numbers(scene: Scene) -> Numbers:
 def numbers_of_friction(scene: Scene) -> Numbers:
     """Numbers for functions that friction alone decides: NaN for spring and load point."""
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
-    size = scene.b if law.states == 1 else slider.a * law.size_over_a
+    size = slider.a * law.size_over_a
+    size = math.copysign(size, law.b_over_a) if law.states == 1 else size
     of_load = math.nan, math.nan, math.nan
     of_stress = law.stress_dependence, scene.imposed_normal_stress
     common = slider.a, size, slider.mu_star, *of_load, *of_stress

@@ -103,7 +103,7 @@ class LawOfStates(Part):
     @property
     def size_over_a(self) -> float:
         """Change of the states by a unit of ln V, over the direct effect; positive."""
-        return self.b_over_a
+        return abs(self.b_over_a) or VANISHING
 
     @property
     def feels_stress(self) -> bool:
@@ -152,12 +152,11 @@ class Law(LawOfStates):
         "$b/a$",
         "1",
         "ratio of evolution effect to direct effect",
-        rule="must be greater than 0",
     )
 
     def numbers(self, scene: Scene) -> Numbers:
-        """b."""
-        return (scene.a * self.b_over_a,)
+        """b; of no effect at all, one that nothing feels, because equations divide by it."""
+        return (scene.a * (self.b_over_a or VANISHING),)
 
     @property
     def least_weakening(self) -> float:
@@ -169,6 +168,13 @@ class Law(LawOfStates):
         enough.
         """
         super().check(scene)
+        if not self.b_over_a and (self.feels_stress or scene.parts.normal_stress.state_effect):
+            raise InvalidValue(
+                "b_over_a",
+                self.b_over_a,
+                "has no meaning where stress acts on the state variable: by alpha/b or c/b",
+                remedy="Leave alpha and stress_dependence out, or give another b_over_a.",
+            )
         least = self.least_weakening
         if self.b_over_a <= least and lacks_threshold(scene):
             raise InvalidValue(
@@ -179,6 +185,8 @@ class Law(LawOfStates):
             )
 
 
+#: b/a in equations that divide by b, of a state variable without effect: by far less than rounding.
+VANISHING = 1e-60
 #: What to do where there is no critical stiffness.
 GIVE_STIFFNESS = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 
