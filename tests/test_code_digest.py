@@ -2,18 +2,25 @@
 it runs, another as soon as anything it draws on is another, and cells are not mixed.
 """
 
+import dataclasses
 import subprocess
 import sys
 import textwrap
 from pathlib import Path
 
 import pytest
+from rsfstudy.named_studies import effects
 
 import rsfstudy
 from rsfstudy.compute import code_digest, provenance
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, names
+from rsfstudy.declare.names import PACKAGE
 from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.reduce import Reduction
+from rsfstudy.status import Status
 
 HELPER = """
 import functools
@@ -218,6 +225,64 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
     monkeypatch.setattr(shared_by_both, "FACTOR", 100.0)
     with pytest.raises(RunError, match="a worker has another Own, or other code"):
         rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
+
+
+def physics_of(study):
+    return provenance.fingerprint(study)["physics"]
+
+
+def with_measures_of_their_own():
+    """Modules of named studies that hold the measure of their study."""
+    loaded = [catalogue.load(name) for name in names.names()]
+    homes = {study.name: type(study.measure).__module__ for study in loaded}
+    return [sys.modules[home] for name, home in homes.items() if home == f"{PACKAGE}.{name}"]
+
+
+def test_a_measure_in_the_file_of_a_named_study_is_no_code_of_ones_own():
+    fingerprint = provenance.fingerprint(effects.study)
+    assert fingerprint["own_code"] == "none"
+    assert fingerprint["physics"] != provenance.code()["physics"]
+
+
+def digest_of_edited(module, edits, monkeypatch):
+    with monkeypatch.context() as patch:
+        for name, value in edits.items():
+            patch.setattr(module, name, value)
+        return physics_of(module.study)
+
+
+@pytest.mark.parametrize("module", with_measures_of_their_own(), ids=lambda m: m.__name__)
+def test_what_else_stands_in_the_file_of_a_study_decides_no_number(module, monkeypatch):
+    """Its figure, its axes and claims, and the reductions it alone uses."""
+    before = physics_of(module.study)
+    others = [n for n, v in vars(module).items() if n == "figure" or is_reduction(v)]
+    edited = dataclasses.replace(module.study, claims=[], axes=module.study.axes[:1], plot="lines")
+    edits = dict.fromkeys(others) | {"study": edited}
+    assert digest_of_edited(module, edits, monkeypatch) == before
+
+
+def is_reduction(value):
+    return isinstance(value, type) and issubclass(value, Reduction)
+
+
+def test_what_its_measure_draws_on_does(monkeypatch):
+    before = physics_of(effects.study)
+    timed = lambda equations, state: 1.0  # noqa: E731
+    for edits in ({"_TURNS": 26}, {"_seconds": timed}, {"_CYCLE": LimitCycle(phases=3)}):
+        assert digest_of_edited(effects, edits, monkeypatch) != before
+    monkeypatch.setattr(effects.EffectCost, "find", lambda *_: Outcome(Status.OK))
+    assert physics_of(effects.study) != before
+
+
+def test_its_cells_and_those_of_an_edited_measure_are_not_mixed(tmp_path, monkeypatch):
+    fixed = {"coupling": "constant normal stress", "dynamics": "quasi-static", "engine": "compiled"}
+    options = {**fixed, "output": tmp_path, "workers": 0, "progress": False}
+    rsfstudy.run("effects", law="slip", **options)
+    monkeypatch.setattr(effects, "figure", None)
+    rsfstudy.run("effects", law=["slip", "slowness"], **options)
+    monkeypatch.setattr(effects, "_TURNS", 26)
+    with pytest.raises(DataError, match="physics: .* there, .* now"):
+        rsfstudy.run("effects", law=["slip", "slowness"], **options)
 
 
 LAW = """

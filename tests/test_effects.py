@@ -8,9 +8,9 @@ import pytest
 from conftest import cot_phi
 from hypothesis import given
 from hypothesis import strategies as st
+from rsfstudy.named_studies import effects
 
 from rsfstudy import Scene
-from rsfstudy.measures import effect_cost
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
     between_ruptures,
@@ -186,8 +186,8 @@ def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(
         turn = next(turns) // 3
         return (1.0 + turn) * (10.0 if turn % 4 == 0 else 1.0) * slowness[equations.regime]
 
-    monkeypatch.setattr(effect_cost, "_seconds", seconds)
-    found = effect_cost.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values
+    monkeypatch.setattr(effects, "_seconds", seconds)
+    found = effects.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values
     assert found["evaluation_cost"] == pytest.approx(4.0, rel=1e-12)
     assert found["evaluation_cost_in_rupture"] == pytest.approx(3.0, rel=1e-12)
 
@@ -196,7 +196,7 @@ def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(
     "fields", [{"normal_stress": "constant"}, {"inertia": True}, {"radiation_damping": 1e-10}]
 )
 def test_every_form_of_the_equations_is_timed(fields):
-    found = effect_cost.EffectCost()(Scene(**fields), Accuracy(1e-3)).values
+    found = effects.EffectCost()(Scene(**fields), Accuracy(1e-3)).values
     forms = ["", "_in_rupture"] if "inertia" in fields else [""]
     for form in forms:
         assert found[f"evaluation_cost{form}"] > 0.0

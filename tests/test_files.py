@@ -333,6 +333,17 @@ def test_every_declaration_restores_its_study(name):
         assert restored.scene(number) == study.scene(number)
 
 
+def test_a_measure_in_the_file_of_a_study_is_found_by_its_name():
+    """Whatever study has it, and in a process that has loaded none."""
+    asked = (
+        "from rsfstudy.files import restore; print(restore.measure({'name': 'effect_cost'}, ''))"
+    )
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ran.stdout == "EffectCost()\n"
+    with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
+        restore.measure({"name": "effect_costs"}, "")
+
+
 def test_a_rerun_reproduces_every_number(small):
     table = rsfstudy.rerun(small, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rsfstudy.named_studies.effects import EffectCost
 from running import named_results
 
 import rsfstudy
@@ -17,7 +18,6 @@ from rsfstudy import Scene
 from rsfstudy.analysis.cycles import cycles
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.effect_cost import EffectCost
 from rsfstudy.measures.hard_case import HardCase
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse

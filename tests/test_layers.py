@@ -10,6 +10,8 @@ import pytest
 
 import rsfstudy
 from rsfstudy import slider
+from rsfstudy.compute import cells
+from rsfstudy.declare import catalogue, names
 
 ROOT = Path(rsfstudy.__file__).parent
 
@@ -154,6 +156,23 @@ def test_studies_load_nothing_that_draws():
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == ""
+
+
+def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
+    """It is sent what the measure draws on, and not what declares, reduces and draws."""
+    for name in names.names():
+        study = catalogue.load(name)
+        task = cells.Task(study.measure, study.accuracy)
+        (tmp_path / name).write_bytes(cells.sendable(task))
+    heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
+    asked = (
+        "import pathlib, pickle, sys, rsfstudy.compute.cells\n"
+        f"sent = [file.read_bytes() for file in pathlib.Path({str(tmp_path)!r}).iterdir()]\n"
+        "print(len([pickle.loads(task) for task in sent]))\n"
+        f"print(*{heavy} & set(sys.modules))"
+    )
+    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ran.stdout.split("\n") == [str(len(names.names())), "", ""]
 
 
 HEAVY = (

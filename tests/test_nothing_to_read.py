@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_readings import PLAIN, read, recorded
 
-from rsfstudy import Scene, measures, protocol, simulate, vocabulary
+from rsfstudy import Scene, measures, named_studies, protocol, simulate, vocabulary
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
@@ -144,8 +144,9 @@ def test_one_step_of_the_integrator_may_hold_a_peak_and_what_is_on_either_side(e
 
 def every_measure() -> list[Measure]:
     """Those of rsfstudy, as they are without an argument."""
-    for module in pkgutil.iter_modules(measures.__path__):
-        importlib.import_module(f"{measures.__name__}.{module.name}")
+    for package in (measures, named_studies):
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{package.__name__}.{module.name}")
 
     def below(kind: type) -> list[type]:
         return [kind, *(one for derived in kind.__subclasses__() for one in below(derived))]

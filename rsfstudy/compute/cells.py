@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import functools
+import importlib
 import itertools
 import pickle
 import signal
@@ -21,6 +22,7 @@ import cloudpickle
 
 from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare.cell import Cell, Rows
+from rsfstudy.declare.names import PACKAGE
 from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError, brief
 from rsfstudy.files.journal import Finished, Layout
@@ -117,13 +119,15 @@ def _named(keys: Iterable[bytes], rows: Iterable[Rows]) -> Iterator[tuple[bytes,
 
 
 def sendable(task: Task) -> bytes:
-    """A task as bytes, with all the code that workers cannot import.
+    """A task as bytes, with all the code that workers cannot import, and that of named studies, to
+    import which would load all that declares and reduces them.
 
     Raises
     ------
     InvalidValue
         Where the measure, a part of the slider or a stepper cannot be serialized.
     """
+    cloudpickle.register_pickle_by_value(importlib.import_module(PACKAGE))
     for part in task.parts:
         _dumped(part, "part", part.name)
     for stepper in task.steppers:

@@ -1,11 +1,13 @@
 """Digests of code: of the physics, from its sources, and of a user's own measure, parts and
 stepper, from the objects in memory, because their files may have changed since they were imported.
+A measure in the file of a named study is digested as a user's own is, because what else stands in
+that file decides no number.
 
-Both are of compiled code, so that remarks, what docstrings say and the places of lines do not
-count. Of a user's own classes the search follows every name that a function uses: the same code has
+All are of compiled code, so that remarks, what docstrings say and the places of lines do not
+count. Of such classes the search follows every name that a function uses: the same code has
 the same digest in a study file, a script, a notebook or a worker, and any change of a function, a
 constant or a helper changes it. Modules that a function imports when it runs are not followed. The
-search ends at Python, installed packages and rsfstudy itself, which have versions.
+search ends at Python, installed packages and the rest of rsfstudy, which have versions.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+
+from rsfstudy.declare.names import PACKAGE as STUDIES
 
 _PACKAGE = Path(__file__).parent.parent.name
 _INSTALLED = tuple(
@@ -50,6 +54,15 @@ def of_sources(sources: Mapping[str, bytes]) -> str:
     # a third of the time of parsing it to a tree that Python can see; 2 leaves docstrings out
     compiled = (compile(text, name, "exec", optimize=2) for name, text in sources.items())
     return _digest(_Walk().parts((*sources, *compiled), ()))
+
+
+def with_measure(physics: str, measure: type) -> str:
+    """Digest of the physics and a measure: that of the physics alone, unless the measure stands in
+    the file of a named study.
+    """
+    if not _is_of_a_study(measure.__module__):
+        return physics
+    return _digest((physics, *_Walk().parts(measure, ())))
 
 
 def of_classes(*used: object) -> str:
@@ -118,7 +131,7 @@ class _Walk:
 
     def _module(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
         """Only what is used of a module counts."""
-        if not _is_own(module.__name__):
+        if not _is_followed(module.__name__):
             yield module.__name__
             return
         asked = (id(module), *names)
@@ -129,7 +142,7 @@ class _Walk:
 
     def _function(self, function: FunctionType) -> Iterator[str]:
         yield function.__qualname__
-        if not _is_own(function.__module__):
+        if not _is_followed(function.__module__):
             return
         yield from self._code(function.__code__)
         cells = [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
@@ -146,7 +159,7 @@ class _Walk:
 
     def _class(self, kind: type) -> Iterator[str]:
         yield kind.__qualname__
-        if not _is_own(kind.__module__):
+        if not _is_followed(kind.__module__):
             return
         yield from self.parts(kind.__bases__, ())
         made = _MADE | ({"__init__"} if _inits_itself(kind) else set())
@@ -156,7 +169,7 @@ class _Walk:
                 yield from self.parts(value, ())
 
     def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
-        if _is_own(type(value).__module__):
+        if _is_followed(type(value).__module__):
             yield from self.parts(getattr(value, "__dict__", None), names)
             return
         try:
@@ -192,6 +205,15 @@ def _is_filled(cell: Any) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _is_followed(name: str | None) -> bool:
+    """True if what is digested of a module is what is used of it."""
+    return _is_of_a_study(name) or _is_own(name)
+
+
+def _is_of_a_study(name: str | None) -> bool:
+    return (name or "").startswith(f"{STUDIES}.")
 
 
 def _is_own(name: str | None) -> bool:

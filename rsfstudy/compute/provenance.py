@@ -26,7 +26,9 @@ _PHYSICS = ("slider", "motion", "analysis", "measures")
 
 
 def sources(package: Path) -> dict[str, bytes]:
-    """Source of everything that decides the number of a cell, by the path in the package."""
+    """Source of everything that decides the number of a cell in every study, by the path in the
+    package.
+    """
     files = [file for part in _PHYSICS for file in sorted((package / part).rglob("*.py"))]
     return {file.relative_to(package).as_posix(): file.read_bytes() for file in files}
 
@@ -49,7 +51,7 @@ def code(engine: str = SCIPY) -> dict[str, str]:
 
 def fingerprint(study: Study) -> dict[str, Any]:
     """All that decides the numbers of a cell, except its scene and its measure's plain fields."""
-    plain = study.measure.plain_fields
+    plain, shared = study.measure.plain_fields, code(study.accuracy.engine)
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
@@ -58,7 +60,8 @@ def fingerprint(study: Study) -> dict[str, Any]:
         "budget": study.accuracy.budget,
         "methods": [list(pair) for pair in study.accuracy.methods],
         "engine": study.accuracy.engine,
-        **code(study.accuracy.engine),
+        **shared,
+        "physics": code_digest.with_measure(shared["physics"], type(study.measure)),
     }
 
 

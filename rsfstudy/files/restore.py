@@ -18,6 +18,7 @@ from rsfstudy import measures, reduce
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.figure import figure_name
+from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.files import contents
@@ -157,7 +158,8 @@ def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
 def measure(described: PlainMeasure, path: str) -> Measure:
     """The measure with this description, which stands at `path` in a file."""
     values: dict[str, Any] = dict(described)
-    name, kinds = values.pop("name"), _kinds(Measure, measures)
+    name = values.pop("name")
+    kinds = _kinds(Measure, measures, name)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
     given = {}
@@ -196,7 +198,8 @@ def _problem(described: dict[str, Any], path: str) -> Problem:
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
-    wanted, kinds = values.pop("kind"), _kinds(Reduction, reduce)
+    wanted = values.pop("kind")
+    kinds = _kinds(Reduction, reduce, wanted)
     if wanted not in kinds:
         remedy = "If it is your own, name the file that declares it: --study FILE (study=)."
         raise InvalidValue(
@@ -206,15 +209,25 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
     return made
 
 
-def _kinds(base: Any, package: ModuleType) -> dict[str, Any]:
-    """The classes of a package that are derived from `base`, by their names in declarations."""
+def _kinds(base: Any, package: ModuleType, wanted: str) -> dict[str, Any]:
+    """The classes of a package that are derived from `base`, by their names in declarations; where
+    none has the `wanted` name, those in the files of named studies too.
+    """
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
-    within = f"{package.__name__}."
+    kinds = _within(package.__name__, base)
+    if wanted not in kinds:
+        for name in names():
+            catalogue.load(name)
+        kinds |= _within(PACKAGE, base)
+    return kinds
+
+
+def _within(package: str, base: Any) -> dict[str, Any]:
     return {
         vars(kind).get("name") or vars(kind)["kind"]: kind
         for kind in _members(base)
-        if kind.__module__.startswith(within)
+        if kind.__module__.startswith(f"{package}.")
     }
 
 
