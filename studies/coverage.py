@@ -1,5 +1,8 @@
 """Coverage: do error estimates cover the errors, over random scenes?"""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import xarray as xr
 
@@ -8,7 +11,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.coverage import QUESTIONS, Coverage
-from rsfstudy.reduce import Covered
+from rsfstudy.reduce.base import Reduction
 from rsfstudy.slider.scene import Scene
 
 DYNAMICS: dict[str, dict[str, bool | float]] = {
@@ -18,6 +21,78 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
     "inertia": {"inertia": True},
 }
 DIGITS = (4, 7)
+
+
+@dataclass(frozen=True)
+class Covered(Reduction):
+    """Statistics of errors over their estimates, by the points of some dimensions.
+
+    Parameters
+    ----------
+    name : str
+        Gives ``<name>_share`` (of numbers whose error is within its estimate), ``<name>_worst``
+        (the largest error over its estimate), ``<name>_typical`` (the median of estimates over
+        errors) and ``<name>_numbers`` (how many there are).
+    of : str
+        Variable that holds errors over estimates; NaN where there is no number.
+    by : tuple of str
+        Dimensions that stay.
+    """
+
+    by: tuple[str, ...] = ()
+    kind: ClassVar[str] = "covered"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Count over all other dimensions."""
+        ratios = dataset[self.of]
+        over = [d for d in ratios.dims if d not in self.by]
+        known = ratios.notnull()
+        numbers = known.sum(over)
+        with np.errstate(divide="ignore"):
+            tightness = (1.0 / ratios).median(over)
+        statistics = {
+            "share": (ratios <= 1.0).sum(over) / numbers.where(numbers > 0),
+            "worst": ratios.max(over),
+            "typical": tightness,
+            "numbers": numbers,
+        }
+        note = f"{self.of} over {', '.join(map(str, over))}"
+        return xr.Dataset(
+            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in statistics.items()}
+        )
+
+
+#: Errors this far below and above their estimates are drawn there.
+SHOWN = (1e-3, 10.0)
+
+
+def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+    """One outline an accuracy."""
+    from rsfstudy.plots import look
+
+    for number, digits in enumerate(dataset["requested_digits"].values):
+        values = dataset["error_over_estimate"].isel(requested_digits=number).values.ravel()
+        values = np.clip(values[np.isfinite(values)], *SHOWN)
+        covered = f"{(values <= 1.0).sum()} of {values.size} covered"
+        label = f"rtol $10^{{-{digits:g}}}$: {covered}"
+        axes.hist(
+            values, np.geomspace(*SHOWN, 33).tolist(), histtype="step", label=label, **look(number)
+        )
+    axes.axvline(1.0, color="0.3", linestyle="-", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.locator_params(axis="y", integer=True)
+
+
+figure = Figure(
+    [
+        Panel(
+            each=["question"],
+            marks=[mark_histogram],
+            x_label="Error over its estimate",
+            y_label="Numbers",
+        )
+    ]
+)
 
 
 def claim(number: int, statement: str, variable: str, digits: int, **held: object) -> Claim:
@@ -66,39 +141,6 @@ def claims(digits: int) -> list[Claim]:
             reason="an inequality, for the median",
         ),
     ]
-
-
-#: Errors this far below and above their estimates are drawn there.
-SHOWN = (1e-3, 10.0)
-
-
-def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
-    """One outline an accuracy."""
-    from rsfstudy.plots import look
-
-    for number, digits in enumerate(dataset["requested_digits"].values):
-        values = dataset["error_over_estimate"].isel(requested_digits=number).values.ravel()
-        values = np.clip(values[np.isfinite(values)], *SHOWN)
-        covered = f"{(values <= 1.0).sum()} of {values.size} covered"
-        label = f"rtol $10^{{-{digits:g}}}$: {covered}"
-        axes.hist(
-            values, np.geomspace(*SHOWN, 33).tolist(), histtype="step", label=label, **look(number)
-        )
-    axes.axvline(1.0, color="0.3", linestyle="-", linewidth=0.8)
-    axes.set_xscale("log")
-    axes.locator_params(axis="y", integer=True)
-
-
-figure = Figure(
-    [
-        Panel(
-            each=["question"],
-            marks=[mark_histogram],
-            x_label="Error over its estimate",
-            y_label="Numbers",
-        )
-    ]
-)
 
 
 study = Study(

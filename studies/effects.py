@@ -39,8 +39,6 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
 FULL = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
 
 
-# ---- the measure --------------------------------------------------------------------------------
-
 #: Evaluations timed together, and how often: the forms of the equations take short turns, so that
 #: a busy moment of the machine falls on all of them.
 _EVALUATIONS, _TURNS = 100, 25

@@ -333,13 +333,23 @@ def test_every_declaration_restores_its_study(name):
         assert restored.scene(number) == study.scene(number)
 
 
-def test_a_measure_in_the_file_of_a_study_is_found_by_its_name():
-    """Whatever study has it, and in a process that has loaded none."""
+def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_names():
+    """In a process that has loaded no study."""
+    described = [catalogue.load(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "from rsfstudy.files import restore; print(restore.measure({'name': 'effect_cost'}, ''))"
+        "import json, sys; from rsfstudy.files import contents, restore\n"
+        "for plain in json.load(sys.stdin):\n"
+        "    study = restore.from_declaration(contents.declaration_of(plain))\n"
+        "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
     )
-    ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout == "EffectCost()\n"
+    ran = subprocess.run(
+        [sys.executable, "-c", asked],
+        capture_output=True,
+        text=True,
+        check=True,
+        input=json.dumps(described),
+    )
+    assert ran.stdout == "EffectCost RelativeDifference\nCoverage Covered\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
         restore.measure({"name": "effect_costs"}, "")
 
