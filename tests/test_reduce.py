@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from rsfstudy.named_studies.bounded_slip import Parting
 from scipy.stats import linregress
 
 from rsfstudy.declare.claims import Claim, verdicts
@@ -17,7 +18,6 @@ from rsfstudy.reduce import (
     Inverse,
     LinearFit,
     OverClosedForm,
-    Parting,
     ProportionalFit,
     RelativeDifference,
     Spread,

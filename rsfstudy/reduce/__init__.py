@@ -18,7 +18,6 @@ from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.edges import CyclingEdge
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
-from rsfstudy.reduce.paths import Parting
 from rsfstudy.reduce.work import Cheapest
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -32,7 +31,6 @@ __all__ = [
     "Inverse",
     "LinearFit",
     "OverClosedForm",
-    "Parting",
     "ProportionalFit",
     "Reduction",
     "RelativeDifference",
