@@ -6,13 +6,13 @@ import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import Parting
+from rsfstudy.named_studies.stability_map import CyclingEdge
 from scipy.stats import linregress
 
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce import (
     Boundary,
-    CyclingEdge,
     DecadeFit,
     Difference,
     Inverse,

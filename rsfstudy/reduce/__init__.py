@@ -16,7 +16,6 @@ from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_fa
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
-from rsfstudy.reduce.edges import CyclingEdge
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.work import Cheapest
 from rsfstudy.status import Status
@@ -25,7 +24,6 @@ from rsfstudy.vocabulary import coverage, quantity
 __all__ = [
     "Boundary",
     "Cheapest",
-    "CyclingEdge",
     "DecadeFit",
     "Difference",
     "Inverse",
