@@ -10,16 +10,17 @@ import pytest
 import xarray as xr
 from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
+from rsfstudy.named_studies import accuracy_cost
+from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Outcome, work_precision
+from rsfstudy.measures import Outcome
 from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.work_precision import WorkPrecision
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.meter import Meter
@@ -98,14 +99,14 @@ def test_what_is_for_mass_does_not_apply_without_it(integrator):
 
 def test_times_are_relative_to_those_of_the_moment(monkeypatch):
     """On a machine that slows down all the time, a right-hand side costs the same in all runs."""
-    original, moment, work = work_precision._timed, itertools.count(1.0), []
+    original, moment, work = accuracy_cost._timed, itertools.count(1.0), []
 
     def slower_and_slower(problem, scene, asked):
         _seconds, outcome, spent = original(problem, scene, asked)
         work.append(spent.spent)
         return 1e-9 * next(moment) * spent.spent, outcome, spent
 
-    monkeypatch.setattr(work_precision, "_timed", slower_and_slower)
+    monkeypatch.setattr(accuracy_cost, "_timed", slower_and_slower)
     found = solved("RK23", 4.0, repeats=3).values
     yardstick, run = work[:2]
     assert work == [yardstick, run, yardstick, run, yardstick, run, yardstick]
@@ -115,13 +116,13 @@ def test_times_are_relative_to_those_of_the_moment(monkeypatch):
 
 def test_a_long_run_is_timed_once(monkeypatch):
     calls = []
-    original = work_precision._timed
+    original = accuracy_cost._timed
 
     def long(problem, scene, asked):
         calls.append(asked)
         return (1.0, *original(problem, scene, asked)[1:])
 
-    monkeypatch.setattr(work_precision, "_timed", long)
+    monkeypatch.setattr(accuracy_cost, "_timed", long)
     assert solved("DOP853", 4.0).values["relative_time"] == 1.0
     assert len(calls) == 3
 
