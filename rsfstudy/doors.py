@@ -52,7 +52,7 @@ def _told(name: str, given: dict[str, Any], error: Exception) -> RsfStudyError:
 
 
 def in_words(error: BaseException) -> str:
-    """What kind of error it is, and what it says, if it can say anything."""
+    """Kind of an error and what it says, if it can say anything."""
     try:
         return f"{type(error).__name__}: {brief(error)}"
     except Exception:  # its text may raise as well

@@ -73,7 +73,7 @@ class InvalidValue(RsfStudyError, ValueError):
         self.value = value
 
     def at(self, place: str) -> InvalidValue:
-        """The same error, with the place where it arose."""
+        """This error, with the place where it arose."""
         placed = InvalidValue.__new__(InvalidValue)
         Exception.__init__(placed, f"{brief(place)}: {self}")
         placed.name, placed.value = self.name, self.value
@@ -93,7 +93,7 @@ class Interrupted(RunError):
 
     @property
     def exit_status(self) -> int:
-        """What the process ends with: 128 and the number of the signal, but 1 after Ctrl-C."""
+        """Exit status of the process: 128 and the number of the signal, but 1 after Ctrl-C."""
         return self.__cause__.exit_status if isinstance(self.__cause__, Signalled) else 1
 
 

@@ -128,7 +128,7 @@ def described(about: Quantity, value: object) -> tuple[object, ...]:
 
 
 class ShownAsTable:
-    """What a notebook shows as a table of quantities."""
+    """Base of what a notebook shows as a table of quantities."""
 
     def shown(self) -> Iterable[tuple[Quantity, object]]:
         """The quantities, with their values."""
@@ -139,7 +139,7 @@ class ShownAsTable:
 
 
 def folded(caption: str, content: Markup) -> Markup:
-    """What is shown once its caption is clicked."""
+    """Content that is shown once its caption is clicked."""
     return Markup(f"<details><summary>{escape(caption)}</summary>{content}</details>")
 
 
@@ -155,7 +155,7 @@ def symbol(formula: str) -> Markup:
 
 
 def unit(about: Quantity) -> Markup:
-    """What 1 is of a quantity: its unit, or its scale where it is dimensionless; empty for 1."""
+    """Unit of a quantity, or its scale where it is dimensionless; empty for 1."""
     if about.scale:
         scale = about.scale.replace("sigma", r"\sigma")
         return symbol(f"${scale}$")

@@ -1,4 +1,4 @@
-"""What became of a cell: an answer, a failure, or not computed yet."""
+"""Statuses of a cell: an answer, a failure, or not computed yet."""
 
 from __future__ import annotations
 

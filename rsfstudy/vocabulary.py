@@ -1,5 +1,5 @@
-"""What scenes, motions and results share: name, symbol, units and long name of each quantity, for
-datasets, axis labels and tables. What one measure alone gives is described in its own file.
+"""Quantities that scenes, motions and results share: name, symbol, units and long name of each,
+for datasets, axis labels and tables. What one measure alone gives is described in its own file.
 """
 
 from __future__ import annotations
@@ -305,7 +305,7 @@ DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
 
 
 def coverage(name: str) -> str:
-    """What kind of content a variable is, in the words of ISO 19115-1."""
+    """Kind of content of a variable, in the words of ISO 19115-1."""
     if name in ("rhs_evaluations", *MEASURED_TIMES):
         return "auxiliaryInformation"
     if name in ("status", "message") or re.search("_(error|stderr|misfit|points)$", name):

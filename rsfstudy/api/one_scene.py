@@ -1,4 +1,4 @@
-"""What a user calls for one scene: its critical step or limit cycle; and quantities in SI units."""
+"""Functions for one scene: its critical step or limit cycle; and quantities in SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a run has come: a bar on a terminal and in a notebook, lines everywhere else."""
+"""Progress of a run: a bar on a terminal and in a notebook, lines everywhere else."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LINES = 10
 
 @contextlib.contextmanager
 def shown(name: str, show: bool) -> Iterator[Progress]:
-    """What shows how far the run of a study has come, on the standard error."""
+    """Display of how far the run of a study has come, on the standard error."""
     console = Console(stderr=True)
     if not show:
         yield lambda _done, _all: None

@@ -1,4 +1,4 @@
-"""What a user calls for a study: run it, open its results, check and rerun them."""
+"""Functions for a study: run it, open its results, check and rerun them."""
 
 from __future__ import annotations
 

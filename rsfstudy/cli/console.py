@@ -1,4 +1,4 @@
-"""Where commands print: plain text, on the standard output or the standard error."""
+"""Consoles of the commands: plain text, on the standard output or the standard error."""
 
 from __future__ import annotations
 

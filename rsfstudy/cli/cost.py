@@ -1,4 +1,4 @@
-"""What a study costs, in words: as its cells took here last, else a guess that says it is one."""
+"""Cost of a study, in words: as its cells took here last, else a guess that says it is one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands print: tables of slopes, claims and failed cells."""
+"""Tables that commands print: of slopes, claims and failed cells."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def announce(study: Study) -> None:
 
 @dataclass(frozen=True)
 class Ended:
-    """What became of the run of a study.
+    """End of the run of a study.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Ended:
 
 
 def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
-    """What a run ends with: slopes, claims, failures and where the files are."""
+    """Print what a run ends with: slopes, claims, failures and where the files are."""
     _reductions(dataset)
     _costs(dataset)
     claims(dataset)
@@ -132,7 +132,7 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
 
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
-    """How a run ended, in few words."""
+    """End of a run, in few words."""
     claimed = runs.check(dataset)
     wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
     verdicts = ""
@@ -201,7 +201,7 @@ def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
 
 
 def agreement(frame: pd.DataFrame) -> int:
-    """How a rerun agrees with its file; FAILED where a number is not the same."""
+    """Print how a rerun agrees with its file; returns FAILED where a number is not the same."""
     for name, (theirs, ours) in frame.attrs["differs"].items():
         console.print(f"{name}: {theirs} then, {ours} now", style="yellow")
     table = Table("variable", "values", "identical", "largest difference", box=None)
@@ -248,7 +248,7 @@ def _reductions(dataset: xr.Dataset) -> None:
 
 
 def _costs(dataset: xr.Dataset) -> None:
-    """Where integrators were compared: the cheapest for each number of digits."""
+    """Print the cheapest integrator for each number of digits, where integrators were compared."""
     numbers = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
     if not {"cheapest_integrator", *numbers} <= set(dataset.data_vars):
         return

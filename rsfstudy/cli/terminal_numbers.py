@@ -1,4 +1,4 @@
-"""What commands print of numbers: the headline of a results file, how two files compare, and the
+"""Numbers that commands print: the headline of a results file, how two files compare, and the
 peaks of a motion.
 """
 
@@ -61,7 +61,7 @@ def headline(dataset: xr.Dataset) -> None:
 
 
 def _caption(dataset: xr.Dataset, name: str, shown: int) -> str:
-    """What the headline is, in which units, and how much of it is shown."""
+    """Meaning of the headline, its units, and how much of it is shown."""
     about, cells = dataset[name].attrs, dataset["status"].size
     units = about.get("scale") or about.get("units", "1")
     text = about.get("long_name", name) + (f", in {units}" if units != "1" else "")

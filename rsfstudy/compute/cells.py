@@ -53,7 +53,7 @@ FinishedCells = list[Finished]
 
 @dataclass(frozen=True)
 class Task:
-    """What is computed in every cell, and under which conditions.
+    """Measure, accuracy and conditions that every cell is computed with.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Task:
 
     @functools.cached_property
     def layout(self) -> Layout:
-        """Where the numbers of a cell are."""
+        """Places of the numbers of a cell."""
         return Layout(self.measure)
 
 

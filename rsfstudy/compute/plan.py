@@ -212,7 +212,7 @@ class Batches(Iterator[Batch]):
 
 
 def scattered(cells: np.ndarray) -> np.ndarray:
-    """The same cells in another order, in strides of the golden section: the first few are a sample
+    """Cells in another order, in strides of the golden section: the first few are a sample
     of all, so that what they show (how long cells take, whether all fail) holds for the rest.
     """
     count = len(cells)

@@ -36,7 +36,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Keeping:
-    """What a run writes, and what it does about failed cells.
+    """Files that a run writes, and what it does about failed cells.
 
     Parameters
     ----------

@@ -93,8 +93,8 @@ class Workers:
         return max(1, at_a_time)
 
     def mapper(self, log: Path | None = None) -> Mapper:
-        """What computes batches of cells there; `log` is where processes of this machine write
-        errors.
+        """Mapper that computes batches of cells there; `log` is where processes of this machine
+        write errors.
         """
         if self.client is not None:
             return on_client(self.client)

@@ -1,4 +1,4 @@
-"""Where studies come from: the named ones, found by file name, and files of a user's own."""
+"""Sources of studies: the named ones, found by file name, and files of a user's own."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _is_beside(name: str, path: Path) -> bool:
 
 
 def _line(error: BaseException, path: Path) -> str:
-    """Where in the file an error arose."""
+    """Line of the file where an error arose, in words."""
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)

@@ -79,7 +79,7 @@ def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
 def _agreement(
     theirs: np.ndarray, ours: np.ndarray, errors: Sequence[np.ndarray]
 ) -> dict[str, Any]:
-    """How two arrays of values agree; their error estimates are none, or one for each."""
+    """Agreement of two arrays of values; their error estimates are none, or one for each."""
     if theirs.dtype.kind != "f":
         same, largest = np.asarray(theirs == ours), np.nan
     else:
@@ -259,7 +259,7 @@ def _flat(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _origin(dataset: xr.Dataset) -> dict[str, Any]:
-    """What made a dataset: versions, code and machine."""
+    """Versions, code and machine that made a dataset."""
     about: Mapping[str, Any] = provenance(dataset)
     decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED}
     others = {n: v for n, v in about.items() if isinstance(v, str)}

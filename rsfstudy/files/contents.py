@@ -92,7 +92,7 @@ class Declaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Fingerprint(TypedDict):
-    """What decided the numbers; what else it holds is only compared."""
+    """Code and versions that decided the numbers; what is not named here is only compared."""
 
     own_code: str
 
@@ -241,7 +241,7 @@ def own_part(declared: Declaration) -> tuple[str, str] | None:
 
 
 def provenance(dataset: xr.Dataset) -> Provenance:
-    """Where a dataset comes from.
+    """Provenance of a dataset.
 
     Raises
     ------

@@ -79,7 +79,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Columns:
-    """What is known of some cells: status, message, right-hand sides, wall time, and one row of
+    """Columns of some cells: status, message, right-hand sides, wall time, and one row of
     numbers each.
     """
 
@@ -223,7 +223,7 @@ class Journal:
         return statuses
 
     def read(self, keys: np.ndarray) -> Columns:
-        """What is known of these cells, in the order of `keys`.
+        """Columns of these cells, in the order of `keys`.
 
         Raises
         ------

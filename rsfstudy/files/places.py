@@ -1,4 +1,4 @@
-"""Where results are: the directory of a run, and the file or store of a study."""
+"""Places of results: the directory of a run, and the file or store of a study."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rsfstudy.errors import DataError, InvalidValue, brief
 
 
 def directory(output: str | Path | None) -> Path | None:
-    """Where results go: a directory, which need not be there yet, or nowhere.
+    """Directory of results, which need not be there yet; None for nowhere.
 
     Raises
     ------

@@ -261,8 +261,8 @@ class Measure:
         return Outcome(*found, _count(meter.spent)), meter
 
     def _checked(self, outcome: Outcome) -> tuple[Status, Mapping[str, Value], str]:
-        """What an outcome says, if it is as declared; ok without a number that it must have becomes
-        `not_finite`.
+        """Status, numbers and message of an outcome, if they are as declared; ok without a number
+        that it must have becomes `not_finite`.
 
         Raises
         ------

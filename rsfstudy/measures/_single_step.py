@@ -1,4 +1,4 @@
-"""What is asked of one step, after which a motion decides, and of what settles or repeats."""
+"""Checks of scenes: of one step, after which a motion decides, and of what settles or repeats."""
 
 from __future__ import annotations
 

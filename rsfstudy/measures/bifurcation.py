@@ -1,4 +1,4 @@
-"""What a motion is like after many events: their peaks, after how many it repeats itself, and the
+"""Motion after many events: their peaks, after how many it repeats itself, and the
 Floquet multipliers of the cycle of one event, which tell where its period doubles.
 """
 
@@ -168,7 +168,7 @@ class Bifurcation(Measure):
         return Outcome(status, values, why)
 
     def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
-        """What is told of the events that are kept."""
+        """Numbers of the events that are kept."""
         peaks = np.array([cycle.fastest / LN10 for cycle in seen])
         return {
             "peak_log10_slip_rate": peaks,

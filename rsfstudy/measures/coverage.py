@@ -36,7 +36,7 @@ def between(low: float, high: float) -> Draw:
 
 
 def decades(low: float, high: float) -> Draw:
-    """The same of its logarithm."""
+    """Any number between two, each decade as likely as another."""
     exponent = between(math.log(low), math.log(high))
     return lambda draw: math.exp(exponent(draw))
 
@@ -47,8 +47,8 @@ def either_way(size: Draw) -> Draw:
 
 
 class Question(NamedTuple):
-    """What may be asked of a random scene: a measure, and what is drawn of the spring and the
-    loading; numbers of the measure's own choice of scene are given as they are.
+    """Question that may be asked of a random scene: a measure, and what is drawn of the spring and
+    the loading; numbers of the measure's own choice of scene are given as they are.
     """
 
     measure: Measure

@@ -294,7 +294,7 @@ class CriticalStep(Measure):
 
 
 def _swung(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> Swing | None:
-    """How the motion after a step of this size goes; None where it cannot go on."""
+    """Motion after a step of this size; None where it cannot go on."""
     try:
         return swing(steps.scene_at(size), accuracy, meter)
     except Halt as halt:

@@ -60,7 +60,7 @@ _OUTPUTS = (
 
 
 class _Record(NamedTuple):
-    """What a motion tells of a hold: its beginning, reloading, the peak, and what was recorded."""
+    """Events of a hold: its beginning, reloading and the peak; and what was recorded."""
 
     begin: Event
     reload: Event
@@ -70,7 +70,7 @@ class _Record(NamedTuple):
 
 @dataclass(frozen=True)
 class Healing(Reading):
-    """What the first hold of a loading shows, by the definitions of the laboratory.
+    """Relaxation and healing by the first hold of a loading, by the definitions of the laboratory.
 
     With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
     mu_h - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
@@ -174,7 +174,7 @@ def _hold(scene: Scene) -> int | Outcome:
 
 
 def _beginning(scene: Scene, hold: int, begin: Event, near: float) -> str:
-    """How far from steady sliding a hold begins, if it does."""
+    """Distance from steady sliding at which a hold begins, in words; empty where it is none."""
     before = (Segment(1.0), *scene.parts.loading.segments)[hold]
     away = unsteady(scene, begin.point, before.load_velocity)
     if away <= near:

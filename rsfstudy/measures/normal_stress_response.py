@@ -115,7 +115,7 @@ class _Record(NamedTuple):
 
     @property
     def drift(self) -> float:
-        """What the trend would have made of the response, over that."""
+        """Response that the trend would have made, over the response."""
         amplitude = 2.0 * abs(np.fft.rfft(self.spring)[self.periods]) / len(self.spring)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
@@ -128,7 +128,7 @@ class _Record(NamedTuple):
 
     @property
     def aliasing(self) -> float:
-        """What overtones that the samples do not resolve may change of all together.
+        """Change of all overtones together by those that the samples do not resolve.
 
         They are taken to be as strong as the upper quarter of those that are resolved, B. They add
         up in squares, and are folded back upon that quarter: (B**2 + 2 B B)/(2 D) of a sum D.
@@ -171,7 +171,7 @@ class _Record(NamedTuple):
 
 @dataclass(frozen=True)
 class NormalStressResponse(Reading):
-    """What an oscillation of imposed normal stress makes of spring stress, once transients have
+    """Response of spring stress to an oscillation of imposed normal stress, once transients have
     decayed: Fourier's projection over one period.
 
     The motion is followed until the slowest decay of small changes has left a tenth of the accuracy
@@ -266,7 +266,7 @@ class NormalStressResponse(Reading):
     def _repeats(
         self, scene: Scene, waits: int, accuracy: Accuracy, meter: Meter
     ) -> tuple[Point, int]:
-        """Where a motion is after so many periods of forcing, and those during which it is looked
+        """Point of a motion after so many periods of forcing, and those during which it is looked
         at; and after how many it repeats itself, or 0. It may take longer than small changes do.
         """
         period = scene.oscillation_period
@@ -342,7 +342,7 @@ def _degrees(response: complex) -> float:
 
 
 def _read(record: _Record, linear: complex) -> dict[str, float]:
-    """What is read off a record."""
+    """Numbers that are read off a record."""
     response = record.response
     return {
         "gain": abs(response),

@@ -77,8 +77,8 @@ _OUTPUTS = (
 
 
 class _Record(NamedTuple):
-    """What a motion tells of a step: the instant after it, what was recorded, and friction at the
-    slips where it is read; nowhere, where the spring has not taken up the change of strength.
+    """Instant after a step, what was recorded, and friction at the slips where it is read; at none
+    where the spring has not taken up the change of strength.
     """
 
     begin: Event
@@ -91,13 +91,13 @@ class _Record(NamedTuple):
         return float(friction_of(self.rows[-1:])[0])
 
     def left(self, slip: float) -> float:
-        """What is left of the transient after so much slip."""
+        """Transient of friction that is left after so much slip."""
         return self.friction.get(slip, math.nan) - self.after
 
 
 @dataclass(frozen=True)
 class NormalStressTransient(Reading):
-    """What friction does after a step of imposed normal stress by a ratio r, while the load point
+    """Response of friction to a step of imposed normal stress by a ratio r, while the load point
     moves on at V_*.
 
     An exponential through what is left of the transient at two slips gives its slip distance, and
@@ -192,7 +192,7 @@ class NormalStressTransient(Reading):
         return ""
 
     def _follow(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> _Record | None:
-        """What the motion tells; nothing where slip does not come as far as it is read."""
+        """Record of the motion; None where slip does not come as far as it is read."""
         recording = Recording()
         begin, *_others = follow(
             scene, accuracy, meter, clock=True, recording=recording, until=self.record
@@ -230,8 +230,8 @@ class NormalStressTransient(Reading):
         return found
 
     def _read(self, scene: Scene, record: _Record) -> dict[str, float]:
-        """What is read off; nothing where no exponential goes through what is left, or the spring
-        has not taken up the change of strength.
+        """Numbers that are read off; none where no exponential goes through what is left, or the
+        spring has not taken up the change of strength.
         """
         first, last = record.left(self.fit_from), record.left(self.fit_to)
         if not first or not 0.0 < last / first < 1.0:
@@ -263,8 +263,8 @@ class NormalStressTransient(Reading):
         }
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:
-        """What friction did at once, whether it has settled, how far it departs from that of a
-        stiff slider, and the record itself.
+        """Change of friction at once, whether it has settled, its departure from that of a stiff
+        slider, and the record itself.
         """
         rows, friction = record.rows, friction_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record

@@ -192,10 +192,10 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
 
 
 def _asymmetry(scene: Scene, log_rate: float) -> dict[str, float]:
-    """How much more a step changes than its inverse: at once, and over its evolution to the new
-    steady state.
+    """Relative excess of the change by a step over that by its inverse: at once, and over its
+    evolution to the new steady state.
 
-    NaN where the inverse step has no steady state to go to.
+    Empty where the inverse step has no steady state to go to.
     """
     steady, inverse_steady = (steady_sliding(scene, x) for x in (log_rate, -log_rate))
     if steady is None or inverse_steady is None:

@@ -32,7 +32,7 @@ TRIGGERS = (_FALL, _PULL, _FASTER)
 
 
 def _of_trigger(trigger: CriticalStep) -> tuple[Output, ...]:
-    """What is told of one critical step."""
+    """Outputs of one critical step."""
     of = trigger.headline
     ended = f"status with which the search for a critical {trigger.of} ended, as its flag value"
     return (
@@ -144,7 +144,7 @@ class Triggers(Measure):
 
 
 def _without_effective_friction(scene: Scene) -> str:
-    """What has no one effective friction mu' in a scene; nothing where it is known."""
+    """Part of a scene that has no one effective friction mu', in words; empty where it is known."""
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     if stress.coupling is None or stress.normal_stress is None:
         return f"{stress.name} normal stress"
@@ -174,7 +174,7 @@ def _undisturbed(scene: Scene) -> Scene:
 def _stresses(
     scene: Scene, cot_phi: float, alpha: float, values: Mapping[str, float]
 ) -> dict[str, float]:
-    """What the triggers are as changes of stress, and how they compare."""
+    """Triggers as changes of stress, and their ratios, with errors."""
     friction = effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
     pulled = _times(scene.stiffness * (1.0 - friction * cot_phi), _PULL.headline, values)
     fallen = _times(-friction, _FALL.headline, values)

@@ -92,8 +92,8 @@ class _Step(NamedTuple):
 
 
 class _Record(NamedTuple):
-    """What a motion tells of a step: where the record begins and ends, the peak between if there is
-    one, and what was recorded.
+    """Events of a step: where the record begins and ends, and the peak between if there is one;
+    and what was recorded.
     """
 
     begin: Event
@@ -104,7 +104,7 @@ class _Record(NamedTuple):
 
 @dataclass(frozen=True)
 class VelocityStep(Reading):
-    """What one step of load point velocity shows, by the definitions of the laboratory.
+    """Response to one step of load point velocity, by the definitions of the laboratory.
 
     With mu_0 before the step by a factor r, mu_p at the first extremum after it (a peak of a step
     up, a trough of a step down) and mu_1 at the end of the record:
@@ -220,7 +220,7 @@ class VelocityStep(Reading):
     def _read(
         self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
     ) -> dict[str, float]:
-        """What is read off; of the peak nothing, where there is none."""
+        """Numbers that are read off; NaN for those of the peak where there is none."""
         before, after = (e.point.reading for e in (record.begin, record.end))
         top = record.peak.point.reading if record.peak else math.nan
         left = self._left(scene, record, accuracy, meter)
@@ -238,8 +238,9 @@ class VelocityStep(Reading):
     def _left(
         self, scene: Scene, record: _Record, accuracy: Accuracy, meter: Meter
     ) -> Event | None:
-        """Where 1/e of the evolution is left, with time and slip since the peak: followed from
-        there, because the step that holds the peak may hold a crossing of the level on either side.
+        """Event where 1/e of the evolution is left, with time and slip since the peak: followed
+        from there, because the step that holds the peak may hold a crossing of the level on either
+        side.
         """
         peak = record.peak
         if peak is None or not peak.time < record.end.time:

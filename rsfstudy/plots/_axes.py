@@ -42,7 +42,7 @@ def is_number(values: xr.DataArray) -> bool:
 
 
 def measured(dataset: xr.Dataset) -> list[str]:
-    """What was measured in each cell: numbers, no error estimates nor costs, the headline first."""
+    """Variables measured in each cell: no error estimates nor costs, the headline first."""
     cells = set(dataset["status"].dims)
     values = {str(name): dataset[name] for name in dataset.data_vars}
     beside = tuple(f"{name}_{end}" for name in values for end in ("stable", "unstable"))
@@ -79,7 +79,7 @@ def is_wide(values: np.ndarray) -> bool:
 
 
 def place(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
-    """Where something is on one dimension, in a few words."""
+    """Place of a cell on one dimension, in a few words."""
     value = cell[dimension].item()
     about = quantity(dimension, stated_by(cell.coords.to_dataset()))
     if isinstance(value, str):
@@ -93,7 +93,7 @@ def place(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
 
 
 def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
-    """Where the points of a dimension are along x; those that are no numbers are named there."""
+    """Places of the points of a dimension along x; those that are no numbers are named there."""
     points = dataset[dimension].values
     if is_numeric(dataset, dimension):
         return np.asarray(points, dtype=float)

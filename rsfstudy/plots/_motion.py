@@ -112,7 +112,7 @@ def _abscissa(motion: xr.Dataset) -> str:
 
 
 def _title(motion: xr.Dataset) -> str:
-    """What it is, and how it ended if not as it should."""
+    """Title of a motion, and how it ended if not as it should."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
     return f"{motion.attrs.get('title', '')}{ending}"

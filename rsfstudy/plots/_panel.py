@@ -198,13 +198,13 @@ def _label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
 
 
 def _text(said: Any, part: xr.Dataset, otherwise: str) -> str:
-    """What a panel says itself."""
+    """Text that a panel states, or else another."""
     if said is None:
         return otherwise
     return str(said(part) if callable(said) else said)
 
 
 def _places(part: xr.Dataset, at: Mapping[str, Any]) -> str:
-    """Where a panel is on the axes that it shows one point of, as a title."""
+    """Place of a panel on the axes that it shows one point of, as a title."""
     text = ", ".join(place(part, dimension) for dimension in at if part[dimension].ndim == 0)
     return f"{text[:1].upper()}{text[1:]}"

@@ -1,4 +1,4 @@
-"""How figures look: the style sheet, widths of journal columns, letters of panels, and legends
+"""Looks of figures: the style sheet, widths of journal columns, letters of panels, and legends
 that lie beside the data.
 """
 

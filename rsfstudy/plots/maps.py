@@ -113,7 +113,7 @@ def _scale(values: np.ndarray) -> tuple[Normalize, Sequence[float]] | None:
 
 
 def _edges(points: np.ndarray, log: bool = False) -> np.ndarray:
-    """Where cells end whose centres are these: halfway, on the scale they are drawn on."""
+    """Edges of cells whose centres are these: halfway, on the scale they are drawn on."""
     if points.size < 2:
         return np.asarray(
             [0.9 * points[0], 1.1 * points[0]] if log else [points[0] - 0.5, points[0] + 0.5]
@@ -158,8 +158,8 @@ def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
 
 
 def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
-    """Where the longest line of each level is farthest from those of other levels and from the
-    frame; nowhere where that is too close for a label, or the line too short.
+    """Places where the longest line of each level is farthest from those of other levels and from
+    the frame; none where that is too close for a label, or the line too short.
     """
     panel = axes.transData + axes.transAxes.inverted()
     levels = [[panel.transform(part) for part in parts if len(part)] for parts in found.allsegs]
