@@ -1,4 +1,4 @@
-"""What the studies of pore fluids share."""
+"""Scene and source that the studies of pore fluids share."""
 
 from rsfstudy.slider.scene import Scene
 

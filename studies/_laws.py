@@ -1,4 +1,4 @@
-"""What the studies of state evolution laws share: the laws they compare, and their sources."""
+"""Laws that the studies of state evolution compare, and their sources."""
 
 from __future__ import annotations
 

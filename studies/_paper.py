@@ -1,4 +1,4 @@
-"""What the studies of the paper share: its name, and the cases of normal stress it compares."""
+"""Name of the paper, and the cases of normal stress that its studies compare."""
 
 PAPER = "doi:10.1007/s11589-014-0098-4"
 REFERENCE = (

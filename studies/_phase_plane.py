@@ -1,5 +1,5 @@
-"""What figures in the plane of stress and slip rate share: the steady-state and constant-state
-lines.
+"""Marks that figures in the plane of stress and slip rate share: the steady-state and
+constant-state lines.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ LN10 = math.log(10.0)
 
 
 def coupling(cell: xr.Dataset) -> tuple[str, float, float]:
-    """What decides the steady-state line: normal stress, its angle, and the law where steady
+    """Choices that decide the steady-state line: normal stress, its angle, and the law where steady
     friction at ten times V_* tells of one.
     """
     scene = scene_of(cell)

@@ -198,7 +198,7 @@ class WorkPrecision(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """The same whatever the study asks for: a run has an accuracy of its own."""
+        """One for all that the study asks for: a run has an accuracy of its own."""
         return {3.0: 1.0, 10.0: 1.0}
 
     def describe(self) -> dict[str, Any]:

@@ -130,7 +130,7 @@ orbit = Panel(
 
 
 def mark_parting(dataset: xr.Dataset, axes: Axes) -> None:
-    """Where paths with mass and without it part, and where they merge."""
+    """Lines where paths with mass and without it part, and where they merge."""
     for name in ("paths_parting", "paths_merging"):
         rates = np.atleast_1d(dataset.get(name, math.nan))
         for rate in rates[np.isfinite(rates)]:

@@ -34,7 +34,7 @@ LINEAR = 1e-6
 
 
 def mark_undrained(dataset: xr.Dataset, axes: Axes) -> None:
-    """Where the spring is as stiff as the critical one of no drainage."""
+    """Line where the spring is as stiff as the critical one of no drainage."""
     weakening = float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
     critical = (weakening - float(dataset["stiffness"])) / float(dataset["mu_star"])
     text = "spring as stiff as the undrained critical one"

@@ -41,7 +41,7 @@ def above_drained(fault: str, drainage: float, by: float) -> Claim:
 
 
 def drained_in_grey(row: xr.Dataset) -> dict[str, Any]:
-    """What no drainage changes, behind the others."""
+    """Style of what no drainage changes, behind the others."""
     grey = {"color": "0.75", "linestyle": "-", "linewidth": 2.2, "marker": "", "zorder": 1}
     return grey if row["fluid"] == "drained" else {}
 

@@ -181,7 +181,7 @@ figure = Figure(
 
 
 def loses(law: str, dynamics: str, published: float) -> Claim:
-    """What the static drop loses with radiation damping instead of mass."""
+    """E1: radiation damping instead of mass loses part of the static drop."""
     return Claim(
         id="E1",
         statement=f"{law} law: {dynamics} instead of mass loses part of the static drop",

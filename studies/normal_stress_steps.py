@@ -36,7 +36,7 @@ def first_rate(step: float) -> float:
 
 
 def left(law: str, step: float, ratio: float, slip: float) -> float:
-    """What is left of the transient of friction after so much slip, to first order in a/K.
+    """Transient of friction that is left after so much slip, to first order in a/K.
 
     With r = 1 + step, a rigid slider shows -alpha ln r exp(-slip) by the slip law, and b ln(1 + y)
     with y = [r^(-alpha/b) - 1] exp(-slip) by the slowness law. While the spring takes up the change

@@ -140,7 +140,7 @@ def leads(responses: np.ndarray) -> Any:
 
 
 def settled(variable: str, row: xr.Dataset) -> xr.DataArray:
-    """Where the motion repeats itself."""
+    """Values of a variable where the motion repeats itself; NaN elsewhere."""
     return row[variable].where(row["settled"] == 1.0)
 
 

@@ -107,7 +107,7 @@ PULLED: dict[str, Any] = {
 
 
 def beside(variable: str, name: str, style: dict[str, Any], over: str | None = None) -> Draw:
-    """What is drawn beside falls of normal stress, in their colours; over a number of the scene."""
+    """Curves beside falls of normal stress, in their colours; over a number of the scene."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
         from rsfstudy.plots import in_grey, look

@@ -24,9 +24,9 @@ WAYS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 100.0: "up by 
 
 
 def late(law: str, ratio: float) -> float:
-    """How far friction at its peak is from that of a rigid slider, to first order in a/K, in units
-    of b a/K: what does not evolve while slip speeds up, and the direct effect of the slip that is
-    faster than the load point while friction falls.
+    """Departure of friction at its peak from that of a rigid slider, to first order in a/K, in
+    units of b a/K: what does not evolve while slip speeds up, and the direct effect of the slip
+    that is faster than the load point while friction falls.
     """
     rate = math.log(ratio)
     if law == "slowness":

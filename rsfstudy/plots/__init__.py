@@ -161,8 +161,8 @@ def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:
 def _fitting(
     dataset: xr.Dataset, own: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
-    """What draws a dataset, and the dataset with the axes that it expects: what the study declares,
-    or plain lines or maps if there are more axes than that can show.
+    """Figure of a dataset, and the dataset with the axes that it expects: the one that the study
+    declares, or plain lines or maps if there are more axes than that can show.
     """
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
     study = catalogue.load(name) if name in names.names() else None
@@ -212,7 +212,7 @@ def _of_module(own: Any, dataset: xr.Dataset) -> Declared:
 
 
 def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:
-    """What draws any lattice: maps where it has two numeric axes, else lines."""
+    """Figure of any lattice: maps where it has two numeric axes, else lines."""
     from rsfstudy.plots import _axes, lines, maps
 
     for module in (maps, lines):

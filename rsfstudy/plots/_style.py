@@ -170,7 +170,7 @@ def _is_drawn(handle: Any) -> bool:
 
 
 def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
-    """Where most panels name the same things, or some of them, name those once, below them all."""
+    """Name what most panels name, or some of it, once and below them all."""
     named = {panel: _texts(legend) for panel in panels if (legend := panel.get_legend())}
     alike: list[Axes] = []
     for fullest in named:
