@@ -64,7 +64,13 @@ def _outputs(of: str) -> tuple[Output, ...]:
 
 @dataclass(frozen=True)
 class CriticalStep(Measure):
-    """Critical step of the load point, or of normal stress.
+    """Critical step of the load point, or of normal stress: the smallest after which slip rate
+    reaches the instability norm, V T/(2 pi D_c).
+
+    It is V_0/V_*, or a displacement in D_c, or a change of normal stress over sigma_*; beside it
+    stand the sizes of two steps that confirm it, of which one settles and one triggers. By the slip
+    law at constant normal stress, critical stiffness and an infinite norm it is ``V_0/V_* = 1 +
+    a/(b - a)``, or a displacement of ``D_c a/(b - a)``.
 
     Parameters
     ----------
@@ -75,6 +81,11 @@ class CriticalStep(Measure):
         (direction "down", and a negative number).
     direction : {"up", "down"}
         Steps that increase, or decrease.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; eqs. 10, 11 and 14
+    of doi:10.1007/s11589-014-0098-4.
     """
 
     of: str = "load_velocity_ratio"

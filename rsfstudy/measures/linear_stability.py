@@ -59,7 +59,16 @@ class LinearStability(Measure):
 
     Twice: from the friction relation, and as the stiffness at which small perturbations of the
     assembled equations neither grow nor decay, so that they vouch for each other; and, for what
-    mass and radiation leave, by the closed form.
+    mass and radiation leave, by the closed form. A perturbation of slip by exp(p s), s being slip
+    over D_c, changes frictional stress by G(p) times itself, and ``K (1 + w**2 p**2) + eta V p +
+    G(p) = 0`` with K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical where p is imaginary
+    (`rsfstudy.slider.stability`): at V_*, by the slip and the slowness law, quasi-statically and
+    drained, ``K = (b - a)/[1 - (mu_* - alpha) cot(phi)]``, without cot(phi) where normal stress is
+    constant.
+
+    References
+    ----------
+    Ruina (1983), J. Geophys. Res. 88, 10359-10370; eqs. 7 and 8 of doi:10.1007/s11589-014-0098-4.
     """
 
     name: ClassVar[str] = "linear_stability"

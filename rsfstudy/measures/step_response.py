@@ -44,7 +44,11 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class StepResponse(Measure):
-    """Oscillations of slip rate that the step of a scene sets off.
+    """Oscillations of slip rate that the step of a scene sets off: peaks of log10(V/V_*), and the
+    path between them.
+
+    It is followed until it has so many peaks, or until ln V and the states are closer to steady
+    sliding than a thousandth of the farthest that they were.
 
     Parameters
     ----------
