@@ -4,6 +4,7 @@ that says what was asked, what went wrong and what to do.
 
 from __future__ import annotations
 
+import bdb
 import functools
 import inspect
 from collections.abc import Callable
@@ -21,7 +22,7 @@ def door(function: Callable[P, T]) -> Callable[P, T]:
 
     Of a call with a dataset, or on one, any other becomes a `DataError`, of all others an
     `InvalidValue`; where it arose is kept as the cause. A call that does not fit the signature is
-    Python's own `TypeError`, and what is a warning stays one.
+    Python's own `TypeError`; what is a warning stays one, and who quits a debugger leaves.
     """
     signature = inspect.signature(function)
 
@@ -30,7 +31,7 @@ def door(function: Callable[P, T]) -> Callable[P, T]:
         given = signature.bind(*args, **options).arguments
         try:
             return function(*args, **options)
-        except (RsfStudyError, Warning):
+        except (RsfStudyError, Warning, bdb.BdbQuit):
             raise
         except Exception as error:
             raise _told(function.__name__, given, error) from error

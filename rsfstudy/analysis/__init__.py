@@ -1,1 +1,1 @@
-"""Between stable and unstable: what motions do after a step, and the path that divides them."""
+"""Algorithms that measures use: critical steps, the paths that touch the boundary, and cycles."""

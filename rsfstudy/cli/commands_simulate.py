@@ -1,4 +1,4 @@
-"""What the command `simulate` does; how it is spelt is in `cli_simulate`."""
+"""The command `simulate`; how it is spelt is in `command_line_simulate`."""
 
 from __future__ import annotations
 

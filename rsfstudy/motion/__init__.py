@@ -1,1 +1,1 @@
-"""Integration of a scene: accuracy, work budget, steps, regimes of motion, events; two engines."""
+"""Integration of a scene: accuracy, work budget, steps, regimes, events; three engines."""

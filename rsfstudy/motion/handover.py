@@ -126,8 +126,8 @@ def has_returned(
 
 
 def termination_of(log_rate: float, normal_stress: float, load_velocity: float) -> int:
-    """True if a motion goes on: not where normal stress vanishes, or normal stress or slip rate
-    grow without bound, or slip stops.
+    """Termination status of a motion: `GOES_ON`, unless normal stress vanishes, normal stress or
+    slip rate grow without bound, or slip stops.
 
     Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
     """

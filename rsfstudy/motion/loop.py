@@ -2,6 +2,9 @@
 
 Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
 or not, with whatever stepper, events are found here. `running` calls it.
+
+To follow a rupture with a debugger: `engine="python"`, a breakpoint at the call of `move_on` in
+`through_regime` where ``motion.regime == FAST``, and one in `enter` for its end.
 """
 
 from __future__ import annotations
@@ -150,7 +153,9 @@ def begin_at(motion, y, last, functions, below, limits, p):
 
 
 def enter(motion, y, last):
-    """Begin a regime at the last point of one before."""
+    """Begin a regime at the last point of one before: spring stress, states and time carry over;
+    between ruptures ln V and friction follow from these, and jump.
+    """
     y[0] = last[SPRING]
     if motion.regime == FAST:
         y[1], y[2] = last[LOG_RATE], last[FRICTION]

@@ -161,7 +161,7 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
 
 
 def halted(end: int, normal_stress: float) -> Halt:
-    """The end of a motion, by its `handover.fate`."""
+    """The end of a motion, by its termination status (`handover.termination_of`)."""
     if end == handover.IS_LOST:
         return Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
     if end == handover.IS_LOCKED:

@@ -8,6 +8,10 @@ parts a scene has; `equations` gives what an integrator takes. Their numbers sta
 says. `steady` asks the same relation for steady sliding and its stability. `closed_forms` are what
 others have published.
 
+From a motion to a law: `motion.loop` takes a step with the rates of a scene's `equations`; they
+are made in `system` (against displacement, or in a rupture), which asks `states` for the changes of
+each state, and those ask the `evolution` of the file in `laws`.
+
 Where the equations of the paper are:
 
     1a, 4a    friction                                   friction

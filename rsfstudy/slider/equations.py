@@ -1,4 +1,4 @@
-"""The equations of motion of a scene, assembled from its parts and ready to be integrated."""
+"""Equations of one scene as an integrator takes them: unknowns, scales, rates and points."""
 
 from __future__ import annotations
 

@@ -5,6 +5,11 @@ choice is one file, with a frozen dataclass derived from `Part` that owns its fi
 symbol, units and description. Its functions are plain functions of floats: they take the numbers of
 a scene as one flat tuple ``p``, in which those of the part begin at the place of its slot, such as
 ``p[LAW]`` (see `places`). `friction` and `system` put them together.
+
+What an effect of your own overrides: how the state evolves, a `Law` (`evolution`) or a
+`LawOfStates` (`evolutions`, `steady_states`; whatever weakens friction may be a state); how normal
+stress follows shear stress, a `NormalStress`; unknowns that end in a pore pressure, a `Fluid`; how
+slip rate follows stress, a `Dynamics`; what moves the load point, a `Loading` or a protocol.
 """
 
 from __future__ import annotations

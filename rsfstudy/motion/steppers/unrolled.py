@@ -10,10 +10,12 @@ end, their scales, and the rows of its dense output.
 
 from __future__ import annotations
 
+import linecache
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from scipy.integrate import DOP853
@@ -103,8 +105,11 @@ def _terms(name: str) -> str:
 
 
 def _made(name: str, arguments: str, lines: Sequence[str], known: Mapping[str, Any]) -> Function:
-    """The function that some lines define."""
+    """The function that some lines define, which a debugger shows."""
     made: dict[str, Any] = {**known, "__name__": __name__, "math": math}
-    exec("\n    ".join([f"def {name}({arguments}):", *lines]), made)
+    text = "\n    ".join([f"def {name}({arguments}):", *lines])
+    file = f"<{__name__}.{name} {crc32(text.encode()):08x}>"
+    linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
+    exec(compile(text, file, "exec"), made)
     function: Function = made[name]
     return function
