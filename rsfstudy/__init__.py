@@ -11,6 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rsfstudy.api.events import events
     from rsfstudy.api.one_scene import critical_step, limit_cycle, to_si
     from rsfstudy.api.runs import cell, check, compare, open, plot, rerun, run, studies
     from rsfstudy.api.trajectory import simulate
@@ -45,6 +46,7 @@ _HOMES = {
     "critical_step": "api.one_scene",
     "limit_cycle": "api.one_scene",
     "to_si": "api.one_scene",
+    "events": "api.events",
 }
 
 __all__ = [
@@ -57,6 +59,7 @@ __all__ = [
     "check",
     "compare",
     "critical_step",
+    "events",
     "limit_cycle",
     "open",
     "picture",

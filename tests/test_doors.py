@@ -89,6 +89,7 @@ def calls(place: Path) -> dict[str, dict]:
         "check": {"dataset": dataset},
         "compare": {"first": dataset, "second": dataset},
         "critical_step": {"scene": scene, "rtol": 1e-2, "engine": "compiled"},
+        "events": {"time": np.arange(400.0), "shear_stress": np.zeros(400)},
         "limit_cycle": {"scene": cycling, "rtol": 1e-2, "engine": "compiled"},
         "open": {"name": place / "lattice.nc"},
         "plot": {"dataset": dataset},

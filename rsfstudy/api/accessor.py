@@ -126,6 +126,38 @@ class Accessor:
         return picture(self._dataset, *what, **how)
 
     @door
+    def events(self, slip_rate: float | None = None) -> xr.Dataset:
+        """The events of a motion: what is faster than a slip rate.
+
+        Parameters
+        ----------
+        slip_rate : float, optional
+            Over V_*; by default ten times the fastest load point velocity of the scene.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along ``event``, in the units of the motion: ``time``, ``duration``, ``interval`` (since
+            the event before began), ``peak_log10_slip_rate``, ``slip``, ``stress_before``,
+            ``stress_after`` (the extremes of spring stress on either side), ``static_stress_drop``
+            and ``dynamic_stress_drop``. Each is read within steps, and has beside it the error of
+            reading; that of the motion is as its ``rtol``. ``cut`` says of which event the motion
+            holds a part only: its numbers are those of that part.
+
+        Raises
+        ------
+        DataError
+            Where the dataset is no motion.
+        InvalidValue
+            For a slip rate that is not positive and finite.
+        """
+        from rsfstudy.api.events import of_motion
+
+        if self._is_study:
+            raise DataError("the dataset is of a study: events are told of a motion of one scene")
+        return of_motion(self._dataset, slip_rate, lambda: self.scene)
+
+    @door
     def failures(self) -> pd.DataFrame:
         """The cells that failed or gave no number.
 

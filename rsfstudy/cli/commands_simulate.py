@@ -21,7 +21,7 @@ from rsfstudy.status import Status
 #: Exit status where a motion passes the instability norm with neither mass nor damping.
 _NO_PHYSICS = 3
 #: Units of the rig in what is printed.
-_UNITS = {"length": "um", "time": "s"}
+_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 _AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
 _ABSCISSAE = {"displacement": "load_point_displacement", "slip": "slip", "time": "time"}
 
@@ -115,7 +115,11 @@ def _write(
             write_image(rendered(drawn, output.suffix[1:]), output)
     except OSError as error:
         raise DataError(f"{output}: cannot be written ({error})") from error
-    terminal_numbers.record(laboratory.in_units(motion, **_UNITS) if laboratory else motion)
+    for show, of in (
+        (terminal_numbers.record, motion),
+        (terminal_numbers.events, motion.rsf.events()),
+    ):
+        show(laboratory.in_units(of, **_UNITS) if laboratory else of)
     console.print(f"{said}\nwrote {output} and {data}")
 
 

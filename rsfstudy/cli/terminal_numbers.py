@@ -25,6 +25,17 @@ from rsfstudy.vocabulary import coverage
 
 #: Most cells of a lattice that are shown, and most that ended otherwise.
 _MOST_CELLS, _MOST_ENDS = 24, 10
+#: What is printed of events; the last has units of a rig only.
+_OF_EVENTS = {
+    "time": "time",
+    "duration": "duration",
+    "interval": "interval",
+    "slip": "slip",
+    "static_stress_drop": "static drop",
+    "dynamic_stress_drop": "dynamic drop",
+    "peak_log10_slip_rate": "lg peak rate",
+    "peak_slip_rate": "peak rate",
+}
 #: Most characters of a value that differs.
 _MOST_CHARACTERS = 60
 
@@ -174,3 +185,29 @@ def record(motion: xr.Dataset) -> None:
         table.add_row("beyond the instability norm", "no physics", since)
     table.add_row("friction at the end", f"{float(friction[-1]):.6g}", "")
     console.print(table)
+
+
+def events(catalogue: xr.Dataset) -> None:
+    """Print the events of a motion, without their errors."""
+    limit = f"faster than {catalogue.attrs['slip_rate_threshold']:g} V_*"
+    if not catalogue.sizes["event"]:
+        console.print(f"no event {limit}")
+        return
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"Events {limit}")
+    names = {name: words for name, words in _OF_EVENTS.items() if name in catalogue}
+    if "peak_slip_rate" in names:
+        del names["peak_log10_slip_rate"]
+    for name, words in names.items():
+        about = catalogue[name].attrs
+        unit = about.get("scale", about["units"]).replace(" s-1", "/s")
+        table.add_column(words if unit == "1" else f"{words}\n{unit}", justify="right")
+    flags = catalogue["cut"].attrs["flag_meanings"].replace("whole", "-").split()
+    table.add_column("cut")
+    shown = catalogue.isel(event=slice(_MOST_CELLS))
+    for place in shown["event"].values:
+        event = shown.isel(event=place)
+        values = ["" if np.isnan(event[n]) else f"{float(event[n]):.4g}" for n in names]
+        table.add_row(*values, flags[int(event["cut"])].replace("_", " "))
+    console.print(table)
+    if left := catalogue.sizes["event"] - shown.sizes["event"]:
+        console.print(f"and {left} more: dataset.rsf.events() has all, with their errors")

@@ -1,0 +1,175 @@
+"""Catalogues of events: of motions, held to limit cycles, and of records with noise."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.signal import lfilter
+
+import rsfstudy
+from rsfstudy import Laboratory, Scene
+from rsfstudy.errors import DataError, InvalidValue
+
+STICK_SLIP = Scene(b_over_a=2.0, stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return rsfstudy.simulate(STICK_SLIP, duration=32.0, engine="compiled", rtol=1e-8)
+
+
+def test_events_of_a_motion_are_those_of_its_cycle(motion):
+    """Errors of reading, and of both motions: 1e-8 of numbers near 1 to 10, by a factor for what
+    three cycles add up.
+    """
+    cycle = rsfstudy.limit_cycle(STICK_SLIP, engine="compiled", rtol=1e-8)
+    found = motion.rsf.events()
+    assert found.sizes["event"] == 4
+    for ours, theirs in (
+        ("interval", "recurrence_interval"),
+        ("static_stress_drop", "static_stress_drop"),
+        ("dynamic_stress_drop", "dynamic_stress_drop"),
+        ("peak_log10_slip_rate", "max_log10_slip_rate"),
+    ):
+        event = found.isel(event=2)
+        off = abs(float(event[ours] - cycle[theirs]))
+        assert off <= float(event[f"{ours}_error"]) + 1e-6, ours
+        assert float(event[f"{ours}_error"]) < 1e-3 * abs(float(event[ours])), ours
+    assert (found.cut == 0).all()
+    # spring stress falls by k times what slips beyond the load point meanwhile
+    event = found.isel(event=2)
+    fell = STICK_SLIP.stiffness * (event.slip - 10.0 * event.duration)
+    assert 0.0 < float(event.static_stress_drop - fell) < 0.03 * float(event.static_stress_drop)
+
+
+def test_crossings_are_read_within_steps(motion):
+    """A motion told at given times, which miss the rupture, says how little it knows of it."""
+    event = motion.rsf.events().isel(event=2)
+    about = float(event.time) + np.linspace(-0.02, 0.02, 4001)
+    asked = rsfstudy.simulate(STICK_SLIP, times=about, engine="compiled", rtol=1e-8)
+    again = asked.rsf.events().isel(event=0)
+    for name in ("time", "slip", "duration", "peak_log10_slip_rate", "stress_after"):
+        allowed = float(event[f"{name}_error"] + again[f"{name}_error"])
+        assert abs(float(event[name] - again[name])) <= allowed + 1e-6, name
+    assert float(event.time_error) < 2e-6  # rows are 1e-5 apart
+    assert float(event.slip_error) < 1e-4
+    assert float(again.slip_error) > 10.0
+    assert int(again.cut) == 1  # stress was highest before the first time
+
+
+def test_slip_rate_decides_what_an_event_is(motion):
+    quick, slow = motion.rsf.events(1e6), motion.rsf.events(30.0)
+    assert quick.sizes["event"] == slow.sizes["event"] == 4
+    assert (quick.duration < slow.duration).all()
+    assert motion.rsf.events(1e12).sizes["event"] == 0
+    with pytest.raises(InvalidValue, match=r"slip_rate = -1.*positive"):
+        motion.rsf.events(-1.0)
+
+
+def test_a_part_of_an_event_is_said_to_be_one(motion):
+    begin, duration = (float(motion.rsf.events()[n][2]) for n in ("time", "duration"))
+    ends = motion.sel(time=slice(None, begin + 0.5 * duration)).rsf.events()
+    assert ends.cut.values.tolist() == [0, 0, 2]
+    begins = motion.sel(time=slice(begin + 0.5 * duration, None)).rsf.events()
+    assert begins.cut.values.tolist() == [1, 0]
+
+
+def test_events_have_the_units_of_the_motion(motion):
+    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+    scene = rig.scene(**{n: getattr(STICK_SLIP, n) for n in ("stiffness_ratio", "inertia")},
+                      load_velocity_ratio=10.0, b_over_a=2.0)  # fmt: skip
+    there = rsfstudy.simulate(scene, duration=12.0, engine="compiled")
+    after = rig.in_units(there.rsf.events(), stress="MPa", length="um")
+    before = rig.in_units(there, stress="MPa", length="um").rsf.events()
+    for name in ("time", "duration", "slip", "static_stress_drop"):
+        np.testing.assert_allclose(after[name], before[name], rtol=1e-8)
+        assert after[name].attrs["units"] == before[name].attrs["units"] != "1"
+    assert after.peak_slip_rate.attrs["units"] == "um s-1"
+
+
+def test_other_datasets_have_no_events():
+    with pytest.raises(DataError, match="time is not there"):
+        rsfstudy.limit_cycle(STICK_SLIP, engine="compiled").rsf.events()
+
+
+# ---- records ------------------------------------------------------------------------------------
+
+SAMPLES = 20_000
+
+
+def noise(seed, correlation=0.0):
+    """Gaussian noise of standard deviation 1."""
+    white = np.random.default_rng(seed).standard_normal(SAMPLES + 1000)
+    return lfilter([math.sqrt(1.0 - correlation**2)], [1.0, -correlation], white)[1000:]
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, 0.99])
+def test_nothing_is_invented_in_noise(correlation):
+    """Loading up, down and not at all: the chance of one false event in 100 records is 1 %, and
+    the records are always these.
+    """
+    time = np.arange(SAMPLES) / 100.0
+    for seed in range(25):
+        trend = (seed % 3 - 1) * 1e-3 * time
+        found = rsfstudy.events(time=time, shear_stress=noise(seed, correlation) + trend)
+        assert not found.sizes["event"], seed
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5])
+def test_all_drops_of_three_standard_deviations_are_found(correlation):
+    time, places = np.arange(SAMPLES) / 100.0, np.arange(1, 8) * SAMPLES // 8
+    for seed in range(15):
+        stress = noise(seed, correlation) + 0.01 * time
+        stress -= 3.0 * (np.arange(SAMPLES)[:, None] >= places).sum(axis=1)
+        found = rsfstudy.events(time=time, shear_stress=stress)
+        assert float(found.smallest_drop) < 3.0
+        assert float(found.noise) == pytest.approx(1.0, abs=0.1)
+        # to within the window that tells them from noise
+        np.testing.assert_allclose(found.time, time[places], atol=0.5)
+        off = np.abs(found.static_stress_drop - 3.0) / found.static_stress_drop_error
+        assert float(off.max()) < 5.0  # of 105
+
+
+def test_a_record_tells_slip_rate_and_dynamic_drop():
+    """A fall over ten samples, twice as fast in its second half, by displacement."""
+    fall = np.interp(np.arange(4000), [2000, 2005, 2010], [0.0, 1.0, 3.0])
+    time, rng = 0.1 * np.arange(4000), np.random.default_rng(5)
+    record = xr.Dataset(
+        {
+            "time": ("sample", time, {"units": "s"}),
+            "displacement": ("sample", 40.0 * fall + rng.normal(0.0, 0.2, 4000), {"units": "um"}),
+            "shear_stress": ("sample", 5.0 - fall + rng.normal(0.0, 0.01, 4000), {"units": "MPa"}),
+        }
+    )
+    event = rsfstudy.events(record).isel(event=0)
+    assert rsfstudy.events(record).sizes["event"] == 1
+    assert float(event.static_stress_drop) == pytest.approx(3.0, abs=0.1)
+    assert float(event.slip) == pytest.approx(120.0, abs=4.0)
+    assert float(event.peak_slip_rate) == pytest.approx(160.0, abs=10.0)  # noise 2.8, largest of 5
+    assert 0.0 < float(event.dynamic_stress_drop) <= float(event.static_stress_drop) + 0.1
+    assert event.slip.attrs["units"] == "um"
+    assert event.peak_slip_rate.attrs["units"] == "um s-1"
+    assert float(event.time) == pytest.approx(200.0, abs=1.0)
+
+
+def test_coarse_digits_are_no_events():
+    """Noise of a tenth of the last digit: mostly the same value, now and then the next."""
+    stress = np.round(0.45 + 0.1 * noise(3))
+    found = rsfstudy.events(time=np.arange(SAMPLES), shear_stress=stress)
+    assert not found.sizes["event"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"time": np.zeros(500)}, "increase, and does not at sample 1"),
+        ({"shear_stress": np.full(500, math.nan)}, "finite, and is not at sample 0"),
+        ({"shear_stress": np.zeros(499)}, "as many samples as time, which holds 500"),
+        ({"time": np.arange(9)}, "400 samples at least"),
+    ],
+)
+def test_records_that_are_none_are_refused(changed, why):
+    given = {"time": np.arange(500), "shear_stress": np.zeros(500)} | changed
+    with pytest.raises(InvalidValue, match=why):
+        rsfstudy.events(**given)
