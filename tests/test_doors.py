@@ -252,6 +252,7 @@ def commands(place: Path) -> dict[str, list[str]]:
         "plot": [file],
         "compare": [file, file],
         "rerun": [file, "--serial", "--quiet", "--cell", "law=slip", "--cell", "b_over_a=2"],
+        "export": [file, "--csv", "--output", f"{file}.csv"],
         "simulate": ["--duration", "0.1", "--engine", "compiled", "--rtol", "0.01"],
     }
 

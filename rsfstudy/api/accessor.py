@@ -158,6 +158,22 @@ class Accessor:
         return of_motion(self._dataset, slip_rate, lambda: self.scene)
 
     @door
+    def to_dataframe(self) -> pd.DataFrame:
+        """A table without columns that never change.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Of results of a study a row a cell, of a motion a row a time, with what there is for
+            each: orbits within cells are left out. Of another answer for one scene, its numbers in
+            one row. What never changes is in ``attrs["constant"]``.
+        """
+        from rsfstudy.api.exchange import to_dataframe
+
+        self._must_be_ours()
+        return to_dataframe(self._dataset)
+
+    @door
     def failures(self) -> pd.DataFrame:
         """The cells that failed or gave no number.
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.compute import provenance
 from rsfstudy.doors import door
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import Measure, Value
@@ -176,6 +177,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "engine": accuracy.engine,
         "status": outcome.status.label,
         "message": outcome.message,
+        **provenance.attributes(f"rsfstudy.{measure.name}"),
     }
     return dataset
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 import xarray as xr
 
+from rsfstudy.api import exchange
 from rsfstudy.api.progress import compile_with_notice, shown
 from rsfstudy.compute import code_digest, provenance, runner
 from rsfstudy.compute.cells import Task, sendable, serial
@@ -271,12 +272,13 @@ def rerun(
     progress: bool = True,
     time_limit: float = TIME_LIMIT,
 ) -> pd.DataFrame:
-    """Compute the cells of a results file again, from its own declaration, and compare the numbers.
+    """Compute the cells of a results file, or a motion, again from what the file says, and compare
+    the numbers.
 
     Parameters
     ----------
     file : path
-        A results file.
+        A results file, or that of a motion.
     study : path, optional
         The file that declares the study, where its measure is not part of rsfstudy; code is never
         taken from a results file.
@@ -297,7 +299,9 @@ def rerun(
     DataError, RunError
         Where the file is damaged, or the run cannot finish.
     """
-    theirs = open(file)
+    theirs = store.read_any(places.results(file, OUTPUT))
+    if contents.is_of_a_scene(theirs):
+        return exchange.rerun(theirs)
     declared = restore.study_of(theirs, study)
     place = places.directory(output)
     if place is not None:

@@ -12,6 +12,7 @@ from typing import Any, Never
 import numpy as np
 import xarray as xr
 
+from rsfstudy.compute import provenance
 from rsfstudy.doors import door
 from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
@@ -154,10 +155,14 @@ def simulate(
             "effects": " ".join(scene.effects) or "none",
             "status": status.label,
             "message": message,
+            "duration": duration,
+            "told": "as it moves" if at is None else "at times that were asked for",
             "rtol": rtol,
+            "budget": budget,
             "engine": accuracy.engine,
             "rhs_evaluations": meter.spent,
             "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
+            **provenance.attributes("rsfstudy.simulate"),
         }
     )
     if passed >= 0.0:

@@ -222,11 +222,12 @@ def check(**given: Any) -> int:
 @options.style
 @click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
 @options.study
+@options.against
 def plot(**given: Any) -> int:
-    """Draw the figure of results, beside them.
+    """Draw the figure of results, or a motion, beside them.
 
-    Of a named study's results, or of a file. A figure of your own is taken from the file that
-    --study names, which is run.
+    Of a named study's results, or of a file, that of a motion too. A figure of your own is taken
+    from the file that --study names, which is run.
     """
     from rsfstudy.cli import commands
 
@@ -278,6 +279,23 @@ def rerun(**given: Any) -> int:
     from rsfstudy.cli import commands
 
     return commands.rerun(**given)
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--csv", "form", flag_value="csv", required=True, help="Without what never changes.")
+@click.option("--mat", "form", flag_value="mat", help="For MATLAB: every variable.")
+@click.option(
+    "--output", type=click.Path(path_type=Path), help="The file to write.  [default: beside FILE]"
+)
+def export(**given: Any) -> int:
+    """Write results, or a motion, for other programs.
+
+    As a table of CSV, a row a cell or a time, or as a file of MATLAB.
+    """
+    from rsfstudy.cli import commands
+
+    return commands.export(**given)
 
 
 cli.add_command(command_line_simulate.simulate)

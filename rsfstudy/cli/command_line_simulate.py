@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from rsfstudy.cli import options
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
 
@@ -46,12 +47,7 @@ def _of_rig(command: Any) -> Any:
     help="CSV file of what the load point does: a header such as 'velocity (um/s), duration (s)'.",
 )
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
-@click.option(
-    "--against",
-    type=click.Choice(["displacement", "slip", "time"]),
-    help="Abscissa of the picture; displacement is that of the load point.  "
-    "[default: displacement, or slip where the load point is held]",
-)
+@options.against
 @_of_rig
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")
 @click.option(

@@ -16,8 +16,8 @@ from typing import Any
 import click
 import xarray as xr
 
-from rsfstudy.api import runs
-from rsfstudy.cli import assignments, terminal, terminal_numbers
+from rsfstudy.api import exchange, runs
+from rsfstudy.cli import assignments, commands_simulate, terminal, terminal_numbers
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
@@ -26,8 +26,8 @@ from rsfstudy.compute.workers import SharedProcesses, Workers
 from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
-from rsfstudy.errors import Interrupted, InvalidValue, RsfStudyError
-from rsfstudy.files import contents, places, restore
+from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
+from rsfstudy.files import contents, places, restore, store
 from rsfstudy.motion.engines import lacking
 
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
@@ -39,7 +39,10 @@ def show(name: str, settings: tuple[str, ...], rtol: float | None, output: Path)
     if Path(name).suffix in _RESULTS:
         if settings or rtol is not None:
             raise click.UsageError("a results file is shown as it is, without --set or --rtol")
-        return terminal.results(runs.open(name), name)
+        dataset = store.read_any(Path(name))
+        if contents.is_of_a_scene(dataset):
+            return commands_simulate.show(dataset)
+        return terminal.results(dataset, name)
     terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol), output)
     return OK
 
@@ -214,20 +217,39 @@ def plot(
     style: str | None,
     variable: str | None,
     study: Path | None,
+    against: str | None,
 ) -> int:
-    """Draw results."""
+    """Draw results, or a motion."""
     status, look = OK, Look(form, style, variable)
     target = _target(output, form, every)
     for what in _results(name, every):
         results = places.results(what, OUTPUT if target else output)
-        dataset = runs.open(results)
-        place = results if output is None else output / results.name
-        own = None if variable else _own_figure(dataset, study)
-        drawn = _drawn(dataset, target or look.beside(place), look, own)
+        dataset = store.read_any(results)
+        place = target or look.beside(results if output is None else output / results.name)
+        if contents.is_of_a_scene(dataset):
+            commands_simulate.draw(dataset, place, against, style)
+            drawn = [place]
+        else:
+            own = None if variable else _own_figure(dataset, study)
+            drawn = _drawn(dataset, place, look, own)
         status = status if drawn else FAILED
         for file in drawn:
             console.print(f"{file}")
     return status
+
+
+def export(file: Path, form: str, output: Path | None) -> int:
+    """Write a file for other programs."""
+    path = output or file.with_suffix(f".{form}")
+    if path.exists():
+        raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
+    dataset = store.read_any(file)
+    try:
+        {"csv": exchange.to_csv, "mat": exchange.to_mat}[form](dataset, path)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error})") from error
+    console.print(f"{path}")
+    return OK
 
 
 def _target(output: Path | None, form: str | None, every: bool) -> Path | None:

@@ -1,16 +1,23 @@
-"""The command `simulate`; how it is spelt is in `command_line_simulate`."""
+"""The command `simulate`, and others with files of motions; how they are spelt is in
+`command_line_simulate` and `command_line`.
+"""
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from rsfstudy.api.accessor import Accessor
 from rsfstudy.api.trajectory import BEYOND
 from rsfstudy.api.trajectory import simulate as simulated
 from rsfstudy.cli import assignments, terminal, terminal_numbers
 from rsfstudy.cli.console import console
+from rsfstudy.compute import provenance
+from rsfstudy.declare.wording import short
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
 from rsfstudy.rig.laboratory import Laboratory
@@ -23,7 +30,6 @@ _NO_PHYSICS = 3
 #: Units of the rig in what is printed.
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 _AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
-_ABSCISSAE = {"displacement": "load_point_displacement", "slip": "slip", "time": "time"}
 
 
 def simulate(
@@ -45,7 +51,8 @@ def simulate(
     scene = _scene(_fields(settings), protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
-    _write(motion, laboratory, output, _ABSCISSAE[against] if against else None)
+    motion = motion.assign_attrs(provenance.attributes(shlex.join(["rsfstudy", *sys.argv[1:]])))
+    _write(motion, laboratory, output, against)
     if motion.attrs["status"] != Status.OK.label:
         return terminal.FAILED
     return _NO_PHYSICS if BEYOND in motion.attrs else terminal.OK
@@ -100,27 +107,59 @@ def _write(
     motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str | None
 ) -> None:
     """The picture, and the data beside it."""
-    from rsfstudy.plots import rendered, styled, write_image
-    from rsfstudy.plots._motion import picture
-
     data = output.with_suffix(".nc")
     said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
     if not motion.sizes["time"]:
         console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
         return
-    try:
-        store.write(laboratory.in_units(motion) if laboratory else motion, data)
-        with styled():
-            drawn = picture(motion, laboratory, against=against)
-            write_image(rendered(drawn, output.suffix[1:]), output)
-    except OSError as error:
-        raise DataError(f"{output}: cannot be written ({error})") from error
-    for show, of in (
+    store.write(laboratory.in_units(motion) if laboratory else motion, data)
+    draw(motion, output, against, laboratory=laboratory)
+    for tell, of in (
         (terminal_numbers.record, motion),
-        (terminal_numbers.events, motion.rsf.events()),
+        (terminal_numbers.events, Accessor(motion).events()),
     ):
-        show(laboratory.in_units(of, **_UNITS) if laboratory else of)
+        tell(laboratory.in_units(of, **_UNITS) if laboratory else of)
     console.print(f"{said}\nwrote {output} and {data}")
+
+
+def draw(
+    motion: xr.Dataset,
+    path: Path,
+    against: str | None,
+    style: str | None = None,
+    laboratory: Laboratory | None = None,
+) -> None:
+    """Draw a motion into a file."""
+    from rsfstudy.plots import rendered, styled, write_image
+    from rsfstudy.plots._motion import picture
+
+    drawn = picture(motion, laboratory, against=against)
+    try:
+        with styled(style):
+            write_image(rendered(drawn, path.suffix[1:]), path)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error})") from error
+
+
+def show(answer: xr.Dataset) -> int:
+    """Print what a motion, or another answer for one scene, holds, and where it comes from; FAILED
+    where it ended early.
+    """
+    about, ours = answer.attrs, Accessor(answer)
+    console.print(about.get("title", "answer for one scene"), style="bold")
+    fields = {name: value for name, value in ours.scene.as_dict().items() if value is not None}
+    console.print(", ".join(f"{name} = {short(value)}" for name, value in fields.items()))
+    made, source = (about.get(name, "unknown") for name in ("history", "source"))
+    console.print(f"made by {made}, with {source}")
+    if "load_point_displacement" in answer:
+        terminal_numbers.record(answer)
+        terminal_numbers.events(ours.events())
+    else:
+        for name, values in answer.data_vars.items():
+            if not values.dims:
+                console.print(f"{name} = {values.item()!r}")
+    console.print(f"{about['status']} {about['message']}".strip())
+    return terminal.OK if about["status"] == Status.OK.label else terminal.FAILED
 
 
 def _fields(settings: tuple[str, ...]) -> dict[str, Any]:

@@ -86,6 +86,17 @@ study = click.option(
 quiet = click.option("--quiet", is_flag=True, help="Do not show how far it has come.")
 
 
+#: By their names in datasets.
+_ABSCISSAE = {"displacement": "load_point_displacement"}
+against = click.option(
+    "--against",
+    type=click.Choice(["displacement", "slip", "time"]),
+    callback=lambda _context, _option, value: _ABSCISSAE.get(value, value),
+    help="Abscissa of the picture of a motion; displacement is that of the load point.  "
+    "[default: displacement, or slip where the load point is held]",
+)
+
+
 def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
     """A style that there is, found out before any work."""
     if value is not None:

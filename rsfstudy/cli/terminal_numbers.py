@@ -193,7 +193,7 @@ def events(catalogue: xr.Dataset) -> None:
     if not catalogue.sizes["event"]:
         console.print(f"no event {limit}")
         return
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"Events {limit}")
+    table = Table(box=None, pad_edge=False, title=f"Events {limit}")
     names = {name: words for name, words in _OF_EVENTS.items() if name in catalogue}
     if "peak_slip_rate" in names:
         del names["peak_log10_slip_rate"]

@@ -90,6 +90,24 @@ def provenance(study: Study, command: str) -> dict[str, Any]:
     }
 
 
+def attributes(command: str) -> dict[str, str]:
+    """Root attributes that say which rsfstudy made a dataset of one scene, when, and how.
+
+    Parameters
+    ----------
+    command : str
+        What the user typed, or called.
+    """
+    when = datetime.now(UTC).isoformat(timespec="seconds")
+    return {"source": _source(), "history": f"{when} {command}"}
+
+
+@functools.cache
+def _source() -> str:
+    version, commit = _version("rsfstudy"), git_state(_PACKAGE.parent)
+    return f"rsfstudy {version}, commit {commit}, numerical model of a spring-slider"
+
+
 _DEPENDENCIES = ("rsfstudy", "numpy", "scipy", "xarray", "dask", "distributed", "netCDF4")
 
 
@@ -101,8 +119,8 @@ def _version(name: str) -> str:
 
 
 def git_state(root: Path) -> str:
-    """Commit of a checkout of this project, and whether what decides numbers was clean; "none"
-    where its root is none, as for an installed wheel.
+    """Commit of a checkout of this project, and whether what decides numbers was clean; where its
+    root is none, as for an installed wheel, the commit that it was built from, or "none".
     """
 
     def ask(*words: str) -> str:
@@ -116,10 +134,16 @@ def git_state(root: Path) -> str:
 
     try:
         if Path(ask("rev-parse", "--show-toplevel")) != root.resolve():
-            return "none"
+            return _built_from()
         # what runs leave in the checkout changes nothing
         changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
         state = "with uncommitted changes" if changed else "clean"
         return f"{ask('rev-parse', 'HEAD')} {state}"
     except (OSError, subprocess.SubprocessError):
-        return "none"
+        return _built_from()
+
+
+def _built_from() -> str:
+    """The commit that a wheel names, as `stamp` writes it."""
+    stamp = _PACKAGE / "commit.txt"
+    return stamp.read_text().strip() if stamp.exists() else "none"

@@ -67,6 +67,22 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     return frame
 
 
+def of_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+    """How two motions of one scene agree, as `compared` tells it of studies."""
+    rows = []
+    for name in (name for name, values in theirs.variables.items() if values.dims):
+        same = name in ours and _comparable(theirs[name], ours[name])
+        missing = {"identical": 0, "largest_difference": np.nan, "beyond_errors": np.nan}
+        found = missing | {"values": theirs[name].size}
+        if same:
+            found = _agreement(theirs[name].values, ours[name].values, [])
+        rows.append({"variable": name, **found})
+    frame = pd.DataFrame(rows, columns=_COLUMNS)
+    made = [str(dataset.attrs.get("source", "unknown")) for dataset in (theirs, ours)]
+    frame.attrs["differs"] = {"source": tuple(made)} if made[0] != made[1] else {}
+    return frame
+
+
 def _finished(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["status"] != int(Status.PENDING)
 

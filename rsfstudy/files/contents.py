@@ -151,6 +151,11 @@ def check(dataset: xr.Dataset) -> None:
     _check_lattice(dataset)
 
 
+def is_of_a_scene(dataset: xr.Dataset) -> bool:
+    """True of a motion, a limit cycle or a critical step of one scene."""
+    return "scene" in dataset.attrs and "declaration" not in dataset.attrs
+
+
 def check_of_a_study(dataset: xr.Dataset, where: str) -> None:
     """Refuse what was asked of one scene, with what to do with it.
 
@@ -159,7 +164,7 @@ def check_of_a_study(dataset: xr.Dataset, where: str) -> None:
     DataError
         If the dataset is a motion, a limit cycle or a critical step.
     """
-    if "scene" in dataset.attrs and "declaration" not in dataset.attrs:
+    if is_of_a_scene(dataset):
         title = brief(dataset.attrs.get("title", "untitled"))
         raise DataError(
             f"{where} is of one scene ({title}), not the results of a study. Open its file with "

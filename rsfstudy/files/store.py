@@ -139,7 +139,21 @@ def _remove(path: Path) -> None:
 
 
 def read(path: Path) -> xr.Dataset:
-    """Load a results file into memory and close it; a Zarr store is opened, not loaded.
+    """Load the results of a study, as `read_any` does.
+
+    Raises
+    ------
+    DataError
+        If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
+    """
+    dataset = read_any(path)
+    contents.check_of_a_study(dataset, brief(path))
+    return dataset
+
+
+def read_any(path: Path) -> xr.Dataset:
+    """Load a results file, or that of one scene, into memory and close it; a Zarr store is opened,
+    not loaded.
 
     Raises
     ------
@@ -162,14 +176,15 @@ def read(path: Path) -> xr.Dataset:
         Exception
     ) as error:  # HDF5, Zarr, netCDF4 and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
-    contents.check_of_a_study(dataset, where)
+    if contents.is_of_a_scene(dataset):
+        return dataset  # which users write by xarray, without a digest
     try:
         contents.check(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
         said = f"{where} has no digest: another program saved it, and may have changed it"
-        warnings.warn(said, stacklevel=4)
+        warnings.warn(said, stacklevel=5)
     return dataset
 
 

@@ -1,0 +1,125 @@
+"""Results and motions for other programs: tables, files of CSV and of MATLAB; and motions computed
+again from their files.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.api.trajectory import simulate
+from rsfstudy.errors import DataError
+from rsfstudy.files import comparison
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.scales import SCALES
+
+#: Names that are none in MATLAB, and how long one may be.
+_KEYWORDS = ("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for",
+    "function", "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch",
+    "try", "while")  # fmt: skip
+_LONGEST = 63
+
+
+def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
+    """A table of a dataset, as `Accessor.to_dataframe` says."""
+    along = [name for name in ("time",) if name in dataset.dims]
+    along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
+    kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
+    table = dataset[kept].to_dataframe() if along else _one_row(dataset[kept])
+    table = table.reset_index() if along else table
+    if len(table) < 2:
+        return table
+    changing = [n for n in table if n in along or table[n].nunique(dropna=False) > 1]
+    constant = {str(n): table[n].iloc[0] for n in table if n not in changing}
+    table = table[changing]
+    table.attrs["constant"] = constant
+    return table
+
+
+def _one_row(dataset: xr.Dataset) -> pd.DataFrame:
+    return pd.DataFrame({str(n): [v.values.item()] for n, v in dataset.variables.items()})
+
+
+def to_csv(dataset: xr.Dataset, path: Path) -> None:
+    """Write the table of a dataset; numbers keep all their digits."""
+    to_dataframe(dataset).to_csv(path, index=False)
+
+
+def to_mat(dataset: xr.Dataset, path: Path) -> None:
+    """Write all variables of a dataset as a file of MATLAB, each with its dimensions in order, and
+    the structures ``units`` and ``dimensions`` that name those of each, and ``attributes``.
+    """
+    from scipy.io import savemat
+
+    names: dict[str, str] = {}
+    for name in map(str, dataset.variables):
+        legal = re.sub(r"\W", "_", name, flags=re.ASCII)
+        legal = legal if re.match("[A-Za-z]", legal) and legal not in _KEYWORDS else f"x{legal}"
+        legal = legal[:_LONGEST]
+        while legal in names.values():
+            legal = f"{legal[: _LONGEST - 1]}x"
+        names[name] = legal
+    about = {
+        "units": {
+            short: str(dataset[name].attrs.get("scale") or dataset[name].attrs.get("units", ""))
+            for name, short in names.items()
+        },
+        "dimensions": {short: " ".join(map(str, dataset[n].dims)) for n, short in names.items()},
+        "attributes": {
+            re.sub(r"\W", "_", str(name))[:_LONGEST]: value for name, value in dataset.attrs.items()
+        },
+    }
+    data = {short: dataset[name].values for name, short in names.items()}
+    for short, values in data.items():
+        if values.dtype.kind in "OUT":
+            data[short] = np.array(values.tolist(), dtype=object)
+    savemat(path, about | data, long_field_names=True, oned_as="column")
+
+
+def rerun(motion: xr.Dataset) -> pd.DataFrame:
+    """Compute a motion again, and compare it with what its file holds.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        As a file holds it.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `rsfstudy.rerun` gives it.
+
+    Raises
+    ------
+    DataError
+        Where it is no motion, or one of which the file does not say how it was told.
+    """
+    about = motion.attrs
+    told = about.get("told", "")
+    if "duration" not in about or told != "as it moves":
+        why = f"told {told}" if told else "no motion, or one of before motions said their duration"
+        raise DataError(f"it is {why}: only motions that are told as they move are computed again")
+    if SCALES in about and "laboratory" not in about:
+        raise DataError(
+            "it is in units of no rig: keep motions as simulate gives them, or by a rig"
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ours = simulate(
+            motion.rsf.scene,
+            duration=float(about["duration"]),
+            rtol=float(about["rtol"]),
+            budget=int(about["budget"]),
+            engine=about["engine"],
+        )
+    if "laboratory" in about:
+        units = {"stress": "shear_stress", "length": "slip", "time": "time"}
+        units = {of: str(motion[name].attrs["units"]) for of, name in units.items()}
+        ours = Laboratory(**json.loads(about["laboratory"])).in_units(ours, **units)
+    return comparison.of_motions(motion, ours)

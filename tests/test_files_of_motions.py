@@ -1,0 +1,142 @@
+"""Files of motions: what they say of themselves, and what commands make of them."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from running import call
+from scipy.io import loadmat
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.api import exchange
+from rsfstudy.compute import provenance
+from rsfstudy.errors import DataError
+from rsfstudy.files import store
+from rsfstudy.measures.limit_cycle import LimitCycle
+
+SCENE = Scene(stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
+RIG = ("--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Motions in units of the slider and of a rig, by the command line, and one at times."""
+    place = tmp_path_factory.mktemp("motions")
+    fields = ("--set", "stiffness_ratio=0.5", "--set", "load_velocity_ratio=10")
+    common = ("simulate", *fields, "--set", "inertia=yes", "--engine", "compiled")
+    for name, rest in (("plain", ("--duration", "8")), ("rig", ("--duration", "80 s", *RIG))):
+        ran = call(*common, *rest, "--output", place / f"{name}.png")
+        assert ran.returncode == 0, ran.stderr
+        assert "Events faster than 100 V_*" in ran.stdout
+    asked = rsfstudy.simulate(SCENE, times=[1.0, 2.0], engine="compiled")
+    store.write(asked, place / "asked.nc")
+    store.write(rsfstudy.limit_cycle(SCENE, rtol=1e-3, engine="compiled"), place / "cycle.nc")
+    return place
+
+
+def test_a_motion_names_version_commit_date_and_command(place):
+    with xr.open_dataset(place / "rig.nc") as motion:
+        source, history = motion.attrs["source"], motion.attrs["history"]
+    assert re.match(rf"rsfstudy {re.escape(provenance._version('rsfstudy'))}, commit \w+", source)
+    assert re.match(r"\d{4}-\d\d-\d\dT\S+ .*simulate .*load_velocity_ratio=10", history)
+    with xr.open_dataset(place / "cycle.nc") as cycle:
+        assert cycle.attrs["history"].endswith(" rsfstudy.limit_cycle")
+
+
+def test_an_installed_wheel_names_the_commit_it_was_built_from(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
+    assert provenance.git_state(tmp_path) == "none"
+    (tmp_path / "commit.txt").write_text("0123abcd\n")
+    assert provenance.git_state(tmp_path) == "0123abcd"
+
+
+@pytest.mark.parametrize("name", ["plain", "rig"])
+def test_commands_take_files_of_motions(place, tmp_path, name):
+    shown = call("show", place / f"{name}.nc")
+    assert shown.returncode == 0, shown.stderr
+    for text in ("stiffness_ratio = 0.5", "made by 20", "peak friction", "Events faster than"):
+        assert text in " ".join(shown.stdout.split())
+    figures = [tmp_path / f"{against}.svg" for against in ("time", "displacement")]
+    for figure in figures:
+        drawn = call("plot", place / f"{name}.nc", "--against", figure.stem, "--output", figure)
+        assert drawn.returncode == 0, drawn.stderr
+    first, second = (figure.read_text() for figure in figures)
+    assert first != second
+    again = call("rerun", place / f"{name}.nc")
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert "every number is the same" in again.stdout
+
+
+def test_a_motion_that_differs_is_told(place, tmp_path):
+    motion = xr.load_dataset(place / "plain.nc")
+    motion["slip"] = motion["slip"] * (1.0 + 1e-9)
+    store.write(motion, tmp_path / "other.nc")
+    table = rsfstudy.rerun(tmp_path / "other.nc").set_index("variable")
+    assert table.loc["slip", "identical"] < table.loc["slip", "values"]
+    assert table.loc["shear_stress", "identical"] == table.loc["shear_stress", "values"]
+
+
+def test_what_cannot_be_computed_again_says_why(place):
+    with pytest.raises(DataError, match="told at times that were asked for"):
+        rsfstudy.rerun(place / "asked.nc")
+    with pytest.raises(DataError, match="no motion"):
+        rsfstudy.rerun(place / "cycle.nc")
+
+
+def test_other_programs_read_what_is_exported(place, tmp_path):
+    motion = xr.load_dataset(place / "rig.nc")
+    for form in ("csv", "mat"):
+        file = tmp_path / f"motion.{form}"
+        ran = call("export", place / "rig.nc", f"--{form}", "--output", file)
+        assert ran.returncode == 0, ran.stderr
+        assert call("export", place / "rig.nc", f"--{form}", "--output", file).returncode == 2
+    table = pd.read_csv(tmp_path / "motion.csv")
+    np.testing.assert_allclose(table["shear_stress"], motion["shear_stress"], rtol=1e-15)
+    assert "reference_rate" not in table  # it never changes
+    mat = loadmat(tmp_path / "motion.mat", squeeze_me=True)
+    np.testing.assert_array_equal(mat["slip"], motion["slip"])
+    assert mat["reference_rate"] == 0.1
+    assert str(mat["units"]["shear_stress"]) == "Pa"
+    assert "simulate" in str(mat["attributes"]["history"])
+    assert call("export", place / "rig.nc").returncode == 2  # of which kind?
+
+
+def test_names_are_legal_in_matlab(tmp_path):
+    odd = {"end": 1.0, "_hidden": 2.0, "a" * 70: 3.0, "a" * 71: 4.0, "grösse": 5.0}
+    exchange.to_mat(xr.Dataset(odd), tmp_path / "odd.mat")
+    names = [name for name in loadmat(tmp_path / "odd.mat") if not name.startswith("__")]
+    assert len(names) == len(odd) + 3
+    for name in names:
+        assert re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name), name
+        assert name != "end"
+
+
+def test_a_table_has_no_columns_that_never_change():
+    motion = rsfstudy.simulate(SCENE, duration=1.0, engine="compiled")
+    table = motion.rsf.to_dataframe()
+    assert len(table) == motion.sizes["time"]
+    assert "reference_rate" not in table
+    assert table.attrs["constant"]["reference_rate"] == SCENE.reference_rate
+    (row,) = rsfstudy.limit_cycle(SCENE, rtol=1e-3, engine="compiled").rsf.to_dataframe().to_dict(
+        "records"
+    )  # fmt: skip
+    assert row["recurrence_interval"] > 0.0
+
+
+def test_a_table_of_a_study_has_a_row_a_cell():
+    axis = rsfstudy.Axis("stiffness_ratio", [0.5, 0.6, 0.7])
+    measure = LimitCycle(phases=5)
+    study = rsfstudy.Study(
+        name="three", title="Three", base=SCENE, axes=[axis], measure=measure
+    )  # fmt: skip
+    results = rsfstudy.run(
+        study, workers=0, output=None, progress=False, engine="compiled", rtol=1e-3
+    )
+    table = results.rsf.to_dataframe()
+    assert table["stiffness_ratio"].tolist() == [0.5, 0.6, 0.7]
+    assert "load_velocity_ratio" not in table
+    assert "status" not in table  # all are ok
+    np.testing.assert_array_equal(table["static_stress_drop"], results["static_stress_drop"])
