@@ -245,26 +245,34 @@ def test_the_slurm_job_is_what_it_says():
 
 #: Jobs that are processes of this machine, in place of SLURM's.
 LOCAL_JOBS = """
-import runpy, sys
+import functools, runpy, sys
 from dask_jobqueue.local import LocalCluster
 
 def cluster(walltime, queue, **words):
     return LocalCluster(**words)
 
-runpy.run_path(sys.argv[1])["main"](
-    "rigid_response", cluster, jobs=1, cores=1, processes=1, memory="2GB",
+command = runpy.run_path(sys.argv[1])["command"]
+names = command.callback.__globals__
+names["main"] = functools.partial(
+    names["main"], cluster=cluster, jobs=1, cores=1, processes=1, memory="2GB",
     python=sys.executable, death_timeout=1200,
     scheduler_options={"dashboard_address": "127.0.0.1:0"},
 )
+command(sys.argv[2:])
 """
 
 
 def test_the_slurm_script_runs_a_study(tmp_path):
-    words = [sys.executable, "-c", LOCAL_JOBS, str(CLUSTERS / "slurm.py")]
+    script = [sys.executable, "-c", LOCAL_JOBS, str(CLUSTERS / "slurm.py")]
+    given = ["--set", "law=slip", "--rtol", "1e-5", "--engine", "compiled", "--output", "there"]
+    words = [*script, "rigid_response", *given]
     ran = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     assert "reproduced" in ran.stdout
-    assert (tmp_path / "outputs" / "rigid_response.nc").exists()
+    results = rsfstudy.open(tmp_path / "there" / "rigid_response.nc")
+    assert results["law"].values.tolist() == ["slip"]
+    accuracy = results.rsf.study.accuracy
+    assert (accuracy.rtol, accuracy.engine) == (1e-5, "compiled")
 
 
 def test_the_kubernetes_file_starts_a_cluster(tmp_path):

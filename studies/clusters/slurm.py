@@ -1,15 +1,22 @@
-"""Run a named study on a SLURM cluster: ``python slurm.py rate_step_boundary``.
+"""Run a named study on a SLURM cluster: ``python slurm.py rate_step_boundary``, and options as of
+``rsfstudy run``: ``--set``, ``--rtol``, ``--engine``, ``--output``.
 
 Run it on a login node, in the environment in which rsfstudy is installed (with dask-jobqueue); it
 submits jobs, waits for the first, and ends them when the study is done.
 """
 
+import shlex
 import sys
+from collections.abc import Mapping
+from typing import Any
 
+import click
 import distributed
 from dask_jobqueue.slurm import SLURMCluster
 
 import rsfstudy
+from rsfstudy.cli import assignments, options
+from rsfstudy.declare import catalogue
 
 #: One job: 16 worker processes of one thread each, because a cell keeps its thread busy.
 JOB = {
@@ -24,14 +31,32 @@ JOB = {
 JOBS = 4
 
 
-def main(study: str, cluster: type = SLURMCluster, jobs: int = JOBS, **job: object) -> None:
-    """Start a cluster, run a study on it, and say what came out."""
+def main(
+    study: str,
+    choices: Mapping[str, Any],
+    cluster: type = SLURMCluster,
+    jobs: int = JOBS,
+    **job: object,
+) -> None:
+    """Start a cluster, run a study on it as `rsfstudy.run` does, and say what came out."""
     with cluster(**{**JOB, **job}) as nodes, distributed.Client(nodes) as client:
         nodes.scale(jobs=jobs)
         client.wait_for_workers(1)
-        dataset = rsfstudy.run(study, client=client)
+        dataset = rsfstudy.run(study, client=client, **choices)
     print(rsfstudy.check(dataset)[["id", "claim", "published", "ours", "verdict"]].to_string())
 
 
+@click.command()
+@click.argument("study")
+@options.settings
+@options.rtol
+@options.engine
+@options.output
+def command(study: str, settings: tuple[str, ...], **choices: Any) -> None:
+    """Run a study on SLURM, by its NAME or file."""
+    overrides = assignments.overrides(catalogue.load(study), settings)
+    main(study, {**choices, **overrides, "command": shlex.join(sys.argv)})
+
+
 if __name__ == "__main__":
-    main(sys.argv[1])
+    command()
