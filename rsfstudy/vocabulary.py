@@ -22,6 +22,14 @@ _QUANTITIES = (
         "1",
         "logarithm of load point velocity over V_star",
     ),
+    # the rig
+    Quantity("sigma_star", r"$\sigma_*$", "Pa", "normal stress sigma_star"),
+    Quantity("slip_distance", "$D_c$", "m", "characteristic slip distance"),
+    Quantity("reference_velocity", "$V_*$", "m s-1", "slip rate V_star of the steady state"),
+    Quantity("mass", "$m$", "kg m-2", "mass that moves over the area of the fault"),
+    Quantity("shear_modulus", "$G$", "Pa", "shear modulus of the medium"),
+    Quantity("density", r"$\rho$", "kg m-3", "density of the medium"),
+    Quantity("load_velocity", "$V_0$", "m s-1", "load point velocity"),
     # what several measures give, or figures name; files leave out their symbols
     Quantity(
         "critical_velocity_ratio",

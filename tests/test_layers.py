@@ -30,9 +30,9 @@ FLOORS = {
     "measures": 4,
     "reduce": 5,
     "declare": 6,
+    "rig": 6,  # which makes axes, of which studies are declared
     "files": 7,
     "compute": 8,
-    "rig": 8,
     "plots": 9,
     "api": 10,
     "cli": 11,

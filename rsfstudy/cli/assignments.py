@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from typing import Any
 
-import numpy as np
-
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.units import number
+from rsfstudy.rig.units import number, spaced
 
-_SPACED = "must read start:stop:count, two finite numbers and a count"
-_LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
-_MOST_POINTS = 1_000_000
 _FLAGS = {"true": True, "yes": True, "false": False, "no": False}
 
 
@@ -52,27 +46,8 @@ def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
             raise InvalidValue("--set", text, "leaves a value out")
         return name.strip(), [value(part) for part in parts]
     if ":" in values:
-        return name.strip(), _spaced(text, values.split(":"))
+        return name.strip(), spaced("--set", text, values.split(":"))
     return name.strip(), value(parts[0])
-
-
-def _spaced(text: str, parts: list[str]) -> list[float]:
-    spacing = parts[3].strip().lower() if len(parts) == 4 else ""
-    if len(parts) not in (3, 4) or spacing not in ("", "log"):
-        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC)
-    first, last, points = map(number, parts[:3])
-    if first is None or last is None or points is None or not points.is_integer():
-        raise InvalidValue("--set", text, _SPACED, remedy=_LOGARITHMIC)
-    if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
-        raise InvalidValue("--set", text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
-    spaced: list[float] = np.linspace(first, last, int(points)).tolist()
-    if not spacing:
-        return spaced
-    if first <= 0.0 or last <= 0.0:
-        remedy = "Leave :log out, or start above 0."
-        raise InvalidValue("--set", text, "has no logarithm of 0 or less", remedy=remedy)
-    geometric: list[float] = np.geomspace(first, last, int(points)).tolist()
-    return geometric
 
 
 def value(text: str) -> Any:

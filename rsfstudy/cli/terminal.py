@@ -52,7 +52,7 @@ def declaration(study: Study, output: Path) -> None:
         console.print(study.summary + "\n")
     table = Table("", "", box=None, show_header=False)
     for axis in study.axes:
-        points = list(axis.labels or [short(row[axis.dimension]) for row in axis.rows])
+        points = axis.points
         if len(points) > _MOST_SHOWN:
             points = [*points[:10], "...", *points[-3:]]
         table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))

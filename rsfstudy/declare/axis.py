@@ -5,12 +5,13 @@ fields.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rsfstudy.declare.wording import short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
@@ -30,7 +31,9 @@ class Axis:
     values : sequence, or mapping of str to mapping
         The values of that field, where a class stands for a part of the user's own; or, for a
         zipped axis, a label for each point and the fields set there, as in
-        ``{"constant": {"normal_stress": "constant"}, ...}``.
+        ``{"constant": {"normal_stress": "constant"}, ...}``, or the rig there.
+    units : mapping of str to str, optional
+        Units of the fields that are in units, in a study of a rig: see `Laboratory.axis`.
 
     Raises
     ------
@@ -41,9 +44,13 @@ class Axis:
     dimension: str
     rows: tuple[Row, ...]
     labels: tuple[str, ...] | None
+    units: Mapping[str, str]
 
     def __init__(
-        self, dimension: str, values: Sequence[Any] | np.ndarray | Mapping[str, Row]
+        self,
+        dimension: str,
+        values: Sequence[Any] | np.ndarray | Mapping[str, Any],
+        units: Mapping[str, str] | None = None,
     ) -> None:
         if not is_name(dimension):
             rule = "must be named by a Python identifier, its accents composed (NFC)"
@@ -61,6 +68,7 @@ class Axis:
         object.__setattr__(self, "dimension", dimension)
         object.__setattr__(self, "rows", rows)
         object.__setattr__(self, "labels", labels)
+        object.__setattr__(self, "units", dict(units or {}))
         self._check()
 
     def _check(self) -> None:
@@ -92,13 +100,18 @@ class Axis:
 
     def describe(self) -> dict[str, Any]:
         """The axis as plain data."""
-        if self.labels is None:
-            return {
-                "dimension": self.dimension,
-                "values": [row[self.dimension] for row in self.rows],
-            }
-        rows = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
-        return {"dimension": self.dimension, "values": rows}
+        values: Any = [row.get(self.dimension) for row in self.rows]
+        if self.labels is not None:
+            values = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
+        units = {"units": dict(self.units)} if self.units else {}
+        return {"dimension": self.dimension, "values": values, **units}
+
+    @property
+    def points(self) -> list[str]:
+        """What its points are called: labels, or values with their units."""
+        units = self.units.get(self.dimension, "")
+        values = (f"{short(row.get(self.dimension))} {units}".strip() for row in self.rows)
+        return list(self.labels or values)
 
 
 def kinds(rows: Sequence[Row]) -> np.ndarray:
@@ -110,6 +123,13 @@ def kinds(rows: Sequence[Row]) -> np.ndarray:
     return np.array([known.setdefault(_kind(row), len(known)) for row in rows])
 
 
+def alike(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+    """Rows on each axis that are of one kind, for each combination of kinds."""
+    every = [kinds(axis.rows) for axis in axes]
+    for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
+        yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))
+
+
 def _kind(row: Row) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
@@ -117,15 +137,16 @@ def _kind(row: Row) -> tuple[Any, ...]:
     )
 
 
-def _rows(dimension: str, points: Mapping[str, Row]) -> tuple[Row, ...]:
+def _rows(dimension: str, points: Mapping[str, Any]) -> tuple[Row, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
-    for label, row in points.items():
+    rows = {label: getattr(row, "on_axis", row) for label, row in points.items()}
+    for label, row in rows.items():
         check_text(dimension, label)
         if not label:
             raise InvalidValue(dimension, label, "must be a text that labels a point")
         if not isinstance(row, Mapping) or not row:
             raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
-    return tuple({n: plain(n, v) for n, v in row.items()} for row in points.values())
+    return tuple({n: plain(n, v) for n, v in row.items()} for row in rows.values())
 
 
 def select(axis: Axis, labels: Sequence[str]) -> Axis:
@@ -135,7 +156,7 @@ def select(axis: Axis, labels: Sequence[str]) -> Axis:
     for label in labels:
         if label not in rows:
             raise InvalidValue(axis.dimension, label, "is no point of the axis", choices=rows)
-    return Axis(axis.dimension, {label: rows[label] for label in labels})
+    return Axis(axis.dimension, {label: rows[label] for label in labels}, axis.units)
 
 
 def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
@@ -156,7 +177,7 @@ def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             elif new in spread or new in axis.labels:
                 new = f"{label}, {new}"
             spread[new] = changed
-    return Axis(axis.dimension, spread)
+    return Axis(axis.dimension, spread, axis.units)
 
 
 def check_text(name: str, text: object) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.wording import listed
@@ -58,5 +57,4 @@ def study_html(
 
 def _along(axis: Axis) -> str:
     """The points of an axis, a long list cut short."""
-    points: list[Any] = list(axis.labels or (row[axis.dimension] for row in axis.rows))
-    return f"{listed(points, ', ')} ({len(axis)})"
+    return f"{listed(axis.points, ', ')} ({len(axis)})"

@@ -14,18 +14,21 @@ from typing import Any
 
 import numpy as np
 
+from rsfstudy.declare import checks
 from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain_values, select, spread
 from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
-from rsfstudy.declare.wording import short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
+from rsfstudy.rig import lattice
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.quantities import FULL
 from rsfstudy.slider.registry import (
     CALLERS,
     FIELDS,
@@ -38,8 +41,6 @@ from rsfstudy.slider.registry import (
     without_meaning,
 )
 from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.synonyms import instead_of_field
-from rsfstudy.vocabulary import QUANTITIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +71,9 @@ class Study:
         Sources of the study.
     accuracy : Accuracy
         Accuracy of each cell.
+    laboratory : Laboratory, optional
+        The rig that the base is a scene of. Axes may be of its quantities, and are in units; plain
+        numbers are in SI units then.
     version : int
         Raised when the meaning of the results changes.
 
@@ -91,6 +95,7 @@ class Study:
     plot: Any = "lines"
     references: Sequence[str] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
+    laboratory: Laboratory | None = None
     version: int = 1
     overrides: Mapping[str, Any] = field(default_factory=dict)
     #: The file of a study that is no named one.
@@ -108,8 +113,8 @@ class Study:
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
         self._check_parts()
-        self._check_own_fields()
-        self._check_fields()
+        checks.own_fields(self)
+        checks.fields(self)
         for name, value in self.describe().items():
             try:
                 json.dumps(value)
@@ -133,6 +138,7 @@ class Study:
             ("claims", self.claims, Claim),
             ("references", self.references, str),
             ("accuracy", [self.accuracy], Accuracy),
+            ("laboratory", [self.laboratory] if self.laboratory is not None else [], Laboratory),
         ]
         for name, values, kind in parts:
             if not isinstance(values, list | tuple):
@@ -142,6 +148,8 @@ class Study:
                     raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
         if not self.axes:
             raise InvalidValue("axes", self.axes, "must hold at least one axis")
+        if self.laboratory is not None:
+            object.__setattr__(self, "axes", [lattice.in_units(axis) for axis in self.axes])
         self.measure.check()
         known = list(self.measure.variables)
         for reduction in self.reductions:
@@ -157,45 +165,9 @@ class Study:
                 if name in taken:
                     raise InvalidValue("axis", name, "is the name of something measured")
 
-    def _check_own_fields(self) -> None:
-        """Refuse parts with a field whose name something else in the results bears already."""
-        taken = {*self.measure.variables, *self.measure.inner_coordinates}
-        taken |= {*TAKEN, *QUANTITIES, *(reduction.name for reduction in self.reductions)}
-        for name in self.scene_fields[len(FIELDS) :]:
-            if name in taken - SLOT_NAMES:
-                rule, remedy = "is the name of something else", "Rename the field of your part."
-                raise InvalidValue("field", name, rule, remedy=remedy)
-
-    def _check_fields(self) -> None:
-        """Refuse axes over unknown fields, and over fields of the measure that decide which numbers
-        it gives, because all cells of a lattice have the same numbers.
-        """
-        known = dict.fromkeys((*self.scene_fields, *self.measure.plain_fields))
-        for axis in self.axes:
-            if axis.labels is not None and axis.dimension in (*self.scene_fields, *axis.fields):
-                rule = "is a field: a zipped axis needs a name of its own"
-                raise InvalidValue("axis", axis.dimension, rule)
-            for name in axis.fields:
-                if name not in known:
-                    rule = (
-                        "is not a field of a scene, nor a number, flag or text of the measure "
-                        f"{self.measure.name}"
-                    )
-                    raise _unknown("field", name, rule, known)
-        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self._of_scene]
-        given = _given(self.measure)
-        for rows in itertools.product(*varied):
-            measure = self.measure.with_(**self._split(rows)[1])
-            if _given(measure) != given:
-                present = self.measure.plain_fields.items()
-                guilty = [n for n, v in measure.plain_fields.items() if (n, v) not in present]
-                rule = "decides which numbers are measured, which all cells must share"
-                remedy = "Make a study of each value."
-                raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
-
     def _check_sought(self, fields: Sequence[str]) -> None:
         for name in fields:
-            if name in self.measure.sought:
+            if {name, FULL.get(name)} & set(self.measure.sought):
                 rule = f"{self.measure.name} solves for {name}; it cannot be an axis or be set"
                 raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
@@ -223,8 +195,25 @@ class Study:
         return fields_with(self.own_parts.values())
 
     @cached_property
-    def _of_scene(self) -> frozenset[str]:
-        return frozenset(self.scene_fields)
+    def of_scene(self) -> frozenset[str]:
+        """Fields of its axes, and others, that decide the scene of a cell."""
+        return frozenset({*self.scene_fields, *self.units})
+
+    @cached_property
+    def rig(self) -> lattice.Cells | None:
+        """What makes scenes of axes in units, in a study of a rig."""
+        return lattice.Cells(self.laboratory, self.base, self.axes) if self.laboratory else None
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Units of the fields of its axes that are in units."""
+        return {name: units for axis in self.axes for name, units in axis.units.items()}
+
+    def fields_of(self, row: Row) -> Row:
+        """The fields of a scene that differ from the base where axes have these values, or arrays
+        of numbers.
+        """
+        return self.rig.fields(row) if self.rig else row
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -259,7 +248,7 @@ class Study:
         InvalidValue
             For a cell that makes no meaningful scene, naming its place on the axes.
         """
-        unused = {name for axis in self.axes for name in axis.fields if name in self._of_scene}
+        unused = {n for axis in self.axes for n in axis.fields if n in self.scene_fields}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
             cell = self._cell(rows)
             unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
@@ -290,27 +279,27 @@ class Study:
         """Where a cell is on the axes, in words."""
         words = []
         for axis, i in zip(self.axes, np.unravel_index(cell, self.shape), strict=True):
-            value = axis.labels[i] if axis.labels else short(axis.rows[i][axis.dimension])
-            words.append(f"{axis.dimension} = {value}")
+            words.append(f"{axis.dimension} = {axis.points[i]}")
         return ", ".join(words)
 
-    def _split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
         """The fields of the scene, and those of the measure, that rows set."""
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
             for name, value in row.items():
-                split[name not in self._of_scene][name] = value
+                split[name not in self.of_scene][name] = value
         return split
 
     def _cell(self, rows: Sequence[Row]) -> Cell:
-        of_scene, changes = self._split(rows)
+        given, changes = self.split(rows)
         # a row that states a choice together with a field it makes meaningless must be refused
         stated = {name for row in rows if set(row) & {*SLOT_NAMES, *CALLERS} for name in row}
         parts = self.own_parts
-        values = by_class(self.base.as_dict() | of_scene, parts)
-        meaningless = without_meaning(values, parts.values()) - stated
-        of_scene = {name: values[name] for name in of_scene if name not in meaningless}
         try:
+            of_scene = self.fields_of(given)
+            values = by_class({**self.base.as_dict(), **of_scene}, parts)
+            meaningless = without_meaning(values, parts.values()) - stated
+            of_scene = {name: values[name] for name in of_scene if name not in meaningless}
             return Cell(self.base.with_(**of_scene), changes)
         except InvalidValue as error:
             place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
@@ -339,6 +328,8 @@ class Study:
 
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
+        if changed_by_rig := lattice.override(self, name, value):
+            return replace(self, **changed_by_rig)
         for index, axis in enumerate(self.axes):
             if name == axis.dimension:
                 changed = select(axis, values) if axis.labels is not None else Axis(name, values)
@@ -350,11 +341,11 @@ class Study:
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
         if name not in known and not own_named([name], _rows(name, values)):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise _unknown("override", name, rule, known)
+            raise checks.unknown("override", name, rule, known)
         self._check_sought([name])
         if is_list(value):
             return replace(self, axes=(Axis(name, values), *self.axes))
-        if name in self._of_scene | SLOT_NAMES:
+        if name in self.of_scene | SLOT_NAMES:
             changes = by_class({name: value}, self.own_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{name: value}))
@@ -375,22 +366,12 @@ class Study:
             "plot": figure_name(self.plot, self.name),
             "references": list(self.references),
             "overrides": dict(self.overrides),
+            **({"laboratory": self.laboratory.as_dict()} if self.laboratory else {}),
         }
 
     def _repr_html_(self) -> str:
         caption = f"{self.name}: {self.title} ({self.size:,} cells)"
         return study_html(caption, self.axes, self.base, self.measure, self.quantities)
-
-
-def _unknown(of: str, name: str, rule: str, known: Collection[str]) -> InvalidValue:
-    remedy = instead_of_field(name)
-    return InvalidValue(of, name, rule, remedy=remedy, choices=() if remedy else known)
-
-
-def _given(measure: Measure) -> str:
-    """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
-    inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
-    return repr((measure.headline, dict(measure.variables), inner, measure.sought))
 
 
 def _rows(name: str, value: Any) -> list[Row]:

@@ -7,7 +7,6 @@ where the cell is computed.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,11 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import Row, kinds
+from rsfstudy.declare.axis import Row, alike, kinds
 from rsfstudy.declare.cell import Rows
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.scene import Scene
+
+#: Cells that are checked at a time: their numbers are in memory meanwhile.
+_CHECKED_AT_A_TIME = 50_000
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Table:
 
     def __init__(self, study: Study) -> None:
         self.study = study
-        self._of_scene = frozenset(study.scene_fields)
+        self._of_scene = study.of_scene
         #: The axis of each field of the measure that varies, and of each of the scene.
         self._of_measure = [p for p, a in enumerate(study.axes) if set(a.fields) - self._of_scene]
         self._places = {
@@ -77,8 +79,7 @@ class Table:
         self._columns = {name: self._column(name) for name in self._places}
         self.blocks: list[Block] = []
         wrong: list[int] = []
-        for kind in np.ndindex(self._shape):
-            rows = tuple(np.flatnonzero(k == n) for k, n in zip(self._kind, kind, strict=True))
+        for rows in alike(study.axes):
             wrong += self._add(rows)
         if wrong:
             study.cell(min(wrong))  # which raises
@@ -91,7 +92,8 @@ class Table:
 
     def _unused(self) -> set[str]:
         scenes = [block.head.as_dict() for block in self.blocks]
-        return {n for n in self._places if all(scene.get(n) is None for scene in scenes)}
+        names = set(self._places) & set(self.study.scene_fields)
+        return {n for n in names if all(scene.get(n) is None for scene in scenes)}
 
     # ---- checking -------------------------------------------------------------------------------
 
@@ -107,23 +109,28 @@ class Table:
             return
         block = Block(rows, head, self._varying(head, rows))
         self.blocks.append(block)
-        places = sorted({self._places[name] for name in block.names})
-        for along in itertools.product(*(rows[place].tolist() for place in places)):
-            at = dict(zip(places, along, strict=True))
-            row = (float(self._columns[name][at[self._places[name]]]) for name in block.names)
-            try:
-                head.with_numbers(dict(zip(block.names, row, strict=True)))
-            except InvalidValue:
-                yield self._number([at.get(p, int(along[0])) for p, along in enumerate(rows)])
-                return
+        varied = {self._places[name] for name in self._numeric([along[:1] for along in rows])}
+        rows = tuple(r if place in varied else r[:1] for place, r in enumerate(rows))
+        shape = tuple(map(len, rows))
+        for start in range(0, math.prod(shape), _CHECKED_AT_A_TIME):
+            numbers = np.arange(start, min(start + _CHECKED_AT_A_TIME, math.prod(shape)))
+            at = [r[i] for r, i in zip(rows, np.unravel_index(numbers, shape), strict=True)]
+            for place, row in enumerate(self.columns(block, at).T.tolist()):
+                try:
+                    head.with_numbers(dict(zip(block.names, row, strict=True)))
+                except InvalidValue:
+                    yield self._number([int(along[place]) for along in at])
+                    return
 
     def _varying(self, head: Scene, rows: tuple[np.ndarray, ...]) -> tuple[str, ...]:
         """The fields of the block's scenes that hold numbers of their own."""
-        return tuple(
-            name
-            for name, place in self._places.items()
-            if name in head.layout.places and not np.isnan(self._columns[name][rows[place][0]])
-        )
+        made = self.study.fields_of(self._numeric([along[:1] for along in rows]))
+        return tuple(n for n in made if n in head.layout.places and made[n] is not True)
+
+    def _numeric(self, rows: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """What axes hold in cells of one block, where it is numbers, by field."""
+        found = {n: self._columns[n][rows[place]] for n, place in self._places.items()}
+        return {name: column for name, column in found.items() if not np.isnan(column[0])}
 
     def _number(self, rows: Sequence[int]) -> int:
         return int(np.ravel_multi_index(tuple(rows), self.study.shape))
@@ -149,8 +156,9 @@ class Table:
 
     def columns(self, block: Block, rows: Sequence[np.ndarray]) -> np.ndarray:
         """The numbers that vary in a block, a row of them for each field."""
-        values = [self._columns[name][rows[self._places[name]]] for name in block.names]
-        return np.array(values).reshape(len(values), len(rows[0]))
+        made, count = self.study.fields_of(self._numeric(rows)), len(rows[0])
+        values = [np.broadcast_to(made[name], count) for name in block.names]
+        return np.array(values).reshape(len(values), count)
 
     def changes(self, rows: Sequence[np.ndarray]) -> list[dict[str, Any]]:
         """Fields of the measure that differ in each cell; none, where no axis varies them."""

@@ -15,7 +15,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import Annotated, Any, TypedDict, get_type_hints
+from typing import Annotated, Any, NotRequired, TypedDict, get_type_hints
 
 import msgspec
 import numpy as np
@@ -57,6 +57,7 @@ class PlainAxis(TypedDict):
 
     dimension: str
     values: Sequence[float | str | bool] | Mapping[str, Mapping[str, float | str | bool | None]]
+    units: NotRequired[Mapping[str, str]]
 
 
 class PlainMeasure(TypedDict):
@@ -89,6 +90,7 @@ class Declaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     plot: str
     references: Sequence[str]
     overrides: Mapping[str, Any]
+    laboratory: Mapping[str, float] | None = None
 
 
 class Fingerprint(TypedDict):

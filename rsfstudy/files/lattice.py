@@ -15,6 +15,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.files.contents import LAYOUT
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.quantity import Quantity
+from rsfstudy.rig.lattice import BESIDE
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
 
@@ -22,6 +23,10 @@ CONVENTIONS = "CF-1.11, ACDD-1.3"
 _COMMENT = (
     "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
     "V_*; the attribute scale of a variable says which."
+)
+_OF_RIG = (
+    " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
+    "the scales of each cell."
 )
 #: Attributes that the user sets in the environment: RSFSTUDY_LICENSE and so on.
 _CREDITS = ("creator_name", "creator_email", "institution", "license", "acknowledgement")
@@ -104,6 +109,11 @@ def coordinates(study: Study) -> dict[Any, Any]:
         for name in axis.fields:
             varied = [point.get(name) for point in points]
             coords[name] = (axis.dimension, _array(varied), _about(name, own, _first(varied)))
+    for name, units in study.units.items():
+        of_axis = {key: v for key, v in coords[name][2].items() if key != "scale"}
+        coords[name] = (*coords[name][:2], of_axis | {"units": units})
+    for name, (dims, values) in study.rig.beside().items() if study.rig else ():
+        coords[name] = (dims, values, _about(name.removeprefix(BESIDE), own))
     for name in study.scene_fields:
         present = {scene.get(name) for scene in sample} - {None}
         if name not in coords and len(present) == 1:
@@ -162,7 +172,7 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
-        "comment": _COMMENT,
+        "comment": _COMMENT + (_OF_RIG if study.laboratory else ""),
         "Conventions": CONVENTIONS,
         "project": "rsfstudy",
         "naming_authority": "rsfstudy",

@@ -7,6 +7,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypedDict
@@ -37,6 +38,7 @@ from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
+from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.registry import SLOTS, Own, by_class
 from rsfstudy.status import Status
 
@@ -135,6 +137,8 @@ def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> 
         parts["measure"] = kind.with_(**stated)
     try:
         parts["axes"] = [_axis(axis, own) for axis in declared.axes]
+        if declared.laboratory is not None:
+            parts["laboratory"] = _laboratory(declared.laboratory)
         return Study(**parts)
     except InvalidValue as error:
         raise refused("declaration", f"makes no study ({error})") from error
@@ -150,9 +154,18 @@ def _own_parts(study: Study | None) -> Mapping[str, Own]:
 
 def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
     dimension, values = described["dimension"], described["values"]
+    units = described.get("units")
     if isinstance(values, Mapping):
-        return Axis(dimension, {label: by_class(row, own) for label, row in values.items()})
-    return Axis(dimension, [by_class({dimension: value}, own)[dimension] for value in values])
+        return Axis(dimension, {label: by_class(row, own) for label, row in values.items()}, units)
+    named = [by_class({dimension: value}, own)[dimension] for value in values]
+    return Axis(dimension, named, units)
+
+
+def _laboratory(stated: Mapping[str, float]) -> Laboratory:
+    unknown = sorted(set(stated) - {field.name for field in fields(Laboratory)})
+    if unknown:
+        raise refused(f"declaration.laboratory.{unknown[0]}", "is unknown")
+    return Laboratory(**stated)
 
 
 def measure(described: PlainMeasure, path: str) -> Measure:

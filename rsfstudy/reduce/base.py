@@ -136,7 +136,9 @@ def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
 
 
 def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Quantities that a dataset states for variables that the vocabulary does not hold."""
+    """Quantities that a dataset states for variables that the vocabulary does not hold, or holds
+    in other units.
+    """
     return {
         str(name): Quantity(
             str(name),
@@ -146,5 +148,10 @@ def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
             str(values.attrs.get("scale", "")),
         )
         for name, values in dataset.variables.items()
-        if name not in QUANTITIES and values.attrs.get("long_name")
+        if values.attrs.get("long_name") and not _is_known(str(name), values.attrs)
     }
+
+
+def _is_known(name: str, attrs: Mapping[Any, Any]) -> bool:
+    about = QUANTITIES.get(name)
+    return about is not None and attrs.get("units", about.units) == about.units

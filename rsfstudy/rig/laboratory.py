@@ -3,40 +3,33 @@
 from __future__ import annotations
 
 import json
-import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
+from rsfstudy.declare.axis import Axis
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig import lattice
+from rsfstudy.rig.quantities import (
+    FIELDS,
+    FULL,
+    ON_AXIS,
+    STATED,
+    UNITS,
+    check_together,
+    in_si_of,
+    of_scene,
+    stated,
+    units_of,
+)
 from rsfstudy.rig.scales import Scale, rate_of, scaled, scales
 from rsfstudy.rig.units import factor, in_si
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
-from rsfstudy.slider.registry import QUANTITIES
 from rsfstudy.slider.scene import Scene
 
-#: What a laboratory may state: SI units, and the range that is usual; beyond it, it warns.
-_STATED: Mapping[str, tuple[str, float, float]] = {
-    "normal_stress": ("Pa", 1e2, 1e10),
-    "slip_distance": ("m", 1e-9, 1e-1),
-    "reference_velocity": ("m/s", 1e-13, 1e1),
-    "stiffness": ("Pa/m", 1e4, 1e15),
-    "period": ("s", 1e-6, 1e3),
-    "mass": ("kg/m^2", 1e-2, 1e9),
-    "shear_modulus": ("Pa", 1e5, 1e12),
-    "density": ("kg/m^3", 1e2, 2e4),
-}
-#: SI units of fields of a scene, by what they are measured in or their own units.
-_UNITS = {
-    "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
-    "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
-}  # fmt: skip
-_FIELDS = {about.name: about for about in QUANTITIES}
 _SEGMENT = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
@@ -87,25 +80,10 @@ class Laboratory:
     density: Any = None
 
     def __post_init__(self) -> None:
-        for name, (units, least, most) in _STATED.items():
+        for name in STATED:
             if getattr(self, name) is not None:
-                value = self._si(name, getattr(self, name), units)
-                if not value > 0.0:
-                    rule, remedy = "must be positive", f"Give it in {units}."
-                    raise InvalidValue(name, getattr(self, name), rule, remedy=remedy)
-                object.__setattr__(self, name, value)
-                if not least <= value <= most:
-                    text = f"{name} is {value:g} {units}: unusual for a rig. Is the unit right?"
-                    warnings.warn(text, UserWarning, stacklevel=3)
-        if self.mass is not None and self.period is not None:
-            rule = f"give mass or period (here {self.period:g} s), not both"
-            raise InvalidValue("mass", self.mass, rule)
-        if self.mass is not None and self.stiffness is None:
-            remedy = "State the stiffness too, or the period."
-            raise InvalidValue("mass", self.mass, "needs a stiffness to oscillate", remedy=remedy)
-        if (self.shear_modulus is None) != (self.density is None):
-            remedy = "State shear_modulus and density, or neither."
-            raise InvalidValue("density", self.density, "goes with shear_modulus", remedy=remedy)
+                object.__setattr__(self, name, stated(name, getattr(self, name), self._stress))
+        check_together(self.as_dict())
 
     @property
     def scales(self) -> dict[str, Scale]:
@@ -117,7 +95,7 @@ class Laboratory:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
         ``sigma_*/D_c`` is asked for.
         """
-        return float(self._si(name, value, _UNITS[scale]) / self.scales[scale].factor)
+        return float(in_si_of(name, value, UNITS[scale], self._stress) / self.scales[scale].factor)
 
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
@@ -129,7 +107,22 @@ class Laboratory:
             `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
             units. ``inertia=False`` leaves out the mass that the rig states.
         """
-        return Scene(**self._of_rig() | {n: self._field(n, v) for n, v in fields.items()})
+        fields = {FULL.get(n, n): self._field(FULL.get(n, n), v) for n, v in fields.items()}
+        return Scene(**of_scene(self.as_dict()) | fields)
+
+    def axis(self, dimension: str, values: Any) -> Axis:
+        """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.lattice.axis`.
+
+        Parameters
+        ----------
+        dimension : str
+            A quantity of the rig (``"slip_distance"``, or ``"normal_stress"``, which is called
+            `sigma_star` there), or a field of a scene: ``"hold_time"``, ``"load_velocity"``.
+        values : sequence of quantity, str, or mapping
+            ``["10 s", "100 s"]``; ``"1:100:20:log um/s"``, which is first, last, how many, and how
+            spaced; or, for a zipped axis, the fields at each label, or the rig.
+        """
+        return lattice.axis(dimension, values)
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
@@ -172,49 +165,25 @@ class Laboratory:
 
     def as_dict(self) -> dict[str, float]:
         """Quantities that were stated, in SI units."""
-        stated = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value for name, value in stated.items() if value is not None}
+        found = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value for name, value in found.items() if value is not None}
 
-    def _si(self, name: str, value: Any, units: str) -> float:
-        """A quantity in SI units; a stiffness may be of friction, over the normal stress."""
-        try:
-            return in_si(name, value, units)
-        except InvalidValue:
-            if units != "Pa/m":
-                raise
-            try:
-                return in_si(name, value, "1/m") * float(self.normal_stress)
-            except InvalidValue:
-                pass
-            raise
+    @property
+    def on_axis(self) -> dict[str, float]:
+        """Quantities that were stated, by the names that they have on axes, in SI units."""
+        return {ON_AXIS.get(name, name): value for name, value in self.as_dict().items()}
 
-    def _of_rig(self) -> dict[str, float]:
-        """The fields of a scene that the rig decides."""
-        found = {"reference_rate": self.reference_velocity / self.slip_distance}
-        if self.stiffness is not None:
-            found["stiffness"] = self.stiffness * self.slip_distance / self.normal_stress
-        if self.mass is not None:
-            found["period"] = 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
-        if self.period is not None:
-            found["period"] = self.period
-        if "period" in found:
-            found["inertia"] = True
-        if self.density is not None:
-            impedance = 0.5 * math.sqrt(self.shear_modulus * self.density)
-            found["radiation_damping"] = impedance * self.reference_velocity / self.normal_stress
-        return found
+    @property
+    def _stress(self) -> float | None:
+        """sigma_* in Pa, once it is known."""
+        return self.normal_stress if isinstance(self.normal_stress, float) else None
 
     def _field(self, name: str, value: Any) -> Any:
-        about = _FIELDS.get(name)
-        plain = isinstance(value, int | float | np.number) or value is None
-        if about is None or isinstance(value, type) or (plain and name.endswith("_ratio")):
+        units = units_of(name, value)
+        if units is None or value is None:
             return value
-        if about.scale:
-            return None if value is None else self.dimensionless(value, about.scale, name)
-        with_units = hasattr(value, "magnitude") or (isinstance(value, str) and about.units)
-        if with_units and about.units in _UNITS:
-            return in_si(name, value, _UNITS[about.units])
-        return in_si(name, value, "1") if with_units and about.units == "1" else value
+        scale = FIELDS[name].scale
+        return self.dimensionless(value, scale, name) if scale else in_si(name, value, units)
 
     def _segment(self, number: int, stated: Any) -> Any:
         if not isinstance(stated, Mapping):

@@ -9,9 +9,11 @@ from __future__ import annotations
 import importlib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any
+
+import numpy as np
 
 from rsfstudy.declare.axis import plain
 from rsfstudy.errors import InvalidValue
@@ -48,12 +50,48 @@ _POWERS = re.compile(rf"(/?)\s*{_POWER}")
 _UNIT = re.compile(
     rf"(?:1(?=\s*/)|{_POWER}(?:(?:\s*[*.\u00b7]\s*|\s+){_POWER})*)?(?:\s*/\s*{_POWER})*"
 )
+_SPACED = "must read start:stop:count, two finite numbers and a count"
+_LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
+_MOST_POINTS = 1_000_000
 _PINT = "Install pint (pip install 'rsfstudy[units]')"
 
 
 def number(text: str) -> float | None:
     """The number that a text is, in the digits and with the point of ASCII; None of others."""
     return float(text) if _NUMBER.fullmatch(text.strip()) else None
+
+
+def parted(text: str) -> tuple[float | None, str]:
+    """The number that a text begins with, if it does, and the units that follow."""
+    match = _NUMBER.match(text.strip())
+    return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
+
+
+def spaced(name: str, text: str, parts: Sequence[str]) -> list[float]:
+    """Numbers by their first, their last, how many there are and, perhaps, ``log``.
+
+    Parameters
+    ----------
+    name, text : str
+        What errors name.
+    parts : sequence of str
+    """
+    spacing = parts[3].strip().lower() if len(parts) == 4 else ""
+    if len(parts) not in (3, 4) or spacing not in ("", "log"):
+        raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
+    first, last, points = map(number, parts[:3])
+    if first is None or last is None or points is None or not points.is_integer():
+        raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
+    if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
+        raise InvalidValue(name, text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
+    found: list[float] = np.linspace(first, last, int(points)).tolist()
+    if not spacing:
+        return found
+    if first <= 0.0 or last <= 0.0:
+        remedy = "Leave :log out, or start above 0."
+        raise InvalidValue(name, text, "has no logarithm of 0 or less", remedy=remedy)
+    geometric: list[float] = np.geomspace(first, last, int(points)).tolist()
+    return geometric
 
 
 def in_si(name: str, value: Any, units: str) -> float:

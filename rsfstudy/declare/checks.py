@@ -1,0 +1,71 @@
+"""Checks of a study's fields: those that its axes vary, and those of parts of the user's own."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import TAKEN, Measure
+from rsfstudy.slider.registry import FIELDS, SLOT_NAMES
+from rsfstudy.slider.synonyms import instead_of_field
+from rsfstudy.vocabulary import QUANTITIES
+
+if TYPE_CHECKING:
+    from rsfstudy.declare.study import Study
+
+
+def own_fields(study: Study) -> None:
+    """Refuse parts with a field whose name something else in the results bears already."""
+    taken = {*study.measure.variables, *study.measure.inner_coordinates}
+    taken |= {*TAKEN, *QUANTITIES, *(reduction.name for reduction in study.reductions)}
+    for name in study.scene_fields[len(FIELDS) :]:
+        if name in taken - SLOT_NAMES:
+            rule, remedy = "is the name of something else", "Rename the field of your part."
+            raise InvalidValue("field", name, rule, remedy=remedy)
+
+
+def fields(study: Study) -> None:
+    """Refuse axes over unknown fields, and over fields of the measure that decide which numbers
+    it gives, because all cells of a lattice have the same numbers.
+    """
+    in_units = study.rig.units if study.rig else {}
+    known = dict.fromkeys((*study.scene_fields, *study.measure.plain_fields, *in_units))
+    for axis in study.axes:
+        if axis.labels is not None and axis.dimension in (*study.scene_fields, *axis.fields):
+            rule = "is a field: a zipped axis needs a name of its own"
+            raise InvalidValue("axis", axis.dimension, rule)
+        if axis.units and study.rig is None:
+            remedy = "Give the study its rig: Study(laboratory=rig)."
+            raise InvalidValue("axis", axis.dimension, "is in units of a rig", remedy=remedy)
+        for name in axis.fields:
+            if name not in known:
+                rule = (
+                    "is not a field of a scene, nor a number, flag or text of the measure "
+                    f"{study.measure.name}"
+                )
+                raise unknown("field", name, rule, known)
+    varied = [axis.rows for axis in study.axes if not set(axis.fields) <= study.of_scene]
+    given = _given(study.measure)
+    for rows in itertools.product(*varied):
+        measure = study.measure.with_(**study.split(rows)[1])
+        if _given(measure) != given:
+            present = study.measure.plain_fields.items()
+            guilty = [n for n, v in measure.plain_fields.items() if (n, v) not in present]
+            rule = "decides which numbers are measured, which all cells must share"
+            remedy = "Make a study of each value."
+            raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
+
+
+def unknown(of: str, name: str, rule: str, known: Collection[str]) -> InvalidValue:
+    remedy = instead_of_field(name)
+    return InvalidValue(of, name, rule, remedy=remedy, choices=() if remedy else known)
+
+
+def _given(measure: Measure) -> str:
+    """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
+    inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
+    return repr((measure.headline, dict(measure.variables), inner, measure.sought))

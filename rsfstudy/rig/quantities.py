@@ -1,0 +1,132 @@
+"""The quantities of a rig, and the fields of a scene that are measured in units of them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.units import in_si
+from rsfstudy.slider.registry import QUANTITIES
+
+#: What a laboratory may state: SI units, and the range that is usual; beyond it, it warns.
+STATED: Mapping[str, tuple[str, float, float]] = {
+    "normal_stress": ("Pa", 1e2, 1e10),
+    "slip_distance": ("m", 1e-9, 1e-1),
+    "reference_velocity": ("m/s", 1e-13, 1e1),
+    "stiffness": ("Pa/m", 1e4, 1e15),
+    "period": ("s", 1e-6, 1e3),
+    "mass": ("kg/m^2", 1e-2, 1e9),
+    "shear_modulus": ("Pa", 1e5, 1e12),
+    "density": ("kg/m^3", 1e2, 2e4),
+}
+#: What it must state: the scales of all else.
+SCALES = ("normal_stress", "slip_distance", "reference_velocity")
+#: What axes call those that are fields of scenes in another sense.
+ON_AXIS = {"normal_stress": "sigma_star"}
+#: Quantities by the names that they have on axes.
+OF_AXIS = {ON_AXIS.get(name, name): name for name in STATED}
+#: SI units of fields of a scene, by what they are measured in or their own units.
+UNITS = {
+    "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
+    "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
+}  # fmt: skip
+#: What fields of scenes are.
+FIELDS = {about.name: about for about in QUANTITIES}
+#: Slip rates of a scene, by the names that they have where they are no ratios.
+FULL = {
+    name.removesuffix("_ratio"): name
+    for name, about in FIELDS.items()
+    if about.scale == "V_*" and name.endswith("_ratio")
+}
+
+
+def stated(name: str, value: Any, stress: float | None = None) -> float:
+    """A quantity of a rig in SI units; warns of what is unusual.
+
+    Raises
+    ------
+    InvalidValue
+        For what is no quantity, of another kind, or not positive.
+    """
+    units, least, most = STATED[name]
+    found = in_si_of(name, value, units, stress)
+    if not found > 0.0:
+        raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")
+    if not least <= found <= most:
+        text = f"{name} is {found:g} {units}: unusual for a rig. Is the unit right?"
+        warnings.warn(text, UserWarning, stacklevel=5)
+    return found
+
+
+def in_si_of(name: str, value: Any, units: str, stress: float | None) -> float:
+    """A quantity in SI units; a stiffness may be of friction, over the normal stress in Pa."""
+    try:
+        return in_si(name, value, units)
+    except InvalidValue:
+        if units == "Pa/m" and stress is not None and is_friction(value):
+            return in_si(name, value, "1/m") * stress
+        raise
+
+
+def is_friction(stiffness: Any) -> bool:
+    """True if a stiffness is friction over displacement, in 1/length."""
+    if not isinstance(stiffness, str) and not hasattr(stiffness, "magnitude"):
+        return False
+    try:
+        in_si("stiffness", stiffness, "1/m")
+    except InvalidValue:
+        return False
+    return True
+
+
+def check_together(rig: Mapping[str, Any]) -> None:
+    """Refuse quantities that do not go with one another.
+
+    Raises
+    ------
+    InvalidValue
+        For mass beside period, mass without stiffness, and one of shear modulus and density.
+    """
+    if "mass" in rig and "period" in rig:
+        rule = f"give mass or period (here {rig['period']:g} s), not both"
+        raise InvalidValue("mass", rig["mass"], rule)
+    if "mass" in rig and "stiffness" not in rig:
+        remedy = "State the stiffness too, or the period."
+        raise InvalidValue("mass", rig["mass"], "needs a stiffness to oscillate", remedy=remedy)
+    if ("shear_modulus" in rig) != ("density" in rig):
+        remedy = "State shear_modulus and density, or neither."
+        raise InvalidValue("density", rig.get("density"), "goes with shear_modulus", remedy=remedy)
+
+
+def of_scene(rig: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a scene that a rig decides; arrays where its quantities are."""
+    found = {"reference_rate": rig["reference_velocity"] / rig["slip_distance"]}
+    if "stiffness" in rig:
+        found["stiffness"] = rig["stiffness"] * rig["slip_distance"] / rig["normal_stress"]
+    if "mass" in rig:
+        found["period"] = 2.0 * np.pi * np.sqrt(rig["mass"] / rig["stiffness"])
+    if "period" in rig:
+        found["period"] = rig["period"]
+    if "density" in rig:
+        impedance = 0.5 * np.sqrt(rig["shear_modulus"] * rig["density"])
+        found["radiation_damping"] = impedance * rig["reference_velocity"] / rig["normal_stress"]
+    plain = {name: v if isinstance(v, np.ndarray) else float(v) for name, v in found.items()}
+    return plain | ({"inertia": True} if "period" in found else {})
+
+
+def units_of(name: str, value: Any) -> str | None:
+    """SI units of a value of a field of a scene; None where it is none in units: a ratio that is a
+    plain number, or a field of another kind.
+    """
+    about = FIELDS.get(name)
+    plain = isinstance(value, int | float | np.number)
+    if about is None or isinstance(value, type) or (plain and name.endswith("_ratio")):
+        return None
+    if about.scale:
+        return UNITS[about.scale]
+    with_units = hasattr(value, "magnitude") or (isinstance(value, str) and about.units)
+    return (UNITS.get(about.units) or ("1" if about.units == "1" else None)) if with_units else None

@@ -1,0 +1,257 @@
+"""Studies of a rig: axes in units, the scene of each cell, files, and units of results."""
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import run
+
+import rsfstudy
+from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy.compute.plan import Plan, cell_key
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+
+STATED = {
+    "normal_stress": "5 MPa",
+    "slip_distance": "10 um",
+    "reference_velocity": "1 um/s",
+    "stiffness": "0.01 MPa/um",
+}
+RIG = Laboratory(**STATED)
+LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
+#: Two roundings of each of a few factors.
+EXACT = 1e-14
+
+
+def study(*axes, laboratory=RIG, measure=None, **fields):
+    base = laboratory.scene(**{**LAW, **fields})
+    measure = measure or LinearStability()
+    return Study(
+        name="of_rig", title="Of a rig", base=base, laboratory=laboratory, axes=axes,
+        measure=measure,
+    )  # fmt: skip
+
+
+def numbers(scene: Scene) -> dict[str, float]:
+    return {name: v for name, v in scene.as_dict().items() if isinstance(v, float)}
+
+
+AXES = {
+    "normal_stress": ["1 MPa", "20 MPa"],
+    "slip_distance": ["2 um", "0.05 mm"],
+    "reference_velocity": ["1 um/s", "1 mm/s"],
+    "stiffness": ["0.01 MPa/um", "0.03 MPa/um"],
+}
+
+
+@pytest.mark.parametrize("varied", list(AXES))
+def test_a_quantity_varies_and_all_others_are_held(varied):
+    """Each cell is the scene of a rig that states its value, with fields in units as they were."""
+    fields = {"hold_time": "100 s", "initial_stress": "50 kPa", "load_velocity_ratio": 3.0}
+    scenes = list(study(RIG.axis(varied, AXES[varied]), **fields).scenes())
+    for value, scene in zip(AXES[varied], scenes, strict=True):
+        theirs = Laboratory(**STATED | {varied: value}).scene(**LAW, **fields)
+        assert numbers(scene) == pytest.approx(numbers(theirs), rel=EXACT)
+        assert scene.load_velocity_ratio == 3.0
+    if varied != "reference_velocity":
+        assert scenes[0].stiffness != scenes[1].stiffness
+
+
+def test_a_stiffness_in_friction_over_displacement_goes_with_the_normal_stress():
+    made = study(
+        RIG.axis("stiffness", ["0.002 1/um", "0.004 1/um"]),
+        RIG.axis("normal_stress", ["1 MPa", "20 MPa"]),
+    )
+    # k D_c/sigma = 0.002/um 10 um, whatever sigma is
+    found = [scene.stiffness for scene in made.scenes()]
+    assert found == pytest.approx([0.02, 0.02, 0.04, 0.04], rel=EXACT)
+
+
+def test_fields_of_scenes_in_units():
+    made = study(
+        RIG.axis("hold_time", ["10 s", "2 min"]), RIG.axis("load_velocity", "1:100:3:log um/s")
+    )
+    assert [axis.units for axis in made.axes] == [{"hold_time": "s"}, {"load_velocity": "um/s"}]
+    assert made.axes[0].points == ["10 s", "120 s"]
+    at = [(scene.hold_time, scene.load_velocity_ratio) for scene in made.scenes()]
+    # D_c/V_* is 10 s
+    expected = list(itertools.product([1.0, 12.0], [1.0, 10.0, 100.0]))
+    assert np.array(at) == pytest.approx(np.array(expected), rel=EXACT)
+
+
+def test_rigs_as_an_axis():
+    rig20 = Laboratory(**STATED | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
+    made = study(Axis("rig", {"5 MPa": RIG, "20 MPa": rig20}), hold_time="10 s")
+    for scene, rig in zip(made.scenes(), (RIG, rig20), strict=True):
+        assert numbers(scene) == pytest.approx(numbers(rig.scene(**LAW, hold_time="10 s")))
+
+
+def test_plain_numbers_are_in_si_units_as_everywhere_in_a_rig():
+    made = study(Axis("hold_time", [10.0, 100.0]), Axis("b_over_a", [1.2, 1.4]))
+    assert made.axes[0].units == {"hold_time": "s"}
+    assert made.axes[1].units == {}
+    assert made.scene(0).hold_time == RIG.scene(**LAW, hold_time=10.0).hold_time
+
+
+def test_mass_of_a_rig_acts():
+    stiffness = RIG.axis("stiffness", ["10 GPa/m", "20 GPa/m"])
+    made = study(RIG.axis("mass", ["1e4 kg/m^2"]), stiffness)
+    for scene, k in zip(made.scenes(), (1e10, 2e10), strict=True):
+        assert scene.inertia
+        assert scene.period == pytest.approx(2.0 * np.pi * np.sqrt(1e4 / k), rel=EXACT)
+
+
+LATTICE = (
+    RIG.axis("normal_stress", ["1 MPa", "5 MPa", "20 MPa"]),
+    Axis("law", ["slip", "slowness"]),
+    RIG.axis("stiffness", ["0.01 MPa/um", "0.03 MPa/um"]),
+    RIG.axis("hold_time", ["0 s", "10 s"]),
+)
+
+
+def test_planning_makes_the_scenes_that_cells_have():
+    """Cells are planned as columns of numbers, and made one by one: to the same last bit."""
+    made = study(*LATTICE, initial_stress="50 kPa")
+    plan = Plan(made)
+    cells = [cell for rows in plan.table.rows(np.arange(made.size)) for cell in rows.cells()]
+    order = plan.table.ordered(np.arange(made.size))
+    for number, cell in zip(order.tolist(), cells, strict=True):
+        assert cell.scene == made.scene(number)
+        assert cell_key(made.scene(number), made.measure) == plan.named(np.array([number]))[0]
+
+
+OTHER = {
+    "normal_stress": "5e6 Pa", "slip_distance": "0.01 mm", "reference_velocity": "1e-6 m/s",
+    "stiffness": "10 GPa/m",
+}  # fmt: skip
+
+
+def test_a_change_of_units_changes_no_dimensionless_number():
+    """The same quantities, written otherwise, along axes and fixed."""
+    one = study(*LATTICE, RIG.axis("load_velocity", ["1 um/s", "3 mm/s"]), initial_stress="50 kPa")
+    rig = Laboratory(**OTHER)
+    two = study(
+        rig.axis("normal_stress", ["10 bar", "50 bar", "0.02 GPa"]), LATTICE[1],
+        rig.axis("stiffness", ["1e4 MPa/m", "30 kPa/um"]),
+        rig.axis("hold_time", ["0 ms", "1e4 ms"]),
+        rig.axis("load_velocity", ["1e-4 cm/s", "0.3 cm/s"]),
+        laboratory=rig, initial_stress="0.05 MPa",
+    )  # fmt: skip
+    for ours, theirs in zip(one.scenes(), two.scenes(), strict=True):
+        assert numbers(ours) == pytest.approx(numbers(theirs), rel=1e-12)
+
+
+# ---- files ---------------------------------------------------------------------------------------
+
+
+def test_coordinates_are_in_the_units_stated_and_dimensionless_ones_stand_beside(tmp_path):
+    results = run(study(*LATTICE), output=tmp_path)
+    assert results["sigma_star"].dims == ("sigma_star",)
+    assert results["sigma_star"].values.tolist() == [1.0, 5.0, 20.0]
+    assert results["sigma_star"].attrs["units"] == "MPa"
+    assert results["stiffness"].attrs["units"] == "MPa/um"
+    beside = results["dimensionless_stiffness"]
+    assert beside.dims == ("sigma_star", "stiffness")
+    # k D_c/sigma: 0.01 MPa/um 10 um over 1, 5 and 20 MPa, and three times that
+    expected = np.array([[0.1, 0.3], [0.02, 0.06], [0.005, 0.015]])
+    assert beside.values == pytest.approx(expected, rel=EXACT)
+    assert results["dimensionless_hold_time"].dims == ("hold_time",)
+    assert results["reference_rate"].dims == ()
+    assert float(results["slip_distance"]) == pytest.approx(1e-5)
+    assert results["slip_distance"].attrs["units"] == "m"
+
+
+def test_results_survive_their_file(tmp_path):
+    made = study(*LATTICE, initial_stress="50 kPa")
+    run(made, output=tmp_path)
+    opened = rsfstudy.open(tmp_path / "of_rig.nc")
+    assert json.loads(opened.attrs["declaration"]) == json.loads(json.dumps(made.describe()))
+    again = opened.rsf.study
+    assert list(again.scenes()) == list(made.scenes())
+    assert opened.isel(sigma_star=1, law=0, stiffness=1, hold_time=0).rsf.scene == made.scene(10)
+    assert len(rsfstudy.check(opened)) == 0
+    rsfstudy.plot(opened)
+    rerun = rsfstudy.rerun(tmp_path / "of_rig.nc", workers=0, progress=False)
+    assert (rerun["identical"] == rerun["values"]).all()
+
+
+def test_two_workers_and_what_is_finished_already(tmp_path):
+    made = study(*LATTICE)
+    serial = run(made, output=tmp_path / "serial")
+    both = rsfstudy.run(made, workers=2, output=tmp_path / "both", progress=False)
+    longer = made.with_(sigma_star=["1 MPa", "5 MPa", "20 MPa", "40 MPa"])
+    kept = run(longer, output=tmp_path / "both")
+    for name in made.measure.variables:
+        xr.testing.assert_identical(serial[name], both[name])
+        xr.testing.assert_equal(both[name], kept[name].isel(sigma_star=slice(3)))
+    # cells that are kept are not timed anew
+    assert kept["wall_time"].isel(sigma_star=slice(3)).equals(both["wall_time"])
+
+
+def test_without_a_rig_nothing_is_said_of_units():
+    plain = Study(
+        name="x", title="t", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=LinearStability()
+    )
+    described = plain.describe()
+    assert "laboratory" not in described
+    assert described["axes"] == [{"dimension": "b_over_a", "values": [2.0]}]
+
+
+# ---- other values ----------------------------------------------------------------------------
+
+
+def test_overrides_in_units():
+    made = study(*LATTICE, initial_stress="50 kPa")
+    assert made.with_(hold_time=["10 s", "1 min"]).axes[3].points == ["10 s", "60 s"]
+    # plain numbers are in the units of their axis
+    assert made.with_(stiffness=[0.02]).axes[2].points == ["0.02 MPa/um"]
+    assert made.with_(slip_distance=["1 um", "2 um"]).dimensions[0] == "slip_distance"
+    assert made.with_(normal_stress=["2 MPa", "5 MPa"]).axes[0].points == ["2 MPa", "5 MPa"]
+    assert made.with_(normal_stress="constant").base == made.base
+    one = made.with_(slip_distance="20 um")
+    assert one.laboratory.slip_distance == pytest.approx(2e-5)
+    theirs = Laboratory(**STATED | {"slip_distance": "20 um"})
+    expected = theirs.scene(**LAW, initial_stress="50 kPa")
+    assert numbers(one.base) == pytest.approx(numbers(expected), rel=EXACT)
+    ramp = {"normal_stress": "imposed", "normal_stress_ramp": "1 MPa", "ramp_duration": "20 s"}
+    base = made.with_(**ramp).base
+    assert (base.normal_stress_ramp, base.ramp_duration) == pytest.approx((0.2, 2.0), rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("axis", "field", "rule"),
+    [
+        (("hold_time", ["10 um"]), "hold_time", "another kind"),
+        (("normal_stress", ["-5 MPa"]), "sigma_star", "must be positive"),
+        (("stiffness", ["0.1 MPa/um", "1e-3 1/um"]), "stiffness", "another kind"),
+        (("load_velocity", "1:0:3:log um/s"), "load_velocity", "no logarithm"),
+        (("load_velocity", ["10 um/s", "fast"]), "load_velocity", "no quantity"),
+    ],
+)
+def test_wrong_axes_are_refused(axis, field, rule):
+    with pytest.raises(InvalidValue, match=rule) as refused:
+        study(RIG.axis(*axis))
+    assert refused.value.name == field
+
+
+def test_what_does_not_go_with_the_rig_is_refused_before_any_work():
+    hold = RIG.axis("hold_time", ["10 s"])
+    parts = {"name": "x", "title": "t", "measure": LinearStability()}
+    with pytest.raises(InvalidValue, match="Study.laboratory=rig"):
+        Study(base=Scene(), axes=[hold], **parts)
+    with pytest.raises(InvalidValue, match="is not that of the laboratory"):
+        Study(base=Scene(), axes=[hold], laboratory=RIG, **parts)
+    bare = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
+    with pytest.raises(InvalidValue, match="does not state stiffness"):
+        study(Axis("rig", {"bare": bare}))
+    ratio, stress = Axis("stiffness_ratio", [0.8]), RIG.axis("normal_stress", ["1 MPa"])
+    with pytest.raises(InvalidValue, match="cell stiffness_ratio=0.8"):
+        list(study(ratio, stress, measure=LimitCycle()).scenes())
+    with pytest.raises(InvalidValue, match="mass or period"):
+        list(study(RIG.axis("mass", [1e4]), RIG.axis("period", ["1 ms"])).scenes())
+    with pytest.raises(InvalidValue, match="Laboratory"):
+        Study(base=Scene(), axes=[hold], laboratory="5 MPa", **parts)
