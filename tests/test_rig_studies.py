@@ -255,3 +255,87 @@ def test_what_does_not_go_with_the_rig_is_refused_before_any_work():
         list(study(RIG.axis("mass", [1e4]), RIG.axis("period", ["1 ms"])).scenes())
     with pytest.raises(InvalidValue, match="Laboratory"):
         Study(base=Scene(), axes=[hold], laboratory="5 MPa", **parts)
+
+
+# ---- results in units ----------------------------------------------------------------------------
+
+
+#: Softer than the fault at 5 MPa and 10 um: (b-a) sigma/D_c is 0.002 MPa/um.
+SOFT = STATED | {"stiffness": "0.001 MPa/um"}
+
+
+@pytest.fixture(scope="module")
+def cycles():
+    """Two normal stresses, two slip distances: all of them stick and slip."""
+    axes = (
+        RIG.axis("normal_stress", ["5 MPa", "20 MPa"]),
+        RIG.axis("slip_distance", ["5 um", "10 um"]),
+        RIG.axis("load_velocity", ["1 um/s", "10 um/s"]),
+    )
+    fields = {"period": "5 ms", "inertia": True}
+    made = study(*axes, laboratory=Laboratory(**SOFT), measure=LimitCycle(), **fields)
+    return run(made, engine="compiled", rtol=1e-5)
+
+
+def test_each_cell_is_converted_by_its_own_scales(cycles):
+    """What the accessor makes of the file is what the rig of each cell makes of its numbers."""
+    assert (cycles["status"] == 0).all()
+    found = cycles.rsf.in_units(stress="kPa", length="mm", time="min")
+    for sigma, slip in itertools.product(["5 MPa", "20 MPa"], ["5 um", "10 um"]):
+        scale = {
+            "recurrence_interval": float(slip.split()[0]) / 60.0,
+            "static_stress_drop": float(sigma.split()[0]) * 1e3,
+            "slip_per_event": float(slip.split()[0]) * 1e-3,
+        }
+        at = {"sigma_star": float(sigma.split()[0]), "slip_distance": float(slip.split()[0])}
+        for name, factor in scale.items():
+            ours, theirs = found[name].sel(at), cycles[name].sel(at)
+            assert ours.values == pytest.approx(theirs.values * factor, rel=EXACT), name
+    assert found["recurrence_interval"].attrs["units"] == "min"
+    # the axes stay in the units stated, and what stood beside them without dimension is left out
+    assert found["load_velocity"].attrs["units"] == "um/s"
+    assert "load_velocity_ratio" not in found
+    rates = 1e-3 * 60.0 * 10.0 ** cycles["max_log10_slip_rate"]
+    assert found["max_slip_rate"].values == pytest.approx(rates.values, rel=1e-13)
+
+
+def test_a_cycle_is_that_of_its_own_rig(cycles):
+    """The cell of another stress and slip distance, asked alone of the rig that states them."""
+    rig = Laboratory(**SOFT | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
+    fields = {"period": "5 ms", "inertia": True, "load_velocity_ratio": 10.0}
+    alone = rsfstudy.limit_cycle(rig.scene(**LAW, **fields), rtol=1e-5, engine="compiled")
+    theirs = rig.in_units(alone, stress="MPa", length="um")
+    ours = cycles.rsf.in_units().sel(sigma_star=20.0, slip_distance=5.0, load_velocity=10.0)
+    # one scene apart from its last bits: both estimates cover what that makes of the cycle
+    for name in ("recurrence_interval", "static_stress_drop"):
+        error = float(ours[f"{name}_error"] + theirs[f"{name}_error"])
+        assert float(ours[name]) == pytest.approx(float(theirs[name]), abs=error)
+
+
+def test_one_scale_for_several_rigs_is_refused(cycles):
+    with pytest.raises(InvalidValue, match="5e.06 to 2e.07 Pa") as refused:
+        cycles.rsf.to_si(normal_stress="5 MPa")
+    assert refused.value.name == "normal_stress"
+    with pytest.raises(InvalidValue, match="contradicts that of the dataset"):
+        RIG.in_units(cycles)
+    one = cycles.isel(sigma_star=0, slip_distance=1)
+    xr.testing.assert_allclose(RIG.in_units(one), one.rsf.to_si(), rtol=1e-12)
+    plain = run(Study(
+        name="x", title="t", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=LinearStability()
+    ))  # fmt: skip
+    with pytest.raises(InvalidValue, match="is not in the dataset"):
+        plain.rsf.in_units()
+
+
+def test_figures_and_tables_show_units(cycles, capsys):
+    from rsfstudy.cli import terminal_numbers
+
+    drawn = rsfstudy.plot(cycles)
+    texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
+    assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
+    assert any("(s)" in text for text in texts)
+    terminal_numbers.headline(cycles)
+    said = capsys.readouterr().out
+    assert "recurrence interval of stick-slip, in s" in said
+    interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])
+    assert f"{interval:.8g}" in said

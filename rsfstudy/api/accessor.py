@@ -96,6 +96,26 @@ class Accessor:
         return to_si(self._dataset, **scales)
 
     @door
+    def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
+        """The results of a study of a rig in these units, by the scales that each cell has; all of
+        them, as `rsfstudy.to_si` says.
+
+        Parameters
+        ----------
+        stress, length, time : str
+            Velocities and stiffnesses follow.
+
+        Raises
+        ------
+        InvalidValue
+            For units of another kind, and for results that hold no scales: those of no rig.
+        """
+        from rsfstudy.rig.scales import in_units, scales_of
+
+        self._must_be_ours()
+        return in_units(self._dataset, scales_of(self._dataset), stress, length, time)
+
+    @door
     def check(self) -> pd.DataFrame:
         """The claims of the study held against the dataset, as `rsfstudy.check` gives them."""
         from rsfstudy.api import runs

@@ -20,7 +20,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
-from rsfstudy.rig.scales import rate_of, scaled, scales
+from rsfstudy.rig.scales import scaled, scales_of
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
@@ -114,8 +114,8 @@ def limit_cycle(
 def to_si(
     dataset: xr.Dataset,
     *,
-    normal_stress: Any,
-    slip_distance: Any,
+    normal_stress: Any = None,
+    slip_distance: Any = None,
     reference_rate: Any = None,
 ) -> xr.Dataset:
     """A dataset in SI units, all of it: stress in Pa, slip in m, time in s, slip rates in m/s.
@@ -134,29 +134,29 @@ def to_si(
         sigma_*: a number in Pa, or a text with units ("5 MPa").
     slip_distance : quantity
         D_c, in m ("10 um").
-    reference_rate : quantity, optional
-        V_*/D_c, in 1/s, of a dataset that does not hold it. One that holds it is converted by its
-        own, cell by cell.
+    reference_rate : quantity
+        V_*/D_c, in 1/s.
+
+    A dataset that holds one of these, as results of a rig hold all, needs none, and is converted by
+    its own, cell by cell.
 
     Raises
     ------
     InvalidValue
-        For scales that are no quantities or not positive; for a dataset that does not say its
-        `reference_rate`, or says another.
+        For scales that are no quantities or not positive; for one that the dataset does not hold
+        and is not stated, or that is stated and is not that of all its cells.
     DataError
         For a dataset that is in other units already, or not of rsfstudy; or where the scale of an
         axis varies along another.
     """
-    if reference_rate is not None:
-        reference_rate = in_si("reference_rate", reference_rate, "1/s")
-    return scaled(
-        dataset,
-        scales(
-            in_si("normal_stress", normal_stress, "Pa"),
-            in_si("slip_distance", slip_distance, "m"),
-            rate_of(dataset, reference_rate),
-        ),
-    )
+    units = {"normal_stress": "Pa", "slip_distance": "m", "reference_rate": "1/s"}
+    given = (normal_stress, slip_distance, reference_rate)
+    stated = {
+        name: in_si(name, value, units[name])
+        for name, value in zip(units, given, strict=True)
+        if value is not None
+    }
+    return scaled(dataset, scales_of(dataset, **stated))
 
 
 def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:

@@ -26,6 +26,8 @@ from rsfstudy.declare.wording import settings, short
 from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
+from rsfstudy.rig.quantities import STATED
+from rsfstudy.rig.scales import in_units_of_rig
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage
@@ -57,9 +59,14 @@ def declaration(study: Study, output: Path) -> None:
             points = [*points[:10], "...", *points[-3:]]
         table.add_row(f"axis {axis.dimension} ({len(axis)})", ", ".join(points))
     varied = {field for axis in study.axes for field in axis.fields}
+    if study.rig:
+        varied |= {name for name, (dims, _values) in study.rig.beside().items() if dims}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
     table.add_row("fixed", ", ".join(f"{n} = {short(v)}" for n, v in fixed.items() if v))
     table.add_row("0 or absent", ", ".join(n for n, v in fixed.items() if not v) or "-")
+    if study.laboratory:
+        rig = {n: f"{v:g} {STATED[n][0]}" for n, v in study.laboratory.as_dict().items()}
+        table.add_row("laboratory", ", ".join(f"{n} = {v}" for n, v in rig.items()))
     about = {n: v for n, v in study.measure.describe().items() if n not in varied}
     table.add_row("measure", ", ".join(f"{n} = {_brief(v)}" for n, v in about.items()))
     gives = study.measure.variables
@@ -222,18 +229,20 @@ def _reductions(dataset: xr.Dataset) -> None:
     """Slopes and their like: reductions with a standard error, one row for each point of their
     dimensions.
     """
+    dataset = in_units_of_rig(dataset)
     for slope in (reduction["name"] for reduction in contents.declaration(dataset).reductions):
         if not {slope, f"{slope}_stderr"} <= set(dataset.data_vars):
             continue  # of another kind, or a notebook left it out
         told = {n: about for end, about in _OF_SLOPES.items() if (n := f"{slope}_{end}") in dataset}
-        places = [Column(str(name), overflow="fold") for name in dataset[slope].dims]
+        named = [terminal_numbers.with_units(dataset[n]) for n in (*dataset[slope].dims, slope)]
+        places = [Column(name, overflow="fold") for name in named[:-1]]
         beside = [
             Column(heading, overflow="fold", min_width=len("1.0e-05"))
             for heading, _form in told.values()
         ]
         table = Table(
             *places,
-            Column(slope, overflow="fold", min_width=_A_NUMBER),
+            Column(named[-1], overflow="fold", min_width=_A_NUMBER),
             *beside,
             box=box.SIMPLE_HEAD,
             title=dataset[slope].attrs.get("comment", slope),

@@ -20,8 +20,9 @@ from rsfstudy.errors import brief
 from rsfstudy.files import numbers
 from rsfstudy.files.comparison import Comparison
 from rsfstudy.files.contents import provenance
+from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import coverage
+from rsfstudy.vocabulary import coverage, quantity
 
 #: Most cells of a lattice that are shown, and most that ended otherwise.
 _MOST_CELLS, _MOST_ENDS = 24, 10
@@ -45,6 +46,8 @@ def headline(dataset: xr.Dataset) -> None:
     name = numbers.headline(dataset)
     if name is None:
         return
+    dataset = in_units_of_rig(dataset)
+    name = name if name in dataset else renamed(name)
     status = dataset["status"]
     dims = [str(d) for d in status.dims]
     at = numbers.sample({d: status.sizes[d] for d in dims}, _MOST_CELLS)
@@ -53,7 +56,7 @@ def headline(dataset: xr.Dataset) -> None:
     has_error = f"{name}_error" in few
     others = bool((few["status"] != int(Status.OK)).any())
     table = Table(
-        *(Column(d, overflow="fold") for d in dims),
+        *(Column(with_units(dataset[d]), overflow="fold") for d in dims),
         Column(name, justify="right", overflow="fold"),
         *([Column("error", justify="right")] if has_error else []),
         *(["status"] if others else []),
@@ -77,6 +80,12 @@ def _caption(dataset: xr.Dataset, name: str, shown: int) -> str:
     units = about.get("scale") or about.get("units", "1")
     text = about.get("long_name", name) + (f", in {units}" if units != "1" else "")
     return text if shown == cells else f"{text} ({shown} of {cells:,} cells)"
+
+
+def with_units(along: xr.DataArray) -> str:
+    """The name of an axis, and its units where it is that of a rig."""
+    name, units = str(along.name), along.attrs.get("units", "1")
+    return name if units in ("1", quantity(name).units) else f"{name} ({units})"
 
 
 def _number(value: float, form: str = ".8g") -> str:

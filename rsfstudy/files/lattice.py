@@ -15,7 +15,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.files.contents import LAYOUT
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.quantity import Quantity
-from rsfstudy.rig.lattice import BESIDE
+from rsfstudy.rig.scales import BESIDE
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, coverage, quantity
 

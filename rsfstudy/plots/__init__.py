@@ -41,6 +41,7 @@ from rsfstudy.plots._text import pretty, symbol, wrapped
 from rsfstudy.plots._text import slope_with_error as slope_with_error
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.reduce.base import stated_by
+from rsfstudy.rig.scales import in_units_of_rig
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, quantity
 
@@ -93,6 +94,7 @@ def figure(
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
         Where there is no such variable or style.
     """
+    dataset = in_units_of_rig(dataset)
     with styled(style):
         drawing, dataset = _fitting(dataset, own, variable)
         panels = _panels(drawing, dataset)
@@ -119,7 +121,7 @@ def figure(
 
 def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | Draw | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
-    drawing, dataset = _fitting(dataset)
+    drawing, dataset = _fitting(in_units_of_rig(dataset))
     panel = panel or _panels(drawing, dataset)[0]
     _draw(dataset, axes, panel)
     _panel.settle([panel], [axes])
@@ -215,6 +217,8 @@ def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:
     """Figure of any lattice: maps where it has two numeric axes, else lines."""
     from rsfstudy.plots import _axes, lines, maps
 
+    logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
+    dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
     for module in (maps, lines):
         if found := module.panels(dataset, variable):
             return Declared(found)

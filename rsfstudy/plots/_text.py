@@ -107,6 +107,7 @@ def label(about: Quantity, width: int = 45) -> str:
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
     powers = re.sub(r"\b([a-zA-Z]+)(-?\d)\b", r"\1$^{\2}$", units)
+    powers = re.sub(r"\bum\b", r"$\\mu$m", powers)
     return wrapped(pretty(f"{text} ({powers})" if units else text), width)
 
 

@@ -24,8 +24,8 @@ from rsfstudy.rig.quantities import (
     stated,
     units_of,
 )
-from rsfstudy.rig.scales import Scale, rate_of, scaled, scales
-from rsfstudy.rig.units import factor, in_si
+from rsfstudy.rig.scales import Scale, in_units, scales, scales_of
+from rsfstudy.rig.units import in_si
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
 from rsfstudy.slider.scene import Scene
@@ -148,20 +148,14 @@ class Laboratory:
         Raises
         ------
         InvalidValue
-            For units of another kind, and results at another reference rate than that of the rig.
+            For units of another kind, and results of other rigs, or at another reference rate.
         DataError
             For a dataset that is in other units already, or not of rsfstudy.
         """
-        rate_of(dataset, self.reference_velocity / self.slip_distance)
-        units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
-        size = {name: factor("units", *pair) for name, pair in units.items()}
-        size["V_*"] = size["D_c"] / size["D_c/V_*"]
-        size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
-        size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
-        units |= {"V_*/D_c": (f"{time}-1", "")}
-        units |= {"V_*": (f"{length} {time}-1", ""), "sigma_*/D_c": (f"{stress} {length}-1", "")}
-        by = {n: Scale(s.factor / size[n], units[n][0]) for n, s in self.scales.items()}
-        return scaled(dataset, by).assign_attrs(laboratory=json.dumps(self.as_dict()))
+        rate = self.reference_velocity / self.slip_distance
+        si = scales_of(dataset, self.normal_stress, self.slip_distance, rate)
+        found = in_units(dataset, si, stress, length, time)
+        return found.assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
         """Quantities that were stated, in SI units."""

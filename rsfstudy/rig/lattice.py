@@ -25,16 +25,13 @@ from rsfstudy.rig.quantities import (
     stated,
     units_of,
 )
-from rsfstudy.rig.scales import scales
+from rsfstudy.rig.scales import BESIDE, scales
 from rsfstudy.rig.units import factor, in_si, parted, spaced
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
     from rsfstudy.rig.laboratory import Laboratory
-
-#: What stands before the name of a field where that is the name of an axis in units.
-BESIDE = "dimensionless_"
 
 
 # ---- axes ----------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.units import factor
 
 #: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.
 _RATIOS = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_normal_stress"}
@@ -18,6 +19,8 @@ _RATIOS = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_norma
 _LOGARITHM = re.compile(r"(\w+_)?log10_slip_rate")
 _WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
+#: What stands before the name of a field where that is the name of an axis in units.
+BESIDE = "dimensionless_"
 #: Attribute of a dataset in other units that tells their scales.
 SCALES = "scales"
 
@@ -33,37 +36,75 @@ class Scale(NamedTuple):
     units: str
 
 
-def rate_of(dataset: xr.Dataset, stated: float | None) -> float | xr.Variable:
-    """V_*/D_c of each cell in 1/s: that of the dataset, where it holds one.
+def scales_of(
+    dataset: xr.Dataset,
+    normal_stress: float | None = None,
+    slip_distance: float | None = None,
+    reference_rate: float | None = None,
+) -> dict[str, Scale]:
+    """The scales of a dataset in SI units, cell by cell: those that it holds, else those stated.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    normal_stress, slip_distance, reference_rate : float, optional
+        sigma_* in Pa, D_c in m, and V_*/D_c in 1/s.
 
     Raises
     ------
     InvalidValue
-        Where it holds none and none is stated, or another is stated.
+        Where it does not hold one that is not stated, or another is stated.
     """
-    if "reference_rate" not in dataset:
+    return scales(
+        _held(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
+        _held(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
+        _held(dataset, "reference_rate", "reference_rate", reference_rate, "1/s"),
+    )
+
+
+def _held(
+    dataset: xr.Dataset, held_as: str, name: str, stated: float | None, units: str
+) -> float | xr.Variable:
+    if held_as not in dataset.variables:
         if stated is None:
             remedy = "State it."
-            raise InvalidValue("reference_rate", None, "is not in the dataset", remedy=remedy)
+            raise InvalidValue(name, None, "is not in the dataset", remedy=remedy)
         return stated
-    held = dataset["reference_rate"].variable.to_base_variable()
+    variable = dataset[held_as].variable.to_base_variable()
+    held = variable * factor(held_as, variable.attrs.get("units", units), units)
     if stated is not None and not np.allclose(held, stated, rtol=_ROUNDING, atol=0.0):
-        rule = f"contradicts that of the dataset, {_range(held)} 1/s"
+        rule = f"contradicts that of the dataset, {_range(held)} {units}"
         remedy = "Each cell is converted by its own: state another to the scenes."
-        raise InvalidValue("reference_rate", stated, rule, remedy=remedy)
+        raise InvalidValue(name, stated, rule, remedy=remedy)
     return held
 
 
+def in_units(
+    dataset: xr.Dataset, si: Mapping[str, Scale], stress: str, length: str, time: str
+) -> xr.Dataset:
+    """A dataset in units of stress, length and time, by its scales in SI units; see `scaled`."""
+    units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
+    size = {name: factor("units", *pair) for name, pair in units.items()}
+    size["V_*"] = size["D_c"] / size["D_c/V_*"]
+    size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
+    size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
+    units |= {"V_*/D_c": (f"{time}-1", "")}
+    units |= {"V_*": (f"{length} {time}-1", ""), "sigma_*/D_c": (f"{stress} {length}-1", "")}
+    return scaled(dataset, {n: Scale(s.factor / size[n], units[n][0]) for n, s in si.items()})
+
+
 def scales(
-    normal_stress: float, slip_distance: float, reference_rate: float | xr.Variable
+    normal_stress: float | xr.Variable,
+    slip_distance: float | xr.Variable,
+    reference_rate: float | xr.Variable,
 ) -> dict[str, Scale]:
     """The scales of dimensionless quantities in SI units, by the names that attributes have.
 
     Parameters
     ----------
-    normal_stress : float
+    normal_stress : float or xarray.Variable
         sigma_* in Pa.
-    slip_distance : float
+    slip_distance : float or xarray.Variable
         D_c in m.
     reference_rate : float or xarray.Variable
         V_*/D_c in 1/s.
@@ -73,10 +114,10 @@ def scales(
     InvalidValue
         For scales that are not positive and finite.
     """
-    for of, factor in (
+    for of, value in (
         ("sigma_*", normal_stress), ("D_c", slip_distance), ("V_*/D_c", reference_rate),
     ):  # fmt: skip
-        _check(of, factor)
+        _check(of, value)
     found = {
         "sigma_*": Scale(normal_stress, "Pa"),
         "D_c": Scale(slip_distance, "m"),
@@ -102,19 +143,29 @@ def _range(factor: float | xr.Variable) -> str:
     return " to ".join(f"{end:g}" for end in ends)
 
 
+def in_units_of_rig(dataset: xr.Dataset) -> xr.Dataset:
+    """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
+    if "sigma_star" not in dataset.variables or SCALES in dataset.attrs:
+        return dataset
+    return in_units(dataset, scales_of(dataset), "MPa", "um", "s")
+
+
 def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     """A dataset in other units, all of it.
 
     What says its ``scale`` is multiplied by it and says its units instead; its name no longer calls
     it a ratio: ``critical_velocity``, ``load_velocity``, ``effective_normal_stress``. Beside the
-    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are. The attribute
-    ``scales`` tells what was 1.
+    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are. What stands
+    beside an axis in units, without dimension, is left out. The attribute ``scales`` tells what was
+    1.
 
     Raises
     ------
     DataError
         Where nothing says its scale, or that of an axis varies along another.
     """
+    beside = [n for n in map(str, dataset.coords) if renamed(n) != n and renamed(n) in dataset]
+    dataset = dataset.drop_vars(beside)
     result = dataset.copy()
     logarithms = [n for n in map(str, dataset.variables) if _LOGARITHM.fullmatch(n)]
     measured = [n for n, v in dataset.variables.items() if v.attrs.get("scale", "") in by]
@@ -124,7 +175,7 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     for name in measured:
         values = dataset[name].variable.to_base_variable()
         scale = by[values.attrs["scale"]]
-        converted = values * scale.factor
+        converted = values * scale.factor if np.any(values) else values  # 0 has no dimensions
         if name in dataset.dims and converted.dims != (name,):
             other = next(dim for dim in converted.dims if dim != name)
             text = f"the scale of the axis {name} varies along {other}: select one place on that"
@@ -133,19 +184,20 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
     for name in logarithms:
         result = result.assign(_slip_rate(dataset, name, by["V_*"]))
-    new = {str(name): _renamed(str(name)) for name in measured}
+    new = {str(name): renamed(str(name)) for name in measured}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
-        beside = str(variable.attrs.get("ancillary_variables", "")).split()
-        if beside:
-            variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in beside)
+        named = str(variable.attrs.get("ancillary_variables", "")).split()
+        if named:
+            variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in named)
     return result.assign_attrs(
         {SCALES: ", ".join(f"{n} = {_range(s.factor)} {s.units}" for n, s in by.items())}
     )
 
 
-def _renamed(name: str) -> str:
+def renamed(name: str) -> str:
     """A name for what is no ratio any more."""
+    name = name.removeprefix(BESIDE)
     for ratio, quantity in _RATIOS.items():
         name = name.replace(ratio, quantity)
     return name
