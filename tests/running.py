@@ -114,6 +114,7 @@ LEFT_TO_COMPILED = (
     "normal_stress_steps",
     "rate_step_lattice",
     "resonance",
+    "rig_recurrence",
     "slide_hold_slide",
     "stress_drop",
     "triggering",
