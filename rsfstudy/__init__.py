@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from rsfstudy.declare.axis import Axis
     from rsfstudy.declare.study import Study
     from rsfstudy.plots._motion import picture
+    from rsfstudy.rig.history import history
     from rsfstudy.rig.laboratory import Laboratory
     from rsfstudy.rig.protocol_file import read_protocol
+    from rsfstudy.rig.table import read_table
     from rsfstudy.slider.loading import Segment
     from rsfstudy.slider.protocol import protocol
     from rsfstudy.slider.scene import Scene
@@ -31,6 +33,8 @@ _HOMES = {
     "protocol": "slider.protocol",
     "Laboratory": "rig.laboratory",
     "read_protocol": "rig.protocol_file",
+    "read_table": "rig.table",
+    "history": "rig.history",
     "picture": "plots._motion",
     "Study": "declare.study",
     "Axis": "declare.axis",
@@ -60,12 +64,14 @@ __all__ = [
     "compare",
     "critical_step",
     "events",
+    "history",
     "limit_cycle",
     "open",
     "picture",
     "plot",
     "protocol",
     "read_protocol",
+    "read_table",
     "rerun",
     "run",
     "simulate",

@@ -93,6 +93,8 @@ def calls(place: Path) -> dict[str, dict]:
         "limit_cycle": {"scene": cycling, "rtol": 1e-2, "engine": "compiled"},
         "open": {"name": place / "lattice.nc"},
         "plot": {"dataset": dataset},
+        "history": {"record": {"time": [0.0, 1.0], "displacement": [0.0, 1.0]}},
+        "read_table": {"path": place / "protocol.csv"},
         "read_protocol": {"path": place / "protocol.csv"},
         "rerun": {"file": place / "lattice.nc", **no_workers},
         "run": {"study": LATTICE, "output": None, **no_workers},

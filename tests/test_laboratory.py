@@ -269,7 +269,7 @@ def test_a_protocol_from_a_file(tmp_path):
         ("velocity (um/s)\n1, 2\n", "line 2: line = .*has 2 fields, and the header 1"),
         ("velocity (um)\n1\n", "segment 1: velocity = '1 um': has units of another kind than m/s"),
         ("velocity (um/s)\n-1\n", "segment 1: velocity = -1.0.*forward slip"),
-        ("velocity (um/s)\nnan\n", "segment 1: velocity = 'nan um/s': must be finite"),
+        ("velocity (um/s)\nnan\n", "line 2, column 1: velocity = 'nan': must be finite"),
         ("velocity (um/s), duration (s)\n1, 0\n", "segment 1: duration = 0.0: must be positive"),
         ("velocity (um/s)\n1\n2\n", "segment 1: duration = inf: never ends"),
     ],

@@ -59,7 +59,7 @@ def test_a_step_of_nothing_is_none(case):
     still = Scene(load_velocity_ratio=2.0, **CASES[case])
     assert still.with_(normal_stress_step=0.0).numbers == still.numbers
     segments = protocol([{"velocity": 2.0, "normal_stress": 1.0}])
-    assert Scene(loading=segments, **CASES[case]).segments[0][0].numbers == still.numbers
+    assert Scene(loading=segments, **CASES[case]).acting(0).numbers == still.numbers
 
 
 def test_driving_that_is_inclined_adds_to_what_is_imposed():

@@ -207,7 +207,7 @@ def test_a_history_without_a_step_is_that_of_the_plain_scene(idle):
         found, expected = measure(idle, accuracy), measure(plain, accuracy)
         assert found.status is expected.status is Status.OK
         assert found.values[measure.headline] == expected.values[measure.headline]
-    if len(idle.segments) == 1:
+    if len(idle.parts.loading.segments) == 1:
         assert Triggered()(idle, accuracy).values["unstable"] == 0.0
 
 

@@ -70,9 +70,9 @@ def _end(scene: Scene) -> float:
 
 def test_once_over_it_leaves_no_unknown():
     scene = Scene(**IMPOSED, **RAMP)
-    (during, lasts), (after, goes_on) = scene.segments
+    (during, first), (after, last) = scene.chains
     assert (during.states, after.states) == (2, 1)
-    assert (lasts, goes_on) == (4.0, math.inf)
+    assert [*first[0, :2], *last[0, :2]] == [0.0, 4.0, 4.0, math.inf]
     assert (
         after.numbers == Scene(**IMPOSED, normal_stress_step=0.1, load_velocity_ratio=1.0).numbers
     )

@@ -165,8 +165,9 @@ def begun(
     functions = [*filling(equations)]
     nothing = memoryview(np.zeros(1))
     space = workspace(
-        block, unknowns, n, scales, states, functions, nothing, 0, equations.p, stepper
-    )
+        block, unknowns, n, scales, states, functions, nothing, 0, equations.p, equations.p,
+        stepper,
+    )  # fmt: skip
     stepper.begin(motion, space)
     return stepper, motion, space
 

@@ -101,7 +101,7 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch, ahead = _Watch(start), 0 if start else len(scene.segments) - 1
+    watch, ahead = _Watch(start), 0 if start else scene.parts.loading.told
     swings, asked = list[float](), _asked(scene.log_load_rate)
     motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
     for event in motion:

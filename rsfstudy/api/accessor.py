@@ -286,16 +286,24 @@ def _cell_of(dataset: xr.Dataset, study: Study) -> int:
 def _scene_of(dataset: xr.Dataset) -> Scene:
     """The scene that the attributes of a dataset describe."""
     from rsfstudy.files import contents
-    from rsfstudy.slider.protocol import Protocol, protocol
+    from rsfstudy.slider.history import of_samples
+    from rsfstudy.slider.protocol import Stated, protocol
     from rsfstudy.slider.registry import SLOTS, Own, name_of
 
     plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
+    digest = plain.pop("samples", "")
     own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
     # protocols of one name differ: the segments tell which it was
-    if segments and (loading not in own or isinstance(own[loading], Protocol)):
+    if segments and (loading not in own or isinstance(own[loading], Stated)):
         rebuilt = protocol(segments, loading)
         own[name_of("loading", rebuilt)] = rebuilt
+    if digest:
+        told = dataset["history_samples"]
+        sampled = of_samples(told.values, bool(told.attrs["of_stress"]), loading)
+        if sampled.digest != digest:
+            raise contents.refused("history_samples", f"are not those of the scene ({digest})")
+        own[name_of("loading", sampled)] = sampled
     for slot in SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.choices, *own}:

@@ -24,7 +24,9 @@ from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_poi
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
-from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.history import History
+from rsfstudy.slider.places import BEGINS, VELOCITY
+from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
@@ -165,6 +167,8 @@ def simulate(
             **provenance.attributes("rsfstudy.simulate"),
         }
     )
+    if isinstance(scene.parts.loading, History):
+        dataset = dataset.assign(history_samples=_samples(scene.parts.loading))
     if passed >= 0.0:
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
         dataset[_INSTABILITY_TIME.name] = ((), passed, _about(_INSTABILITY_TIME))
@@ -176,12 +180,21 @@ def simulate(
     return dataset
 
 
+def _samples(history: History) -> xr.Variable:
+    """The samples of a history, by which its scene can be made again."""
+    about = {
+        "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
+        "of_stress": int(history.of_stress),
+    }
+    return xr.Variable(("history_sample", "history_column"), history.columns, about)
+
+
 def _limit(scene: Scene) -> float:
     """ln(V/V_*) beyond which a motion is no physics."""
     if scene.has_mass or scene.dynamics.damping(0.0):
         return math.inf
-    loads = [segment.load_velocity for segment in scene.parts.loading.segments]
-    fastest = math.log(max(1.0, *loads))
+    loads = np.asarray(scene.parts.loading.table)[:, VELOCITY]
+    fastest = math.log(max(1.0, float(loads.max())))
     norm = scene.log_norm_rate
     return norm if norm > fastest else fastest + math.log(_OVER_LOADING)
 
@@ -212,8 +225,8 @@ def _about(about: Quantity) -> dict[str, str]:
 def _as_stated(scene: Scene) -> float:
     """Time that the loading of a scene takes."""
     loading = scene.parts.loading
-    stated = math.fsum(s.duration for s in loading.segments if s.duration < math.inf)
-    if isinstance(loading, Protocol) and loading.lasts > stated:
+    stated = float(loading.table[-1][BEGINS])
+    if isinstance(loading, History) or (isinstance(loading, Stated) and loading.lasts > stated):
         return loading.lasts
     if len(loading.segments) == 1:
         return _USUAL

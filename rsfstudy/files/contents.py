@@ -26,7 +26,7 @@ from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fluid
 from rsfstudy.slider.parts import names_of
-from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.registry import SLOTS, Own, by_class, kinds_with
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -220,7 +220,7 @@ def scene(
     DataError
         Where the fields make no scene, naming the first that does not.
     """
-    parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Protocol)]
+    parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Stated)]
     kinds = kinds_with(parts)
     values = {**_OLDER, **plain}
     _check_names(values, kinds, path)

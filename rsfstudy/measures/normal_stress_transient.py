@@ -214,7 +214,7 @@ class NormalStressTransient(Reading):
         an integrator; rows tell nearly when that is, and slip rate the rest.
         """
         found, passed, moved = dict[float, float](), 0.0, 0.0
-        (stepped, _lasts), start = scene.segments[0], None
+        stepped, start = scene.acting(0), None
         stress = 1.0 + scene.parts.loading.segments[0].normal_stress
         for slip in sorted({self.fit_from, 1.0, self.fit_to}):
             wait = float(np.interp(slip, rows[:, OBSERVED.index("slip")], rows[:, 0])) - passed

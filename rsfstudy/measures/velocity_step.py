@@ -250,7 +250,7 @@ class VelocityStep(Reading):
         level = after + (top - after) / math.e - above
         # with a state that strengthens, evolution may go the way of the direct effect
         watch = fall(of, level, ends=True) if top > after else rise(of, level, ends=True)
-        stepped, _lasts = scene.segments[self.step_number - 1]
+        stepped = scene.acting(self.step_number - 1)
         rest = record.end.time - peak.time
         events = follow(stepped, accuracy, meter, [watch], start=peak.point, until=rest)
         return next((event for event in events if event.watch == watch), None)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import jumped, starting
-from rsfstudy.motion.running import happening, path, segment
+from rsfstudy.motion.running import chain, happening, path
 from rsfstudy.slider.equations import Equations
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.places import BEGINS, ENDS_AT, LOG_LOAD_RATE, LOG_VELOCITY
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.scene import FOR_EVER, Scene
 
 
 def follow(
@@ -58,25 +61,28 @@ def follow(
         the equations end; `work_budget_spent`; or `integration_failed` where no step can be taken,
         a step has no length, or a number is not finite.
     """
-    segments = scene.segments if start is None else scene.segments[-1:]
-    clock = clock or until < math.inf or len(segments) > 1
-    time, slip, before = 0.0, 0.0, None
-    for number, (acting, duration) in enumerate(segments):
+    chains = scene.chains if start is None else ((scene.acting(-1), FOR_EVER),)
+    clock = clock or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+    time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.told
+    for number, (acting, table) in enumerate(chains):
         if start is None:
             start = starting(acting)
         elif number:
             start = jumped(acting, start)
-        goes_on = number == len(segments) - 1 and not acting.parts.loading.unknowns
+        goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
         asked = watches if goes_on else _without_settling(watches)
-        end = min(time + duration, until)
-        for last in segment(
+        table = _up_to(table, until)
+        end = float(table[-1, ENDS_AT])
+        for last in chain(
             acting,
             accuracy,
             meter,
             start,
             asked,
             origin=(time, slip, start.spring),
-            lasts=end - time if clock else math.inf,
+            lasts=float(table[0, ENDS_AT]) - time if clock else math.inf,
+            kinks=table[1:],
+            told=told,
             clock=clock,
             recording=recording,
         ):
@@ -97,8 +103,20 @@ def follow(
         if end >= until:
             yield last
             return
-        start, before = last.point, (last.point, acting.numbers)
+        numbers = list(acting.numbers)  # of the first segment of the chain
+        numbers[LOG_LOAD_RATE] = float(table[-1, LOG_VELOCITY])
+        start, before = last.point, (last.point, tuple(numbers))
         time, slip = last.time, last.slip
+
+
+def _up_to(table: np.ndarray, until: float) -> np.ndarray:
+    """Those of the segments of a chain that begin before a time, the last of which ends then."""
+    if table[-1, ENDS_AT] <= until:
+        return table
+    count = max(int(np.searchsorted(table[:, BEGINS], until)), 1)
+    cut = table[:count].copy()
+    cut[-1, ENDS_AT] = min(until, cut[-1, ENDS_AT])
+    return cut
 
 
 def _begun(

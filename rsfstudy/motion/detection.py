@@ -8,7 +8,7 @@ from typing import Any
 from rsfstudy.motion.calls import moved
 from rsfstudy.motion.handover import margin, weight_of_mass
 from rsfstudy.motion.layout import (
-    CHANGE,
+    BEGIN,
     CLOCK,
     CODE,
     DISTANCE,
@@ -17,6 +17,7 @@ from rsfstudy.motion.layout import (
     FRICTION,
     GROWTH,
     KIND,
+    KINK,
     LEVEL,
     LOG_RATE,
     MAXIMUM,
@@ -148,17 +149,19 @@ def slipped(motion, clock, passed, spring, p):
 
 
 def report_beginning(motion, space, last, events, limits):
-    """Tell that a regime has begun, and what happened on the way to it from the last point of the
-    one before: at the more extreme of both, or at the first beyond a level. Returns whether that
-    ends the motion.
+    """Tell that a regime or segment has begun, and what happened on the way to it from the last
+    point of the one before: at the more extreme of both, or at the first beyond a level. Returns
+    whether that ends the motion.
     """
     p, passed = space.p, passed_at_begin(motion, space, limits)
-    add_event(motion, events, float(motion.begins), motion.clock, passed, space.before, p)
-    if motion.begins != CHANGE:
+    p_before = space.p_before if motion.begins == KINK else p
+    if motion.begins != KINK or motion.kinks < motion.told:
+        add_event(motion, events, float(motion.begins), motion.clock, passed, space.before, p)
+    if motion.begins == BEGIN:
         return False
     for w in range(space.watched):
         watch = watch_of(space, w)
-        jumps = between(watch, last, p, space.before, p)
+        jumps = between(watch, last, p_before, space.before, p)
         if jumps != NOWHERE:
             columns = last if jumps == BEFORE else space.before
             add_event(motion, events, float(w), motion.clock, passed, columns, p)
@@ -190,6 +193,8 @@ def detect(motion, space, limits):
         watch = watch_of(space, w)
         space.when[w] = math.nan
         if watch[KIND] == SETTLED:
+            if motion.kinks > 0:
+                continue
             apart = abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE])
             away = max(apart, space.after[DISTANCE] / abs(p[B]))
             watch[FARTHEST] = max(watch[FARTHEST], away)

@@ -16,6 +16,8 @@ MOTION = np.dtype(
         ("spring", "f8"),
         ("budget", "i8"),  # right-hand sides that it may spend
         ("records", "i8"),  # when the slider is recorded
+        ("kinks", "i8"),  # kinks of the loading that are ahead, and the last of them that are told
+        ("told", "i8"),
         ("spent_slow", "i8"),  # right-hand sides, by regime
         ("spent_fast", "i8"),
         ("steps", "i8"),
@@ -29,7 +31,8 @@ MOTION = np.dtype(
         ("clock", "f8"),  # at the beginning of a step, and at its end
         ("end", "f8"),
         ("taken", "f8"),  # length of the step; its end may have been brought forward
-        ("length", "f8"),  # of the next step
+        ("length", "f8"),  # of the next step; 0 where none is known
+        ("pace", "f8"),  # change of time by the clock of a step against time; 0 of others
         ("resolved", "f8"),  # longest step within which dense output is as accurate as is wanted
         ("regime", "i8"),
         ("begins", "i8"),  # what to tell before the first event of a regime
@@ -40,6 +43,7 @@ MOTION = np.dtype(
         ("slip_is_clock", "i8"),  # whether the clock is slip
         ("sampled", "i8"),  # how often the slider was recorded at values asked for
         ("target", "f8"),  # time that is looked for
+        ("urgent", "i8"),  # whether what was told at a kink cannot wait
         ("at_point", "i8"),  # whether it begins at the last point of one before, not where y is
         ("is_dense", "i8"),  # whether dense output of the step is there
         ("termination", "i8"),  # why the motion cannot go on, and normal stress there
@@ -50,8 +54,8 @@ MOTION = np.dtype(
     ]
 )
 #: The same as bytes: fields of records take much longer to write and to read.
-CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring", "budget", "records"
-CALLED_WITH, SAYS = struct.Struct("=4d2q"), struct.Struct("=6q")
+CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring", "budget", "records", "kinks", "told"
+CALLED_WITH, SAYS = struct.Struct("=4d4q"), struct.Struct("=6q")
 #: Rows of the table of functions; and how many equations have there, of which the last may be
 #: missing (see `columns.Filling`).
 SLOW, FAST = 0, 1
@@ -68,14 +72,14 @@ NEVER, WITHIN_STEPS, AT_CLOCKS, AT_TIMES = range(4)
 #: Columns of the table of events; from POINT on, those of a point.
 CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
 #: Codes of events that are not asked for; those of others are the places of their watches.
-BEGIN, CHANGE, END, SAMPLED = -1, -2, -3, -4
+BEGIN, CHANGE, END, SAMPLED, KINK = -1, -2, -3, -4, -5
 
 #: Columns of a point; its states follow.
 LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, DISTANCE, COEFFICIENT, RATIO = range(10)
 READING, READING_GROWTH, PSIS = 10, 11, 12
 
 #: Why a call returns: to hand over what it has told; because the motion has ended; because the
-#: regime changes; or because it cannot go on.
-HANDS_OVER, ENDED, CHANGES, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH = range(7)
+#: regime changes; because it cannot go on; or because the loading has a kink.
+HANDS_OVER, ENDED, CHANGES, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH, KINKS = range(8)
 #: What `steps.take_step` returns where it has taken one.
 TAKEN = -1

@@ -21,6 +21,7 @@ from rsfstudy.motion.detection import (
     report,
     report_beginning,
     report_end,
+    slipped,
     waits,
 )
 from rsfstudy.motion.handover import (
@@ -44,6 +45,8 @@ from rsfstudy.motion.layout import (
     GROWTH,
     HALTED,
     HANDS_OVER,
+    KINK,
+    KINKS,
     LOG_RATE,
     NO_LENGTH,
     PSIS,
@@ -53,9 +56,10 @@ from rsfstudy.motion.layout import (
     SPRING,
     TAKEN,
     WATCHED,
+    WITHIN_STEPS,
 )
 from rsfstudy.motion.recording import SAMPLES
-from rsfstudy.motion.sampling import record, record_begin
+from rsfstudy.motion.sampling import is_recorded, record, record_begin
 from rsfstudy.motion.steppers import begin, retake
 from rsfstudy.motion.steps import (
     cut,
@@ -66,13 +70,27 @@ from rsfstudy.motion.steps import (
     take_step,
 )
 from rsfstudy.motion.workspace import copy, workspace
-from rsfstudy.slider.places import LOAD_VELOCITY
+from rsfstudy.slider.places import (
+    BEGINS,
+    ENDS_AT,
+    LAW,
+    LOAD_VELOCITY,
+    LOADING,
+    LOG_LOAD_RATE,
+    LOG_VELOCITY,
+    RATE,
+    RELIEF,
+    VELOCITY,
+)
 
 #: How often the clock at which a step is to end is looked for.
 CORRECTIONS = 2
+#: Change of ln V_0 at a kink beyond which the length of steps is found anew: displacement along the
+#: path, V + V_0, is then another, and rejected steps would cost more than the first one does.
+FAR = 3.0
 
 
-def advance(memory, y, last, block, plan, watches, samples, events, rows, stepper):
+def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows, stepper):
     """Follow a motion from where `memory` and `y` are.
 
     Parameters
@@ -87,10 +105,12 @@ def advance(memory, y, last, block, plan, watches, samples, events, rows, steppe
         Memory for the workspace of a regime.
     plan : tuple
         Scales of the unknowns, of which those in a rupture follow those between ruptures; the table
-        of functions, a row for each regime; the limits of the regimes; and the numbers of the
-        scene.
+        of functions, a row for each regime; the limits of the regimes; the numbers of the
+        scene; and as many that take in what those were before a kink.
     watches, samples : array
         What is watched for, one row of numbers after the other, and when to record.
+    kinks : array
+        The segments of loading that follow on the first without a jump.
     events, rows : array
         What happens, and what is recorded.
     stepper : Stepper
@@ -103,9 +123,9 @@ def advance(memory, y, last, block, plan, watches, samples, events, rows, steppe
     """
     motion = memory[0]
     motion.events = motion.recorded = 0
-    scales, functions, numbers, p = plan
+    scales, functions, numbers, p, p_before = plan
     y, scales, block = first_of(y), first_of(scales), first_of(block)
-    last, p = first_of(last), first_of(p)
+    last, p, p_before = first_of(last), first_of(p), first_of(p_before)
     limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
     if motion.at_point:
         begin_at(motion, y, last, functions, block, limits, p)
@@ -124,14 +144,21 @@ def advance(memory, y, last, block, plan, watches, samples, events, rows, steppe
             first_of(watches),
             len(watches) // len(WATCHED),
             p,
+            p_before,
             stepper,
         )
         end = through_regime(motion, space, last, samples, events, rows, limits)
         if end == CHANGES:
-            motion.regime, motion.begins = FAST - motion.regime, CHANGE
+            motion.regime, motion.begins, motion.length = FAST - motion.regime, CHANGE, 0.0
             enter(motion, y, last)
-            if is_full(motion, space.watched, events, rows):
-                end = HANDS_OVER
+        elif end == KINKS:
+            regime, end = motion.regime, CHANGES
+            turn(motion, space, last, kinks, rows)
+            begin_at(motion, y, last, functions, block, limits, p)
+            if motion.regime != regime:
+                motion.length = 0.0
+        if end == CHANGES and (motion.urgent or is_full(motion, space.watched, events, rows)):
+            motion.urgent, end = 0, HANDS_OVER
     return end
 
 
@@ -139,6 +166,25 @@ def is_full(motion, watched, events, rows):
     """True if the tables have no room for all that one more step may add to them."""
     full = len(events) - motion.events < 2 * watched + 4
     return full or (len(rows) > 0 and len(rows) - motion.recorded < 2 * SAMPLES)
+
+
+def turn(motion, space, last, kinks, rows):
+    """Go on to the next segment of loading, whose numbers take the place of those before it."""
+    n, p, relief = len(kinks) - motion.kinks, space.p, PSIS + motion.states - 1
+    copy(space.after, last, PSIS + motion.states)
+    motion.slip = slipped(motion, motion.end, motion.lasts, last[SPRING], p)
+    motion.spring, motion.time, motion.started = last[SPRING], kinks[n, BEGINS], 0.0
+    motion.lasts = kinks[n, ENDS_AT] - kinks[n, BEGINS]
+    motion.begins, motion.kinks = KINK, motion.kinks - 1
+    if motion.records == WITHIN_STEPS:  # to the last digit, too
+        rows[motion.recorded - 1, 0] = motion.time
+    copy(p, space.p_before, LAW)
+    # the length of a step goes on with the motion, unless its path has become quite another
+    if not abs(kinks[n, LOG_VELOCITY] - p[LOG_LOAD_RATE]) < FAR:
+        motion.length = 0.0
+    p[LOAD_VELOCITY], p[LOG_LOAD_RATE] = kinks[n, VELOCITY], kinks[n, LOG_VELOCITY]
+    if not math.isnan(kinks[n, RATE]):
+        p[LOADING], last[relief] = kinks[n, RATE], kinks[n, RELIEF]
 
 
 def begin_at(motion, y, last, functions, below, limits, p):
@@ -171,16 +217,18 @@ def enter(motion, y, last):
 def through_regime(motion, space, last, samples, events, rows, limits):
     """Follow one regime; returns why it ends, or why the call has to."""
     if motion.begins:
+        motion.pace = 0.0
         begin(motion, space)
-        motion.resolved = math.inf
+        if motion.begins != KINK:
+            motion.resolved = math.inf
     else:
         copy(moved(space.y, space.unknowns), space.rates, space.unknowns)
     evaluate(space.point, space.y, space.rates, space.p, space.before)
     while True:
-        taken = take_step(motion, space)
+        taken = take_step(motion, space, limits)
         if taken != TAKEN:
             return taken
-        if motion.records:
+        if is_recorded(motion, space, samples, limits):
             halve_unresolved(motion, space)
         evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
         if math.isnan(space.after[LOG_RATE]):
@@ -202,6 +250,9 @@ def through_regime(motion, space, last, samples, events, rows, limits):
         if complete:
             urgent = 2
             report_end(motion, space, events, SAMPLED, limits)
+        if over and motion.kinks > 0:
+            motion.urgent = int(urgent == 2)
+            return KINKS
         if over:
             report_end(motion, space, events, END, limits)
             return ENDED
@@ -238,6 +289,8 @@ def cut_short(motion, space, limits):
     leaves = after >= 0.0 > before
     if leaves:
         cut(motion, space, located(EXCESS, before, after, motion, space, limits))
+    if motion.pace > 0.0 and motion.end == motion.clock + motion.taken:
+        return leaves, True
     over = passed_at_end(motion, space, limits) >= motion.lasts
     if over:
         motion.target = motion.lasts

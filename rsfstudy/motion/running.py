@@ -24,6 +24,7 @@ from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.slider.equations import Equations, without_mass
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.places import RELIEF
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -52,7 +53,7 @@ _COLUMNS = {
     "": 0,
 }
 #: What is told beside what was asked for: the codes of these count from the end.
-_BESIDE = [(kind, None) for kind in (Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
+_BESIDE = [(kind, None) for kind in (Kind.SEGMENT, Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
 #: Where the states of a point begin in a line of the table of events; and where the numbers of a
 #: `Point` are that come before its states, and behind them.
 _OF_STATES = layout.POINT + layout.PSIS
@@ -61,6 +62,7 @@ _BEHIND = slice(_BEFORE.stop, _OF_STATES)
 #: Makes a named tuple of a tuple, in half the time that its name takes.
 _named = tuple.__new__
 _TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
+_NO_KINKS = np.empty((0, RELIEF + 1)), 0
 _NO_MASS = (math.nan,) * len(Limits._fields)
 
 
@@ -105,8 +107,8 @@ class Plain:
     def passed(self, *arrays: np.ndarray) -> Sequence[memoryview]:
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
-    def numbers(self, p: Numbers) -> Numbers:
-        return p
+    def numbers(self, p: Numbers) -> list[float]:
+        return list(p)
 
     def advance(self) -> Any:
         return advance
@@ -153,7 +155,7 @@ class _Plan(NamedTuple):
     systems: tuple[Equations, ...]
 
 
-def segment(
+def chain(
     scene: Scene,
     accuracy: Accuracy,
     meter: Meter,
@@ -162,24 +164,31 @@ def segment(
     *,
     origin: Numbers,
     lasts: float,
+    kinks: np.ndarray,
+    told: int,
     clock: bool,
     recording: Recording | None,
 ) -> Iterator[Event]:
-    """Events of one segment of loading; the last is its end, unless one ends the motion earlier.
+    """Events of segments of loading that follow each other without a jump; the last is their end,
+    unless one ends the motion earlier.
 
     Parameters
     ----------
     scene, accuracy, meter, start, watches, clock, recording
         As those of `course.follow`.
     origin : tuple of float
-        Time, slip and spring stress where the segment begins.
+        Time, slip and spring stress where the first segment begins.
     lasts : float
         How long it lasts.
+    kinks : ndarray
+        The others, one row each (see `places`).
+    told : int
+        How many of them, the last ones, are told.
     """
     plan = _planned(scene, accuracy, meter, clock=clock)
     count = max(len(system.unknowns) for system in plan.systems)
     begins = np.empty(2 * count), _columns_of(start)
-    return _events(plan, (lasts, *origin), begins, meter, watches, recording)
+    return _events(plan, (lasts, *origin), begins, meter, watches, recording, (kinks, told))
 
 
 def path(
@@ -197,7 +206,7 @@ def path(
     fields |= {"direction": -1.0 if backward else 1.0, "slip_is_clock": equations.is_rigid}
     plan = _plan(_machine(meter), fields, equations)
     begins = np.array((*state, *state)), np.empty(layout.PSIS + equations.states)
-    return _events(plan, (math.inf, 0.0, 0.0, 0.0), begins, meter, watches, recording)
+    return _events(plan, (math.inf, 0.0, 0.0, 0.0), begins, meter, watches, recording, _NO_KINKS)
 
 
 def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> _Plan:
@@ -243,7 +252,7 @@ def _plan(
     scales = np.array([scale for system in systems for scale in system.scales])
     limits = _NO_MASS if both is None else tuple(both.limits)
     table, p = machine.table(systems), machine.numbers(slow.p)
-    called = *machine.passed(scales), table, limits, p
+    called = *machine.passed(scales), table, limits, p, p
     return _Plan(machine, machine.initial(tuple(fields.items())), called, systems)
 
 
@@ -254,6 +263,7 @@ def _events(
     meter: Meter,
     watches: Sequence[Watch],
     recording: Recording | None,
+    kinks: tuple[np.ndarray, int],
 ) -> Iterator[Event]:
     """Events of a motion, a table of them by each call of the loop.
 
@@ -264,6 +274,8 @@ def _events(
     begins : tuple of ndarray
         The unknowns with which it begins, behind which is room for as many; and the columns of the
         point at which it begins, if it is that which the plan begins with.
+    kinks : tuple of ndarray and int
+        Those of the loading, and how many of the last ones are told.
 
     Raises
     ------
@@ -273,15 +285,19 @@ def _events(
     machine, (y, last) = plan.machine, begins
     regimes, states = [system.regime for system in plan.systems], len(last) - layout.PSIS
     asked, meanings = _asked(tuple(watches))
-    stepper = stepper_of(meter.engine, plan.systems, meter.methods)
+    called, systems = plan.called, plan.systems
+    if len(kinks[0]):  # where the numbers change, they are those of this motion alone
+        p, p_before = (machine.numbers(systems[0].p) for _ in range(2))
+        called, systems = (*called[:-2], p, p_before), tuple(s._replace(p=p) for s in systems)
+    stepper = stepper_of(meter.engine, systems, meter.methods)
     events = np.empty((max(_EVENTS, 2 * len(watches) + 4), _OF_STATES + states))
-    keeper = _Keeper(recording, plan.systems[0], times[1], regimes, states)
-    called_with = *times, meter.budget - meter.spent, keeper.records
+    keeper = _Keeper(recording, plan.systems[0], regimes, states)
+    called_with = *times, meter.budget - meter.spent, keeper.records, len(kinks[0]), kinks[1]
     state = machine.state(plan.initial, called_with)
     block = np.empty(workspace.size(len(y) // 2, states, len(watches)))
     arrays = machine.passed(y, last, block)
-    tables = machine.passed(asked.copy(), keeper.samples, events, keeper.rows)
-    arguments = *arrays, plan.called, *tables, stepper
+    tables = machine.passed(asked.copy(), kinks[0], keeper.samples, events, keeper.rows)
+    arguments = *arrays, called, *tables, stepper
     run, end, account = machine.advance(), layout.HANDS_OVER, _Account(meter, regimes)
     while end == layout.HANDS_OVER:
         end = run(state.memory, *arguments)
@@ -323,7 +339,7 @@ class _Account:
 
 
 class _Keeper:
-    """Hands what one segment records to a recording.
+    """Hands what one chain of segments records to a recording.
 
     Attributes
     ----------
@@ -337,14 +353,13 @@ class _Keeper:
         self,
         recording: Recording | None,
         system: Equations,
-        begins: float,
         regimes: Sequence[str],
         states: int,
     ) -> None:
         self._recording, self._regimes = recording, regimes
         self.samples, count, self.records = np.empty(0), 0, layout.NEVER
         if recording is not None and recording.at is not None:
-            self.samples = recording.left() - (0.0 if system.is_rigid else begins)
+            self.samples = recording.left()
             count = len(self.samples) + 2 * SAMPLES
             self.records = layout.AT_CLOCKS if system.is_rigid else layout.AT_TIMES
         elif recording is not None:

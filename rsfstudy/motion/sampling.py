@@ -7,6 +7,7 @@ from rsfstudy.motion.layout import (
     AT_TIMES,
     FRICTION,
     LOG_RATE,
+    NEVER,
     PSIS,
     RATIO,
     READING,
@@ -23,6 +24,14 @@ def record_begin(motion, space, rows):
     if motion.records == WITHIN_STEPS:
         record_point(motion, rows, motion.clock, motion.started, space.before, space.p)
         rows[motion.recorded - 1, PLACE] = 0.0
+
+
+def is_recorded(motion, space, samples, limits):
+    """True if the step is recorded between its ends."""
+    if motion.records != AT_TIMES:
+        return motion.records != NEVER
+    end = passed_at_end(motion, space, limits) + motion.time
+    return motion.sampled < len(samples) and samples[motion.sampled] < end
 
 
 def record(motion, space, rows, samples, over, limits):
@@ -55,8 +64,8 @@ def record_asked(motion, space, rows, samples, over, limits):
         at_begin = passed_at_begin(motion, space, limits)
         at_end = passed_at_end(motion, space, limits)
     last = motion.lasts if over else at_end
-    while motion.sampled < len(samples) and samples[motion.sampled] <= last:
-        asked = samples[motion.sampled]
+    while motion.sampled < len(samples) and samples[motion.sampled] - motion.time <= last:
+        asked = samples[motion.sampled] - motion.time
         motion.sampled += 1
         if asked <= at_begin:
             passed = passed_at_begin(motion, space, limits)
@@ -82,7 +91,7 @@ def record_within(motion, space, rows, clock, limits):
 def record_point(motion, rows, clock, passed, columns, p):
     """Add what is recorded of a point (see `recording.row`)."""
     n = motion.recorded
-    rows[n, 0] = motion.time + passed
+    rows[n, 0] = motion.time + (motion.lasts if passed > motion.lasts else passed)
     rows[n, 1] = slipped(motion, clock, passed, columns[SPRING], p)
     rows[n, 2], rows[n, 3], rows[n, 4] = columns[LOG_RATE], columns[SPRING], columns[FRICTION]
     rows[n, 5], rows[n, 6], rows[n, 7] = columns[RATIO], columns[STATE], columns[READING]

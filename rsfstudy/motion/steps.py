@@ -15,8 +15,8 @@ from rsfstudy.motion.layout import (
     RATIO,
     TAKEN,
 )
-from rsfstudy.motion.steppers import attempt, retake, unknowns_at
-from rsfstudy.motion.workspace import copy, spend
+from rsfstudy.motion.steppers import attempt, reach, retake, unknowns_at
+from rsfstudy.motion.workspace import copy, rate_of_step, spend
 from rsfstudy.slider.equations import LONGEST_STEP, stride
 from rsfstudy.slider.places import LOG_LOAD_RATE
 
@@ -44,7 +44,7 @@ def passed_at_end(motion, space, limits):
     return motion.started + elapsed(motion, space, space.new, limits)
 
 
-def take_step(motion, space):
+def take_step(motion, space, limits):
     """Take a step whose local error is allowed; why not, where there is none."""
     longest = LONGEST_STEP
     if motion.limits_steps:
@@ -52,7 +52,11 @@ def take_step(motion, space):
     longest *= motion.finer
     if motion.records:
         longest = min(longest, motion.resolved)
-    length = attempt(motion, space, longest)
+    length = 0.0
+    if motion.kinks > 0:
+        length = step_to_kink(motion, space, min(longest, motion.length), limits)
+    if length == 0.0:
+        length = attempt(motion, space, longest)
     motion.steps += 1
     if length <= 0.0:
         return NO_STEP if length == 0.0 else BUDGET_SPENT
@@ -62,6 +66,13 @@ def take_step(motion, space):
     if motion.end == motion.clock or not math.isfinite(total):
         return NO_LENGTH
     return TAKEN
+
+
+def step_to_kink(motion, space, longest, limits):
+    """Length of a step that ends at the next kink, if that is not farther; else 0."""
+    left = motion.lasts - passed_at_begin(motion, space, limits)
+    length = left / elapsed(motion, space, space.rates, limits)
+    return reach(motion, space, length) if 0.0 < length <= longest else 0.0
 
 
 def halve_unresolved(motion, space):
@@ -94,7 +105,7 @@ def is_resolved(motion, space):
                 space.slopes[i] += weight / (12.0 * APART) * space.within[i]
         unknowns_at(motion, space, clock)
         spend(motion, 1)
-        evaluate(space.rate, space.within, space.within, space.p, space.rates_within)
+        rate_of_step(motion, space, space.within, space.rates_within)
         for i in range(space.unknowns):
             differ = abs(motion.taken * space.rates_within[i] - space.slopes[i])
             size = space.scales[i] + max(abs(space.y[i]), abs(space.new[i]))

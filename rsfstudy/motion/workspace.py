@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from rsfstudy.motion.calls import moved
+from rsfstudy.motion.calls import evaluate, moved
 from rsfstudy.motion.layout import FUNCTIONS, PSIS, SLOW
 from rsfstudy.motion.steppers.unrolled import ALL_STAGES, ROWS, SIZES, STAGES
 
 Array = Any
+#: Time by the clock of a step that stands for none.
+LEAST = 1e-300
 
 
 class Workspace(NamedTuple):
@@ -37,8 +39,8 @@ class Workspace(NamedTuple):
         What is watched for, one row of numbers after the other.
     watched : int
         How many rows.
-    p : array
-        The numbers of the scene.
+    p, p_before : array
+        The numbers of the scene, and what they were before the last kink.
     stepper : object
         What takes the steps.
     """
@@ -66,6 +68,7 @@ class Workspace(NamedTuple):
     watches: Array
     watched: int
     p: Array
+    p_before: Array
     stepper: Any
 
 
@@ -75,7 +78,9 @@ def size(unknowns: int, states: int, watches: int) -> int:
     return SIZES + of_unknowns * unknowns + 3 * (PSIS + states) + watches
 
 
-def workspace(block, y, unknowns, scales, states, functions, watches, watched, p, stepper):
+def workspace(
+    block, y, unknowns, scales, states, functions, watches, watched, p, p_before, stepper
+):
     """The workspace of a regime, in a block of that size."""
     new = moved(block, SIZES)
     own = moved(new, unknowns)
@@ -113,6 +118,7 @@ def workspace(block, y, unknowns, scales, states, functions, watches, watched, p
         watches,
         watched,
         p,
+        p_before,
         stepper,
     )
 
@@ -121,6 +127,15 @@ def copy(source, target, count):
     """Copy so many numbers."""
     for i in range(count):
         target[i] = source[i]
+
+
+def rate_of_step(motion, space, y, result):
+    """Fill in the rates at some unknowns by the clock of the step."""
+    evaluate(space.rate, y, y, space.p, result)
+    if motion.pace > 0.0:
+        slower = motion.pace / max(result[space.unknowns - 1], LEAST)
+        for i in range(space.unknowns):
+            result[i] *= slower
 
 
 def spend(motion: Any, evaluations: int) -> None:

@@ -156,7 +156,9 @@ def _steady(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | Non
     but for its loading, which does not matter.
     """
     try:
-        scene = Scene(**{k: v for k, v in values.items() if k not in ("loading", "segments")})
+        scene = Scene(
+            **{k: v for k, v in values.items() if k not in ("loading", "segments", "samples")}
+        )
     except InvalidValue:
         return None
     rates = log10_rates * LN10

@@ -30,7 +30,8 @@ from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
 from rsfstudy.slider.scene import Scene
 
-_SEGMENT = {
+#: Units of the slider of what a segment of a protocol states.
+SEGMENT = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
@@ -184,7 +185,7 @@ class Laboratory:
             return stated  # a Segment is in units of the slider
         try:
             return {
-                key: self.dimensionless(value, _SEGMENT[key], key) if key in _SEGMENT else value
+                key: self.dimensionless(value, SEGMENT[key], key) if key in SEGMENT else value
                 for key, value in stated.items()
             }
         except InvalidValue as error:

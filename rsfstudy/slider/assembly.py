@@ -11,7 +11,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.numbers import Slider, with_spring
 from rsfstudy.slider.parts import Part, checked, names_of
-from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.registry import (
     FIELDS,
     NAMED,
@@ -93,7 +93,7 @@ def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
 def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
     """The part that is asked for in a slot."""
     value = given.get(slot.name)
-    if isinstance(value, type | Protocol):
+    if isinstance(value, type | Stated):
         return resolve(slot, value)
     if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
@@ -173,7 +173,7 @@ def own_parts(parts: Parts) -> dict[str, Own]:
     """Those of the parts that are the user's own, by slot."""
     filled = zip(SLOTS, parts[1:], strict=True)
     return {
-        slot.name: part if isinstance(part, Protocol) else type(part)
+        slot.name: part if isinstance(part, Stated) else type(part)
         for slot, part in filled
         if type(part) not in slot.choices.values()
     }

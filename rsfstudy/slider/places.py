@@ -26,6 +26,11 @@ A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, IMPOS
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
 
+#: Columns of the table of segments of a loading: when each begins and ends, V_0/V_* and its
+#: logarithm, and the rate and the fall of normal stress that a loading with unknowns imposes as it
+#: begins, NaN of others.
+BEGINS, ENDS_AT, VELOCITY, LOG_VELOCITY, RATE, RELIEF = range(6)
+
 #: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
 #: ln(V/V_*) = 276 (`slip_rate_unbounded`).
 LARGEST_EXPONENT = 300.0

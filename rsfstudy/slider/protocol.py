@@ -21,18 +21,33 @@ KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Protocol(Loading):
-    """A loading history as it was stated.
+class Stated(Loading):
+    """Base of loading histories of a user's own, which are data.
 
     Attributes
     ----------
     name : str
         What stands for it in results.
+    """
+
+    name: str  # type: ignore[misc]  # of each, and not of the class
+
+    @property
+    def lasts(self) -> float:
+        """Duration in D_c/V_* of all that was stated."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol(Stated):
+    """A loading history as it was stated, segment by segment.
+
+    Attributes
+    ----------
     history : tuple of Segment
         Its segments; the last may say how long it lasts.
     """
 
-    name: str  # type: ignore[misc]  # of each, and not of the class
     history: tuple[Segment, ...]
 
     @property

@@ -14,12 +14,12 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
 from rsfstudy.slider.numbers import SPRING, Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
-from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.synonyms import law_name
 
-#: A part of a user's own: its class, whose fields are fields of the scene; or a protocol, which is
+#: A part of a user's own: its class, whose fields are fields of the scene; or a loading, which is
 #: data.
-Own = type[Part] | Protocol
+Own = type[Part] | Stated
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Slot:
         The one that is meant where none is named.
     long_name : str
         What it is.
-    own : dict of str to type or Protocol
+    own : dict of str to type or Stated
         Parts of the user's own, by name, as far as they are known in this process.
     """
 
@@ -144,7 +144,7 @@ def defaults() -> dict[str, Any]:
 # ---- parts of a user's own -----------------------------------------------------------------------
 
 #: Classes that were checked.
-_CHECKED: set[type[Part]] = {Protocol}
+_CHECKED: set[type[Part]] = set()
 
 
 def kind_of(part: Own) -> type[Part]:
@@ -168,7 +168,7 @@ def resolve(slot: Slot, part: Any) -> Own:
     found: Own = part
     if part in slot.choices.values() and slot.name in SLOT_FIELDS:
         return found
-    if isinstance(part, Protocol) and slot.base is loading.Loading:
+    if isinstance(part, Stated) and slot.base is loading.Loading:
         own.check_name(slot, part, SLOTS)
     elif part not in _CHECKED or slot_of(part) is not slot:
         own.check(slot, part, SLOTS, OWNERS)
@@ -195,7 +195,7 @@ def name_of(field: str, value: Any) -> Any:
     InvalidValue
         Where the part cannot fill the slot.
     """
-    for slot in SLOTS if isinstance(value, type | Protocol) else ():
+    for slot in SLOTS if isinstance(value, type | Stated) else ():
         if slot.name == field:
             return resolve(slot, value).name
     return law_name(value) if field == "law" and isinstance(value, str) else value
@@ -265,7 +265,7 @@ def shown(
     Parameters
     ----------
     values : mapping of str to value
-    parts : iterable of type or Protocol
+    parts : iterable of type or Stated
         Parts of the user's own whose fields may be among those.
     """
     about = {one.name: one for one in (*QUANTITIES, *quantities_with(parts))}
@@ -283,7 +283,7 @@ def without_meaning(values: Mapping[str, Any], parts: Iterable[Own] = ()) -> fro
     Parameters
     ----------
     values : mapping of str to value
-    parts : iterable of type or Protocol
+    parts : iterable of type or Stated
         Parts of the user's own that may be among those.
     """
     try:

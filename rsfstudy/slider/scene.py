@@ -11,6 +11,8 @@ from functools import cached_property, lru_cache
 from inspect import Parameter, Signature
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.slider import (
@@ -35,6 +37,8 @@ from rsfstudy.slider.registry import Own
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
 _KEPT = 4096
+#: Table of the one segment of most loadings, which does not end.
+FOR_EVER = np.array([[0.0, math.inf, *[math.nan] * 4]])
 #: Attributes of a scene that only its equations and its lattice ask for.
 _INNER = frozenset(
     {"layout", "made", "functions", "numbers", "numbers_of_friction", "under", "shown"}
@@ -216,8 +220,13 @@ class Scene(ShownAsTable):
         return {name: values[name] for name in self.layout.fields}
 
     def describe(self) -> dict[str, Any]:
-        """The fields, and the segments of a loading of the user's own, as `protocol` takes them."""
-        stated = self.parts.loading.stated if "loading" in self.layout.named else ()
+        """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or
+        the digest of its samples.
+        """
+        history = self.parts.loading
+        if history.samples:
+            return self.as_dict() | {"samples": history.digest}
+        stated = history.stated if "loading" in self.layout.named else ()
         return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
 
     @property
@@ -273,16 +282,28 @@ class Scene(ShownAsTable):
             return self
         return self.under(loading.Segment(self.load_velocity))
 
-    @property
-    def segments(self) -> tuple[tuple[Scene, float], ...]:
-        """The scene as each segment of its loading has it, and for how long, in D_c/V_*."""
-        history = self._history
-        if len(history) == 1:
-            return ((self, history[0].duration),)
-        acting = [self.under(segment) for segment in history]
-        if self.parts.loading.unknowns:
-            acting[0] = self
-        return tuple((scene, s.duration) for scene, s in zip(acting, history, strict=True))
+    def acting(self, number: int) -> Scene:
+        """The scene as a segment of its loading has it."""
+        alone = self.parts.loading.alone(number)
+        if alone is self.parts.loading:
+            return self
+        if isinstance(alone, loading.Segment):
+            return self.under(alone)
+        return Scene(self.parts._replace(loading=alone))
+
+    @cached_property
+    def chains(self) -> tuple[tuple[Scene, np.ndarray], ...]:
+        """Its segments of loading as far as each follows on another without a jump: the scene as
+        the first of them has it, and their table (see `places`).
+        """
+        if len(self._history) == 1:
+            return ((self, FOR_EVER),)
+        table, breaks = map(np.array, (self.parts.loading.table, self.parts.loading.jumps))
+        if self.parts.law.regularised:  # where slip has reversed, a hold may have no answer
+            breaks = breaks | (table[:, places.VELOCITY] == 0.0)
+        first = np.flatnonzero(breaks[1:]) + 1
+        acting = map(self.acting, (0, *first.tolist()))
+        return tuple(zip(acting, np.split(table, first), strict=True))
 
     @cached_property
     def _history(self) -> tuple[loading.Segment, ...]:

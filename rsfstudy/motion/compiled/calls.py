@@ -73,6 +73,7 @@ IN_PLACE: Mapping[Any, Any] = {
     calls.moved: moved,
     steppers.begin: order_eight.begin,
     steppers.attempt: order_eight.attempt,
+    steppers.reach: order_eight.reach,
     steppers.unknowns_at: order_eight.unknowns_at,
     steppers.retake: order_eight.retake,
 }

@@ -23,7 +23,7 @@ from rsfstudy.slider.scene import Scene
 
 _ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
 _LIMITS = types.UniTuple(types.float64, len(Limits._fields))
-_PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY))
+_PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY, _ARRAY))
 
 
 class Compiled:
@@ -104,7 +104,7 @@ def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
 def compiled_loop() -> Any:
     """The compiled loop of motions."""
     memory = types.Array(numba.from_dtype(layout.MOTION), 1, "C")
-    tables = _ARRAY, _ARRAY, _TABLE, _TABLE, types.int64
+    tables = _ARRAY, _TABLE, _ARRAY, _TABLE, _TABLE, types.int64
     signature = types.int64(memory, _ARRAY, _ARRAY, _ARRAY, _PLAN, *tables)
     return called_from_python(advance, signature)
 

@@ -45,7 +45,8 @@ class Stepper(ABC):
     @abstractmethod
     def begin(self, motion: Any, space: Any) -> None:
         """Begin with the unknowns ``space.y`` of the regime ``motion.regime``, at clock zero; fill
-        in their rates, ``space.rates``.
+        in their rates, ``space.rates``. Where the loading has a kink, ``motion.length`` is that of
+        the step it has cut short; elsewhere it is 0.
         """
 
     @abstractmethod
@@ -61,6 +62,12 @@ class Stepper(ABC):
         float
             Its length, or `NO_STEP`, or `BUDGET_SPENT`.
         """
+
+    def reach(self, motion: Any, space: Any, length: float) -> float:
+        """Take a step that ends when the segment of loading does, as `attempt` does; of about that
+        length. A stepper that cannot returns 0.
+        """
+        return 0.0
 
     @abstractmethod
     def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
@@ -80,6 +87,11 @@ def begin(motion, space):
 def attempt(motion, space, longest):
     """Length of the step that could be taken; not positive where there is none."""
     return space.stepper.attempt(motion, space, longest)
+
+
+def reach(motion, space, length):
+    """Length of a step that ends when the segment does; 0 where none could be taken."""
+    return space.stepper.reach(motion, space, length)
 
 
 def unknowns_at(motion, space, clock):

@@ -22,11 +22,15 @@ from rsfstudy.motion.steppers.unrolled import (
     STAGES,
     TOLERANCE,
 )
-from rsfstudy.motion.workspace import spend
+from rsfstudy.motion.workspace import rate_of_step, spend
 from rsfstudy.slider.equations import LONGEST_STEP
 
 #: Weights of the stages of dense output, and of all stages in its rows.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = map(np.ascontiguousarray, (DOP853.A_EXTRA, DOP853.D))
+#: Weights of the stages before each stage, of which the last is the end of the step, and in its
+#: errors of fifth and third order.
+_STAGE_WEIGHTS = tuple(map(tuple, [*DOP853.A[:STAGES, :STAGES].tolist(), DOP853.B.tolist()]))
+_FIFTH, _THIRD = tuple(DOP853.E5.tolist()), tuple(DOP853.E3.tolist())
 _SAFETY, _LEAST, _MOST, _EXPONENT = 0.9, 0.2, 10.0, -1.0 / 8.0
 
 
@@ -34,8 +38,10 @@ def begin(motion, space):
     """Start the clock of the equations."""
     motion.clock = 0.0
     evaluate(space.rate, space.y, space.y, space.p, space.rates)
-    motion.length = min(first_length(space, motion.direction, motion.tolerance), LONGEST_STEP)
-    spend(motion, 2)
+    spend(motion, 1)
+    if motion.length == 0.0:
+        motion.length = min(first_length(space, motion.direction, motion.tolerance), LONGEST_STEP)
+        spend(motion, 1)
 
 
 def attempt(motion, space, longest):
@@ -44,7 +50,7 @@ def attempt(motion, space, longest):
     shortest = 10.0 * abs(towards - motion.clock)
     length = max(min(motion.length, longest), shortest)
     rejected = False
-    space.step[TOLERANCE] = motion.tolerance
+    space.step[TOLERANCE], motion.pace = motion.tolerance, 0.0
     while length >= shortest:
         motion.end = motion.clock + length * motion.direction
         motion.taken = motion.end - motion.clock
@@ -68,16 +74,58 @@ def take(motion, space):
     spend(motion, STAGES)
 
 
+def reach(motion, space, length):
+    """Take a step against time, which is the last unknown, up to when the segment ends; its clock
+    runs as time does at its beginning, when it has that length. Returns 0 where its error is too
+    large.
+    """
+    motion.pace, motion.taken = space.rates[space.unknowns - 1], length
+    motion.end, motion.is_dense = motion.clock + length, 0
+    error = take_at_pace(motion, space)
+    spend(motion, STAGES)
+    if motion.spent_slow + motion.spent_fast > motion.budget:
+        return BUDGET_SPENT
+    if error < 1.0:
+        motion.length = max(motion.length, stretched(length, error, False))
+        return length
+    motion.length = shortened(length, error)
+    return 0.0
+
+
+def take_at_pace(motion, space):
+    """Take a step by the clock of a pace; returns its local error over what is allowed."""
+    count, y, new, stages, length = space.unknowns, space.y, space.new, space.stages, motion.taken
+    for s in range(1, STAGES + 1):
+        for i in range(count):
+            together = 0.0
+            for j in range(s):
+                together += _STAGE_WEIGHTS[s][j] * stages[j * count + i]
+            new[i] = y[i] + length * together
+        rate_of_step(motion, space, new, moved(stages, s * count))
+    fifth = third = 0.0
+    for i in range(count):
+        of_fifth = of_third = 0.0
+        for j in range(STAGES + 1):
+            of_fifth += _FIFTH[j] * stages[j * count + i]
+            of_third += _THIRD[j] * stages[j * count + i]
+        allowed = motion.tolerance * (space.scales[i] + max(abs(y[i]), abs(new[i])))
+        fifth += (of_fifth / allowed) * (of_fifth / allowed)
+        third += (of_third / allowed) * (of_third / allowed)
+    both = fifth + 0.01 * third
+    return length * fifth / math.sqrt(both * count) if both != 0.0 else 0.0
+
+
 def retake(motion, space, clock):
     """Take the step anew, to a clock within it."""
     motion.end, motion.taken, motion.is_dense = clock, clock - motion.clock, 0
+    motion.pace = 0.0
     take(motion, space)
 
 
 def unknowns_at(motion, space, clock):
     """Fill in the unknowns at a clock within the step."""
     if not motion.is_dense:
-        prepare_interpolation(space, motion.taken)
+        prepare_interpolation(motion, space, motion.taken)
         spend(motion, EXTRA)
         motion.is_dense = 1
     interpolate(space, (clock - motion.clock) / motion.taken)
@@ -121,7 +169,7 @@ def first_length(space, direction, tolerance):
     return min(100.0 * trial, length)
 
 
-def prepare_interpolation(space, length):
+def prepare_interpolation(motion, space, length):
     """Fill in the rows of dense output, by three more evaluations of the rates."""
     count, y, stages, rows = space.unknowns, space.y, space.stages, space.dense
     for s in range(EXTRA):
@@ -131,7 +179,7 @@ def prepare_interpolation(space, length):
                 together += _EXTRA_WEIGHTS[s, j] * stages[j * count + i]
             space.within[i] = y[i] + length * together
         rates = moved(stages, (STAGES + 1 + s) * count)
-        evaluate(space.rate, space.within, y, space.p, rates)
+        rate_of_step(motion, space, space.within, rates)
     for i in range(count):
         change = space.new[i] - y[i]
         first, last = stages[i], stages[STAGES * count + i]
@@ -165,6 +213,9 @@ class OrderEight(Stepper):
 
     def attempt(self, motion: Any, space: Any, longest: float) -> float:
         return float(attempt(motion, space, longest))
+
+    def reach(self, motion: Any, space: Any, length: float) -> float:
+        return float(reach(motion, space, length))
 
     def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
         unknowns_at(motion, space, clock)

@@ -18,7 +18,7 @@ from scipy.integrate import (
 )
 
 from rsfstudy.motion.meter import Halt
-from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
+from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
 from rsfstudy.motion.workspace import spend
 from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.parts import Numbers
@@ -72,16 +72,21 @@ class SciPyStepper(Stepper):
     def begin(self, motion: Any, space: Any) -> None:
         ends = 0.0, motion.direction * np.inf
         # the longest first step is asked of a trial step, which may leave the domain
-        self._solver = self._solves(motion, space, ends, np.array(space.y[: space.unknowns]))
+        begin, known = np.array(space.y[: space.unknowns]), motion.length
+        first = {"first_step": known} if known else {}
+        self._solver = self._solves(motion, space, ends, begin, **first)
         space.rates[: space.unknowns] = self._rates()
 
     def attempt(self, motion: Any, space: Any, longest: float) -> float:
+        motion.pace = 0.0
         if self._solver.status == "finished":  # a step that was taken anew
             ends = motion.clock, motion.direction * np.inf
             begin, length = np.array(space.y[: space.unknowns]), abs(motion.length)
             self._solver = self._solves(motion, space, ends, begin, first_step=length)
         solver = self._solver
         solver.max_step = longest
+        if motion.length and isinstance(solver, DOP853):  # it may have been too long for a kink
+            solver.h_abs = motion.length
         if not self._step(motion, solver):
             return BUDGET_SPENT
         if solver.status == "failed":
@@ -90,18 +95,28 @@ class SciPyStepper(Stepper):
             return BUDGET_SPENT
         motion.end, self._dense = float(solver.t), None
         motion.taken = motion.end - motion.clock
-        motion.length = abs(motion.taken)
+        motion.length = float(getattr(solver, "h_abs", abs(motion.taken)))
         self._fill(space)
         return abs(float(motion.taken))
 
+    def reach(self, motion: Any, space: Any, length: float) -> float:
+        if not isinstance(self._solver, DOP853):
+            return 0.0
+        self._dense = None
+        taken: float = order_eight.reach(motion, space, length)  # type: ignore[no-untyped-call]
+        return taken
+
     def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
+        if motion.pace > 0.0:
+            order_eight.unknowns_at(motion, space, clock)  # type: ignore[no-untyped-call]
+            return
         if self._dense is None:
             self._dense = _by_floats(self._solver.dense_output())
         for i, unknown in enumerate(self._dense(clock)):
             space.within[i] = unknown
 
     def retake(self, motion: Any, space: Any, clock: float) -> None:
-        begin = np.array(space.y[: space.unknowns])
+        begin, motion.pace = np.array(space.y[: space.unknowns]), 0.0
         length, ends = abs(clock - motion.clock), (motion.clock, clock)
         self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
         clocks, within = [motion.clock], []

@@ -63,6 +63,9 @@ class Loading(Part):
     """
 
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    #: Of a history that was sampled: its numbers, and what tells them.
+    samples: ClassVar[bytes] = b""
+    digest: ClassVar[str] = ""
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
 
@@ -84,6 +87,40 @@ class Loading(Part):
     def stated(self) -> tuple[Segment, ...]:
         """The history as it was stated: the last segment may say how long it lasts."""
         return self.segments
+
+    def alone(self, number: int) -> Loading | Segment:
+        """One of its segments without the others; the history itself, if it has one only, or
+        unknowns in the first.
+        """
+        history = self.segments
+        if len(history) == 1 or (self.unknowns and number == 0):
+            return self
+        return history[number]
+
+    @property
+    def told(self) -> int:
+        """How many segments a motion tells the beginning of; these are the last ones."""
+        return len(self.segments) - 1
+
+    @property
+    def table(self) -> Any:
+        """The segments as motions read them, a row each (see `places`)."""
+        rows, begins = [], 0.0
+        for velocity, _step, lasts, _stress in self.segments:
+            log = math.log(velocity) if velocity > 0.0 else -math.inf
+            rows.append((begins, begins + lasts, velocity, log, math.nan, math.nan))
+            begins += lasts
+        return rows
+
+    @property
+    def jumps(self) -> Any:
+        """Whether each segment begins with a jump, of the load point or of normal stress."""
+        before, found = 0.0, []
+        for place, segment in enumerate(self.segments):
+            ends = place == 1 and bool(self.unknowns)  # which the first segment has
+            found.append(ends or segment.displacement != 0.0 or segment.normal_stress != before)
+            before = segment.normal_stress
+        return found
 
     @property
     def is_a_step(self) -> bool:
@@ -120,7 +157,7 @@ def last_velocity() -> Any:
     )
 
 
-def refuse_fluid(scene: Scene, name: str, value: float) -> None:
+def refuse_fluid(scene: Scene, name: str, value: object) -> None:
     """Refuse a field of a loading that has unknowns beside a fluid that has some too."""
     fluid = scene.parts.fluid
     if fluid.unknowns:

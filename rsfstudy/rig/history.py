@@ -1,0 +1,150 @@
+"""Loading histories from records: arrays, datasets and CSV files, in whatever units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.doors import door
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.table import Column, read_table
+from rsfstudy.slider.history import History, check_samples, sampled
+
+#: What a record may hold, and the units of the slider.
+_SCALES = {
+    "time": "D_c/V_*", "displacement": "D_c", "velocity": "V_*", "normal_stress": "sigma_*",
+    "pore_pressure": "sigma_*",
+}  # fmt: skip
+
+
+@door
+def history(
+    record: Any,
+    laboratory: Laboratory | None = None,
+    *,
+    columns: Mapping[str, tuple[str, str]] | None = None,
+    name: str = "history",
+) -> History:
+    """A loading history that was sampled: ``Scene(loading=history(record))``.
+
+    Linear between samples: a load point whose displacement was sampled moves at a steady velocity
+    from each sample to the next; one whose velocity was, by the mean of both; normal stress and
+    pore pressure change at steady rates. It begins with the first sample, before which the slider
+    slides steadily at V_*. After the last one the load point goes on at the last velocity, and
+    stress stays.
+
+    Parameters
+    ----------
+    record : mapping, xarray.Dataset, str or Path
+        Arrays by name, or variables, or a CSV file whose first line names columns and units
+        (`read_table`): ``time``; ``displacement`` or ``velocity`` of the load point, which moves at
+        V_* without either; ``normal_stress``; and ``pore_pressure`` above that before the record.
+    laboratory : Laboratory, optional
+        The rig whose units are used. Without it all are those of the slider: ``D_c/V_*``, ``D_c``,
+        ``V_*``, ``sigma_*``.
+    columns : mapping of str to (str, str), optional
+        What the columns are called in the record, and their units, as in ``{"time": ("t", "s")}``.
+        Without it arrays are in units of the slider, or in SI units where a laboratory is given;
+        variables have an attribute ``units``.
+    name : str
+        What the history is called in results.
+
+    Raises
+    ------
+    InvalidValue
+        For missing units, a gap or NaN, a clock that stands still or runs back, a load point that
+        moves back, and normal stress that is not positive: with line and column, or the number of
+        the sample.
+    """
+    found = _columns(record, columns, laboratory)
+    for key in found:
+        if key not in _SCALES:
+            raise InvalidValue("column", key, "is unknown", choices=_SCALES)
+    if "time" not in found or len(found) == 1:
+        remedy = 'State "time" and what was sampled, as in {"time": ..., "displacement": ...}.'
+        raise InvalidValue("record", [*found], "tells no history", remedy=remedy)
+    if "displacement" in found and "velocity" in found:
+        rule = "has displacement and velocity of the load point: give one of them"
+        raise InvalidValue("record", [*found], rule)
+    sizes = {len(column.values) for column in found.values()}
+    if len(sizes) > 1 or min(sizes) < 2:
+        rule = f"has columns of {sorted(sizes)} samples: all must have as many, 2 at least"
+        raise InvalidValue("record", [*found], rule)
+    for key, column in found.items():
+        wrong = ~np.isfinite(column.values)
+        check_samples(key, column.values, wrong, "must be a finite number", column.place)
+    values = {key: _plain(key, column, laboratory) for key, column in found.items()}
+    time, clock = values["time"], found["time"]
+    late = np.append(False, np.diff(time) <= 0.0)
+    check_samples("time", clock.values, late, "must be later than the sample before", clock.place)
+    velocity = _velocity(values, found)
+    fall = None
+    if "normal_stress" in found or "pore_pressure" in found:
+        ones, none = np.ones(len(time)), np.zeros(len(time))
+        fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
+        key = "normal_stress" if "normal_stress" in found else "pore_pressure"
+        rule = "leaves no normal stress: it must stay positive, less pore pressure"
+        check_samples(key, found[key].values, fall >= 1.0, rule, found[key].place)
+    return sampled(time, velocity, fall, name)
+
+
+def _columns(
+    record: Any, columns: Mapping[str, tuple[str, str]] | None, laboratory: Laboratory | None
+) -> dict[str, Column]:
+    """Columns of a record, of whatever kind."""
+    if isinstance(record, str | Path):
+        return read_table(record, columns)
+    is_dataset = hasattr(record, "data_vars")
+    if not is_dataset and not isinstance(record, Mapping):
+        remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
+        raise InvalidValue("record", record, "is no record", remedy=remedy)
+    names = [*record.variables] if is_dataset else [*record]
+    found = {}
+    for key, (theirs, units) in (columns or {n: (n, "") for n in names if n in _SCALES}).items():
+        if theirs not in names:
+            raise InvalidValue("column", theirs, "is not in the record", choices=map(str, names))
+        values = np.asarray(record[theirs], dtype=float)
+        if values.ndim != 1:
+            raise InvalidValue(key, values.shape, "must lie along one dimension")
+        units = units or (str(record[theirs].attrs.get("units", "")) if is_dataset else "")
+        if is_dataset and not units and laboratory is not None:
+            rule = "has no units"
+            raise InvalidValue(key, theirs, rule, remedy="Set its attribute units.")
+        found[key] = Column(values, units)
+    if columns is None and not is_dataset and len(found) < len(names):
+        unknown = next(name for name in names if name not in _SCALES)
+        raise InvalidValue("column", unknown, "is unknown", choices=_SCALES)
+    return found
+
+
+def _plain(key: str, column: Column, laboratory: Laboratory | None) -> np.ndarray:
+    """Numbers of a column in units of the slider."""
+    scale, units = _SCALES[key], column.units
+    if units == scale or (laboratory is None and units in ("", "1")):
+        return column.values
+    if laboratory is None:
+        rule = f"need the scales of a rig for {key}"
+        raise InvalidValue("units", units, rule, remedy=f"Give a laboratory, or {scale}.")
+    one = laboratory.dimensionless(f"1 {units}" if units else 1.0, scale, key)
+    return np.asarray(column.values * one)
+
+
+def _velocity(values: Mapping[str, np.ndarray], found: Mapping[str, Column]) -> np.ndarray:
+    """Velocity of the load point from each sample on."""
+    time, key = values["time"], "velocity" if "velocity" in found else "displacement"
+    if key not in found:
+        return np.ones(len(time))
+    rule = "moves the load point back: friction is that of forward slip"
+    if key == "velocity":
+        speeds = values[key]
+        check_samples(key, found[key].values, speeds < 0.0, rule, found[key].place)
+        return np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
+    steps = np.diff(values[key])
+    back = np.append(False, steps < 0.0)
+    check_samples(key, found[key].values, back, rule, found[key].place)
+    speeds = steps / np.diff(time)
+    return np.append(speeds, speeds[-1])

@@ -1,0 +1,128 @@
+"""Tables of numbers with units, from CSV files."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.doors import check_file, door
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.units import number
+
+_HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
+_EXAMPLE = "velocity (um/s), distance (um)"
+
+
+class Column(NamedTuple):
+    """A column of a table.
+
+    Attributes
+    ----------
+    values : ndarray
+        Its numbers; NaN where a field is empty.
+    units : str
+        What they are measured in.
+    number : int
+        Its place in the file, from 1.
+    lines : ndarray
+        The line of the file that each number stands in.
+    path : str
+        The file.
+    """
+
+    values: np.ndarray
+    units: str
+    number: int = 0
+    lines: np.ndarray = np.empty(0, dtype=int)
+    path: str = ""
+
+    def place(self, row: int) -> str:
+        """Where a number stands."""
+        if not self.path:
+            return f"sample {row + 1}"
+        return f"{self.path}, line {self.lines[row]}, column {self.number}"
+
+
+@door
+def read_table(
+    path: str | Path, columns: Mapping[str, tuple[str, str]] | None = None
+) -> dict[str, Column]:
+    """Columns of a CSV file by their names: numbers, units, and where each stands.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : mapping of str to (str, str), optional
+        Name, heading in the file and units of each column that is wanted, as in ``{"time":
+        ("t", "s")}``. Without it the first line names all columns with their units, as in
+        ``velocity (um/s), distance (um)``.
+
+    Raises
+    ------
+    DataError
+        Where there is no such file of text.
+    InvalidValue
+        For a header that does not name the columns, or a field that is no number, with its line
+        and column.
+    """
+    check_file("table", path)
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            rows = [(n, row) for n, row in enumerate(csv.reader(file), start=1) if any(row)]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise DataError(f"{path}: cannot be read as CSV ({error})") from error
+    if not rows:
+        remedy = f"Its first line reads, for instance, {_EXAMPLE}."
+        raise InvalidValue("table", str(path), "has no header", remedy=remedy)
+    (line, header), *body = rows
+    for n, row in body:
+        if len(row) != len(header):
+            rule = f"has {len(row)} fields, and the header {len(header)}"
+            raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
+    headings = [text.strip() for text in header]
+    wanted = _as_headed(headings, f"{path}, line {line}") if columns is None else columns
+    lines = np.array([n for n, _row in body], dtype=int)
+    found = {}
+    for name, (heading, units) in wanted.items():
+        if headings.count(heading) != 1:
+            rule = f"heads {headings.count(heading)} columns, and must head one"
+            raise InvalidValue("column", heading, rule, choices=headings).at(f"{path}, line {line}")
+        place = headings.index(heading)
+        column = Column(np.empty(len(body)), units, place + 1, lines, str(path))
+        for n, (_line, row) in enumerate(body):
+            column.values[n] = _number(name, row[place], column, n)
+        found[name] = column
+    return found
+
+
+def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:
+    """Name, heading and units of each column, by a header that states them."""
+    found: dict[str, tuple[str, str]] = {}
+    for n, heading in enumerate(headings, start=1):
+        match = _HEADER.fullmatch(heading)
+        if not match:
+            remedy = f"Write the header as in {_EXAMPLE}."
+            rule = "names no column with its units"
+            raise InvalidValue("header", heading, rule, remedy=remedy).at(f"{place}, column {n}")
+        if match[1] in found:
+            raise InvalidValue("column", match[1], "stands twice in the header").at(place)
+        found[match[1]] = heading, match[2].strip()
+    return found
+
+
+def _number(name: str, text: str, column: Column, row: int) -> float:
+    if not text.strip():
+        return math.nan
+    found = number(text)
+    if found is None:
+        wrong = InvalidValue(name, text, "is no number", remedy="Units stand in the header.")
+        raise wrong.at(column.place(row))
+    if not math.isfinite(found):
+        raise InvalidValue(name, text.strip(), "must be finite").at(column.place(row))
+    return found

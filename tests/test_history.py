@@ -1,0 +1,257 @@
+"""Records as loading: what is sampled is followed exactly, however it is cut; bad records say where
+they are wrong.
+"""
+
+import copy
+import cProfile
+import pickle
+import pstats
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import run
+
+from rsfstudy import (
+    Axis,
+    Laboratory,
+    Scene,
+    Study,
+    history,
+    protocol,
+    read_protocol,
+    read_table,
+    simulate,
+)
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.slider.laws import PARTS as LAWS
+
+PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}
+SLIDERS = {
+    "plain": {"law": "slip"},
+    "mass": {"law": "slowness", "inertia": True, "period": 1e7, "stiffness": 0.003},
+    "damping": {"law": "slip", "radiation_damping": 1e-4, "stiffness": 0.003},
+    "dilatant": {"law": "slowness", "fluid": "dilatant"},
+}
+TIMES = np.array([5.0, 12.0, 20.0])
+WHAT = ["shear_stress", "log10_slip_rate", "state_variable", "slip"]
+
+
+def told(loading, slider="plain", engine=COMPILED, rtol=1e-8, **fields):
+    scene = Scene(**PLAIN | SLIDERS.get(slider, {}) | fields, loading=loading)
+    motion = simulate(scene, times=TIMES, rtol=rtol, engine=engine)
+    return np.array([motion[name].values for name in WHAT])
+
+
+def wave(samples, period=4.0):
+    time = np.linspace(0.0, 20.0, samples)
+    return {"time": time, "displacement": time + 0.4 * np.sin(2.0 * np.pi * time / period)}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_steps_as_a_history_tell_what_the_steps_do(slider, engine):
+    steps = protocol([{"velocity": 3.0, "duration": 5.5}, {"velocity": 0.5, "duration": 8.0},
+                      {"velocity": 2.0}])  # fmt: skip
+    record = {"time": [0.0, 5.5, 13.5, 21.0], "displacement": [0.0, 16.5, 20.5, 35.5]}
+    known = told(steps, slider, rtol=1e-9)
+    np.testing.assert_allclose(told(history(record), slider, engine), known, atol=3e-7, rtol=0.0)
+
+
+def test_slide_hold_slide_is_that_of_its_fields():
+    known = simulate(Scene(**PLAIN, hold_time=9.0), times=TIMES, engine=COMPILED)
+    record = history({"time": [0.0, 9.0, 30.0], "velocity": [0.0, 0.0, 0.0]})
+    assert record.segments[1].load_velocity == 0.0
+    record = history({"time": [0.0, 9.0, 30.0], "displacement": [0.0, 0.0, 21.0]})
+    scene = Scene(**PLAIN, loading=record)
+    motion = simulate(scene, times=TIMES, engine=COMPILED)
+    for name in WHAT:
+        np.testing.assert_allclose(motion[name], known[name], atol=1e-8)
+    # all of it is followed by default
+    assert float(simulate(scene, engine=COMPILED).time[-1]) == 30.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_all_engines_tell_one_motion_by_every_law(law):
+    fields = {"law": law}
+    if "two" in law:
+        fields |= {"b1_over_a": 1.2, "b2_over_a": 0.2, "length_ratio": 3.0, "b_over_a": None}
+    scipy, python, compiled = (told(history(wave(60)), "", e, **fields) for e in ENGINES)
+    np.testing.assert_allclose(scipy, compiled, atol=1e-9)
+    np.testing.assert_allclose(python, compiled, atol=1e-9)
+
+
+@pytest.mark.parametrize("slider", SLIDERS)
+def test_finer_samples_where_it_is_linear_change_nothing(slider):
+    """Beyond the accuracy: each of a hundred kinks that are none begins a step."""
+    record = wave(21)
+    finer = np.union1d(record["time"], np.linspace(0.0, 20.0, 102))
+    between = {"time": finer, "displacement": np.interp(finer, *record.values())}
+    known = told(history(record), slider)
+    np.testing.assert_allclose(told(history(between), slider), known, atol=3e-7, rtol=0.0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_sampled_normal_stress_is_a_ramp(engine):
+    fields = {"normal_stress": "variable", "phi": 70.0}
+    ramp = Scene(**PLAIN | fields, normal_stress_ramp=-0.2, ramp_duration=8.0)
+    known = simulate(ramp, times=TIMES, rtol=1e-9, engine=COMPILED)
+    for column, values in (("normal_stress", [1.0, 0.9, 0.8, 0.8]),
+                           ("pore_pressure", [0.0, 0.1, 0.2, 0.2])):  # fmt: skip
+        record = history({"time": [0.0, 4.0, 8.0, 21.0], column: values})
+        found = told(record, engine=engine, **fields)
+        for name, numbers in zip(WHAT, found, strict=True):
+            # slip is integrated over all that time, at rates of which 1e-8 of ln V is unknown
+            np.testing.assert_allclose(numbers, known[name], atol=3e-7)
+
+
+def test_a_step_of_normal_stress_at_the_first_sample_is_one():
+    fields = {"normal_stress": "imposed"}
+    stepped = Scene(**PLAIN | fields, normal_stress_step=0.1, load_velocity_ratio=1.0)
+    known = simulate(stepped, times=TIMES, rtol=1e-9, engine=COMPILED)
+    found = told(history({"time": [0.0, 30.0], "normal_stress": [1.1, 1.1]}), **fields)
+    for name, numbers in zip(WHAT, found, strict=True):
+        np.testing.assert_allclose(numbers, known[name], atol=1e-7)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_sample_costs_one_step_and_no_python(engine):
+    """Thirteen right-hand sides a sample where the motion needs next to none; and, compiled, not
+    one more call of Python.
+    """
+    work, calls = [], []
+    for samples in (200, 400, 800):  # the first brings in what is imported late
+        scene = Scene(**PLAIN, loading=history(wave(samples, period=40.0)))
+        with cProfile.Profile() as profile:
+            motion = simulate(scene, times=[20.0], engine=engine)
+        calls.append(pstats.Stats(profile).total_calls)
+        work.append(motion.attrs["rhs_evaluations"])
+    assert work[2] - work[1] < 15 * 400
+    if engine == COMPILED:
+        assert calls[2] == pytest.approx(calls[1], rel=0.02)
+
+
+def test_units_of_a_rig(tmp_path):
+    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+    record = wave(30)
+    known = history(record)
+    file = tmp_path / "record.csv"
+    rows = [f"{10.0 * t:.17g},{10.0 * d:.17g}" for t, d in zip(*record.values(), strict=True)]
+    file.write_text("\n".join(["time (s), displacement (um)", *rows]))
+    read = history(file, rig)
+    np.testing.assert_allclose(read.columns, known.columns, rtol=1e-11, atol=1e-12)
+    file.write_text("\n".join(["t, LVDT", *rows]))
+    columns = {"time": ("t", "s"), "displacement": ("LVDT", "um")}
+    assert history(file, rig, columns=columns).digest == read.digest
+    assert read_table(file, columns)["time"].units == "s"
+    dataset = xr.Dataset(
+        {"displacement": ("n", 10.0 * record["displacement"], {"units": "um"}),
+         "time": ("n", 10.0 * record["time"], {"units": "s"})}
+    )  # fmt: skip
+    np.testing.assert_allclose(history(dataset, rig).columns, known.columns, atol=1e-11)
+    with pytest.raises(InvalidValue, match="time = 'time': has no units"):
+        history(dataset.assign(time=("n", record["time"])), rig)
+    with pytest.raises(InvalidValue, match="units = .*: need the scales of a rig for"):
+        history(dataset)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("time, displacement\n0,0\n1,1\n", "line 1, column 1: header = 'time': names no column"),
+        ("0,0\n1,1\n0,2\n", "line 4, column 1: time = 0.0: must be later"),
+        ("0,0\n1,1\n1,2\n", "line 4, column 1: time = 1.0: must be later"),
+        ("0,0\n1,\n2,2\n", "line 3, column 2: displacement = nan: must be a finite number"),
+        ("0,0\n1,nan\n2,2\n", "line 3, column 2: displacement = 'nan': must be finite"),
+        ("0,0\n1,x\n2,2\n", "line 3, column 2: displacement = 'x': is no number"),
+        ("0,0\n1\n2,2\n", "line 3: line = '1': has 1 fields, and the header 2"),
+        ("0,3\n\n1,2\n", "line 4, column 2: displacement = 2.0: moves the load point back"),
+        ("0,3\n", "must have as many, 2 at least"),
+    ],
+)
+def test_bad_records_say_where(tmp_path, text, complaint):
+    file = tmp_path / "record.csv"
+    header = "" if text.startswith("time") else "time (D_c/V_*), displacement (D_c)\n"
+    file.write_text(header + text)
+    with pytest.raises(InvalidValue, match=complaint):
+        history(file)
+
+
+@pytest.mark.parametrize(
+    ("record", "complaint"),
+    [
+        ({"time": [0.0, 1.0], "velocity": [1.0, -1.0]}, "sample 2: velocity = -1.0: moves"),
+        ({"time": [0.0, 1.0], "normal_stress": [1.0, 0.0]}, "sample 2: normal_stress = 0.0"),
+        ({"time": [0.0, 1.0], "pore_pressure": [0.0, 1.0]}, "sample 2: pore_pressure = 1.0"),
+        ({"time": [0.0, 1.0, 2.0], "velocity": [1.0, 1.0]}, r"columns of \[2, 3\] samples"),
+        ({"time": [0.0, 1.0]}, "tells no history"),
+        ({"time": [0.0, 1.0], "speed": [1.0, 1.0]}, "column = 'speed': is unknown"),
+        ({"time": [0.0, 1.0], "velocity": [1.0] * 2, "displacement": [1.0] * 2}, "give one"),
+    ],
+)
+def test_bad_arrays_say_which_sample(record, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        history(record)
+
+
+def test_what_a_scene_cannot_follow_is_refused():
+    pressed = history({"time": [0.0, 1.0], "normal_stress": [1.0, 1.1]})
+    with pytest.raises(InvalidValue, match="is changed by the loading"):
+        Scene(**PLAIN, loading=pressed)
+    with pytest.raises(InvalidValue, match="no meaning for fluid='dilatant'"):
+        Scene(**PLAIN | {"normal_stress": "imposed", "fluid": "dilatant"}, loading=pressed)
+
+
+def test_a_history_is_data():
+    """Equal where its samples are; copied and pickled; an axis; told by its digest."""
+    one, same, other = history(wave(20)), history(wave(20)), history(wave(30), name="finer")
+    assert one == same != other
+    assert pickle.loads(pickle.dumps(one)) == copy.deepcopy(one) == one
+    assert one.digest in repr(one)
+    assert len(repr(one)) < 120
+    study = Study(
+        name="records",
+        title="Two records",
+        base=Scene(**PLAIN),
+        axes=[Axis("loading", [one, other])],
+        measure=StepResponse(peaks=2, phases=2),
+    )
+    assert study.shape == (2,)
+    found = run(study, rtol=1e-4)
+    assert found.loading.values.tolist() == ["history", "finer"]
+    assert np.isfinite(found.max_log10_slip_rate).all()
+    # a study of other samples by the same name is another one
+    assert set(study.own_classes[1:]) == {one, other}
+
+
+def test_a_motion_holds_its_samples(tmp_path):
+    """Two of one name are told apart; other samples than those of the scene are refused."""
+    scene = Scene(**PLAIN, loading=history(wave(20)))
+    file = tmp_path / "motion.nc"
+    simulate(scene, duration=2.0, engine=COMPILED).to_netcdf(file)
+    Scene(**PLAIN, loading=history(wave(30)))
+    motion = xr.load_dataset(file)
+    assert motion.history_samples.dims == ("history_sample", "history_column")
+    assert motion.rsf.scene == scene
+    motion["history_samples"] = 2.0 * motion.history_samples
+    with pytest.raises(DataError, match="history_samples are not those of the scene"):
+        _ = motion.rsf.scene
+
+
+def test_the_files_that_ship_are_followed():
+    """Beside the page of the rig: a protocol and a record."""
+    pages = Path(__file__).parent.parent / "studies" / "pages"
+    rig = Laboratory(
+        normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
+        stiffness="0.05 MPa/um",
+    )  # fmt: skip
+    for loading, lasts in (
+        (history(pages / "record.csv", rig), 300.0),
+        (read_protocol(pages / "protocol.csv", rig), 1130.0),
+    ):
+        scene = rig.scene(law="slowness", normal_stress="imposed", loading=loading)
+        motion = rig.in_units(simulate(scene, rtol=1e-4, engine=COMPILED))
+        assert float(motion.time[-1]) == pytest.approx(lasts)
