@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import collections
 import json
 import math
 import warnings
@@ -18,7 +17,7 @@ from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
-from rsfstudy.motion.events import rise
+from rsfstudy.motion.events import Event, Kind, rise
 from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
@@ -26,6 +25,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.history import History
 from rsfstudy.slider.places import BEGINS, VELOCITY
+from rsfstudy.slider.point import Point
 from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
@@ -46,6 +46,8 @@ _INSTABILITY_TIME = Quantity(
 )
 #: Attribute that says from when on a motion is no physics.
 BEYOND = "beyond_instability_norm"
+#: Attribute that holds time, slip and point of the end of a motion.
+END = "end"
 #: Slip rate over that of the load point that counts as instability where the load point alone
 #: reaches the norm, as it may where the period is not that of the slider.
 _OVER_LOADING = 1e6
@@ -59,6 +61,7 @@ def simulate(
     *nameless: Never,
     duration: float | None = None,
     times: Sequence[float] | np.ndarray | None = None,
+    start: xr.Dataset | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
     engine: Any = SCIPY,
@@ -75,6 +78,9 @@ def simulate(
     times : sequence of float, optional
         Times in D_c/V_* at which to tell what the slider does, to the accuracy of the motion. By
         default all of it is told, several times within each step.
+    start : xarray.Dataset, optional
+        A motion of this scene, from whose end it goes on as if uninterrupted: time, slip and
+        loading do. A duration counts from there.
     rtol : float
         Accuracy of the motion.
     budget : int
@@ -102,8 +108,9 @@ def simulate(
     Raises
     ------
     InvalidValue
-        For a duration that is not positive and finite, or is given without its name; and for times
-        that do not increase, or beside a duration.
+        For a start that is no motion of this scene with an end; for a duration that is not positive
+        and finite, or is given without its name; and for times that do not increase, or beside a
+        duration.
 
     Warns
     -----
@@ -117,10 +124,12 @@ def simulate(
         remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
         raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     check_scene(scene)
-    at = _increasing(times, duration)
+    since = None if start is None else _end_of(start, scene)
+    began = since.time if since else 0.0
+    at = _increasing(times, duration, began)
     if at is not None:
-        duration = float(at[-1])
-    duration = _as_stated(scene) if duration is None else duration
+        duration = float(at[-1]) - began
+    duration = _as_stated(scene) - began if duration is None else duration
     if not _is_positive(duration):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
@@ -132,10 +141,12 @@ def simulate(
     recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
     watches = [rise("log_rate", limit)] if limit < math.inf else []
-    moving = follow(scene, accuracy, meter, watches, recording=recording, until=duration)
+    until = began + duration if at is None else float(at[-1])
+    moving = follow(scene, accuracy, meter, watches, recording=recording, until=until, since=since)
     try:
-        passed = next((e.time for e in moving if e.watch or e.point.log_rate >= limit), math.nan)
-        collections.deque(moving, maxlen=0)
+        for last in moving:
+            if math.isnan(passed) and (last.watch or last.point.log_rate >= limit):
+                passed = last.time
     except Halt as halt:
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
@@ -167,6 +178,8 @@ def simulate(
             **provenance.attributes("rsfstudy.simulate"),
         }
     )
+    if status is Status.OK:
+        dataset.attrs[END] = json.dumps((last.time, last.slip, last.point))
     if isinstance(scene.parts.loading, History):
         dataset = dataset.assign(history_samples=_samples(scene.parts.loading))
     if passed >= 0.0:
@@ -178,6 +191,19 @@ def simulate(
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
     return dataset
+
+
+def _end_of(motion: object, scene: Scene) -> Event:
+    """The end of a motion of a scene, from which it can go on."""
+    if not isinstance(motion, xr.Dataset) or END not in motion.attrs:
+        remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
+        raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
+    if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
+        remedy = "Give the scene of the motion itself, motion.rsf.scene."
+        raise InvalidValue("start", motion.attrs["title"], "is of another scene", remedy=remedy)
+    time, slip, numbers = json.loads(motion.attrs[END])
+    point = Point._make(tuple(x) if isinstance(x, list) else x for x in numbers)
+    return Event(Kind.END, None, time, slip, point, "", 0, 0.0)
 
 
 def _samples(history: History) -> xr.Variable:
@@ -233,7 +259,7 @@ def _as_stated(scene: Scene) -> float:
     return stated + (_BEYOND / scene.load_velocity if scene.load_velocity else _USUAL)
 
 
-def _increasing(times: Any, duration: float | None) -> np.ndarray | None:
+def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray | None:
     """Times that were asked for, checked."""
     if times is None:
         return None
@@ -243,9 +269,10 @@ def _increasing(times: Any, duration: float | None) -> np.ndarray | None:
         at = np.asarray(times, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidValue("times", times, "must be numbers, in D_c/V_*") from error
-    right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= 0.0 and at[-1] > 0.0
+    right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= began and at[-1] > began
     if not right or not (np.diff(at) > 0.0).all():
-        raise InvalidValue("times", times, "must increase from 0 or later, and be finite")
+        rule = f"must increase from {began:g} or later, and be finite"
+        raise InvalidValue("times", times, rule)
     return at
 
 

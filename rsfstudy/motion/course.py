@@ -30,6 +30,7 @@ def follow(
     clock: bool = False,
     recording: Recording | None = None,
     until: float = math.inf,
+    since: Event | None = None,
 ) -> Iterator[Event]:
     """Follow a scene from the instant after its first step, for as long as the caller asks.
 
@@ -49,6 +50,8 @@ def follow(
         Takes in what the motion does, step by step.
     until : float
         Time at which to end.
+    since : Event, optional
+        End of an earlier motion of the scene, from which to go on.
 
     Yields
     ------
@@ -61,9 +64,13 @@ def follow(
         the equations end; `work_budget_spent`; or `integration_failed` where no step can be taken,
         a step has no length, or a number is not finite.
     """
+    chains: Sequence[tuple[Scene, np.ndarray]]
     chains = scene.chains if start is None else ((scene.acting(-1), FOR_EVER),)
     clock = clock or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
     time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.told
+    if since is not None:
+        chains, start = _left(scene, since)
+        time, slip = since.time, since.slip
     for number, (acting, table) in enumerate(chains):
         if start is None:
             start = starting(acting)
@@ -107,6 +114,25 @@ def follow(
         numbers[LOG_LOAD_RATE] = float(table[-1, LOG_VELOCITY])
         start, before = last.point, (last.point, tuple(numbers))
         time, slip = last.time, last.slip
+
+
+def _left(scene: Scene, since: Event) -> tuple[Sequence[tuple[Scene, np.ndarray]], Point]:
+    """The chains of segments that are left after the end of a motion, and the point to begin at:
+    behind the jump, where it ended at one.
+    """
+    first, point, left = 0, since.point, []
+    for acting, table in scene.chains:
+        number = int(np.searchsorted(table[:, BEGINS], since.time, side="right")) - 1
+        if number > 0:
+            acting = scene.acting(first + number)
+        if first and number == 0 and table[0, BEGINS] == since.time:
+            point = jumped(acting, point)
+        rest = table[max(number, 0) :].copy()
+        rest[0, BEGINS] = max(rest[0, BEGINS], since.time)
+        if rest[-1, ENDS_AT] > since.time:
+            left.append((acting, rest))
+        first += len(table)
+    return left, point
 
 
 def _up_to(table: np.ndarray, until: float) -> np.ndarray:
