@@ -12,7 +12,9 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, settling
@@ -243,7 +245,7 @@ def test_without_b_a_step_is_relaxed_as_by_the_direct_effect_alone(law, engine):
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness", "composite", "cut_off", "perrin_rice_zheng"])
-@given(b=st.floats(-3.0, 0.9))
+@given(b=st.floats(-3.0, 0.9).filter(lambda b: b == 0.0 or abs(b) > 1e-30))
 @settings(max_examples=5, deadline=None)
 def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
     """At ``mu_* + (a - b) ln(V_0/V_*)``, where the law has that; no cycle, and no critical
@@ -268,3 +270,35 @@ def test_b_of_zero_is_refused_where_stress_acts_on_the_state_by_alpha_over_b():
     with pytest.raises(InvalidValue, match=r"b_over_a = 0\.0.*alpha"):
         Scene(b_over_a=0.0, stiffness=0.02)
     assert Scene(b_over_a=0.0, alpha=0.0, stiffness=0.02).critical_stiffness == 0.0
+
+
+def test_what_has_no_meaning_at_b_of_zero_or_next_to_it_is_refused_or_answered_by_status():
+    """A stated state without effect, exponents beyond the range of numbers, and readings of an
+    evolution that is none.
+    """
+    plain = {"law": "slowness", "normal_stress": "constant", "stiffness": 0.02}
+    for fields, name in (
+        ({"b_over_a": 0.0, "initial_state": 0.005}, "initial_state"),
+        ({"b_over_a": 1e-140}, "b_over_a"),
+        ({"b_over_a": -5e-324}, "b_over_a"),
+    ):
+        with pytest.raises(InvalidValue, match=f"^{name} = "):
+            Scene(**plain, **fields)
+    accuracy = Accuracy(rtol=1e-6, engine="compiled")
+    step = Scene(**plain, b_over_a=0.0, load_velocity_ratio=2.0)
+    imposed = step.with_(normal_stress="imposed", alpha=0.0, load_velocity_ratio=1.0)
+    for measure, scene in (
+        (RigidResponse(), step),
+        (RigidResponse(), step.with_(b_over_a=1e-17)),
+        (StepResponse(), step),
+        (NormalStressTransient(), imposed.with_(stiffness=5.0, normal_stress_step=0.02)),
+    ):
+        assert measure(scene, accuracy).status is Status.NOT_APPLICABLE
+
+
+@pytest.mark.parametrize("b", [-3.0, -0.1, 0.5])
+def test_strengthening_friction_with_radiation_is_stable_within_a_usual_budget(b):
+    """The state lags on the side of b; the motion is seen to rise to the load point."""
+    fields = {"law": "slowness", "normal_stress": "constant", "radiation_damping": 0.01}
+    outcome = CriticalStep()(Scene(**fields, b_over_a=b, stiffness=0.02), Accuracy(1e-6))
+    assert outcome.status is Status.STABLE_FOR_ALL_STEPS

@@ -9,6 +9,7 @@ for faster than it grows. Both are crossed inwards, and between them ln V rises.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -54,7 +55,9 @@ def rises_to_load_point(scene: Scene, point: Point) -> bool:
         return _BEHIND * change(x, 0.0)[1]
 
     lag = point.state - steady_states_of(scene, point.log_rate, 0.0)[0]
-    if not 0.0 <= lag <= farthest(point.log_rate):
+    # it lags on the side of b
+    side = math.copysign(1.0, scene.b)
+    if not 0.0 <= side * lag <= side * farthest(point.log_rate):
         return False
     several = max(2, round(np.log(distance / _NEAREST) / _APART))
     for x in (load - np.geomspace(distance, _NEAREST, several)).tolist():
@@ -63,8 +66,8 @@ def rises_to_load_point(scene: Scene, point: Point) -> bool:
         step = _STEP * (load - x)
         slope = (farthest(x + step) - farthest(x - step)) / (2.0 * step)
         faster, behind = change(x, lag)
-        inwards = slope * faster - behind > _INWARDS * lag
-        if not (rising > 0.0 and growing > 0.0 and faster > 0.0 and inwards):
+        inwards = side * (slope * faster - behind) > _INWARDS * side * lag
+        if not (rising > 0.0 and side * growing > 0.0 and faster > 0.0 and inwards):
             return False
     return True
 

@@ -291,7 +291,8 @@ class NormalStressTransient(Reading):
         slip = record.rows[:, OBSERVED.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
-        away = -coupling[1] / scene.b * math.log(ratio)
+        # without b there is no alpha either, and nothing evolves
+        away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
         seen = friction_of(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())

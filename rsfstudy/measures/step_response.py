@@ -16,7 +16,7 @@ from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import OBSERVED, Recording, along_path
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
@@ -119,7 +119,10 @@ class StepResponse(Measure):
         for event in follow(scene, accuracy, meter, asked, clock=True, recording=recording):
             if event.kind is Kind.MAXIMUM or _tops_at_start(scene, event):
                 peaks.append(event.point.log_rate / LN10)
-            if len(peaks) == self.peaks or (peaks and event.kind is Kind.SETTLED):
+            if event.kind is Kind.SETTLED and not peaks:
+                text = "slip rate has no maximum: it changes steadily to that of the load point"
+                raise Halt(Status.NOT_APPLICABLE, text)
+            if len(peaks) == self.peaks or event.kind is Kind.SETTLED:
                 return np.array(peaks), recording.seen(scene, until=event)
         raise AssertionError("a motion never ends by itself")
 

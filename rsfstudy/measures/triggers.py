@@ -128,7 +128,8 @@ class Triggers(Measure):
         found = {trigger: _found(trigger, scene, accuracy, meter) for trigger in TRIGGERS}
         values: dict[str, float] = {}
         for trigger, outcome in found.items():
-            values |= {n: float(v) for n, v in outcome.values.items() if n in self.variables}
+            numbers = {n: float(v) for n, v in outcome.values.items() if n in self.variables}
+            values |= {n: v for n, v in numbers.items() if not math.isnan(v)}
             values[f"{trigger.headline}_status"] = float(outcome.status)
         values |= _stresses(scene, *coupling, values)
         told = [

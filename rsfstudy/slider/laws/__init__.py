@@ -175,6 +175,16 @@ class Law(LawOfStates):
                 "has no meaning where stress acts on the state variable: by alpha/b or c/b",
                 remedy="Leave alpha and stress_dependence out, or give another b_over_a.",
             )
+        if not self.b_over_a and scene.parts.slider.initial_state:
+            raise InvalidValue(
+                "initial_state",
+                scene.parts.slider.initial_state,
+                "is of a state variable that has no effect where b_over_a is 0",
+                remedy="Leave initial_state out.",
+            )
+        if 0.0 < abs(self.b_over_a) < SMALLEST:
+            rule = f"must be 0, or at least {SMALLEST:g} in size"
+            raise InvalidValue("b_over_a", self.b_over_a, rule, remedy="Give 0.")
         least = self.least_weakening
         if self.b_over_a <= least and lacks_threshold(scene):
             raise InvalidValue(
@@ -187,6 +197,8 @@ class Law(LawOfStates):
 
 #: b/a in equations that divide by b, of a state variable without effect: by far less than rounding.
 VANISHING = 1e-60
+#: The smallest b/a but 0: below it, powers and quotients of it are lost to the range of numbers.
+SMALLEST = 1e-30
 #: What to do where there is no critical stiffness.
 GIVE_STIFFNESS = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 
