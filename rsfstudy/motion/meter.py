@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rsfstudy.motion.engines import SCIPY
@@ -72,3 +72,24 @@ class Meter:
                 Status.WORK_BUDGET_SPENT,
                 f"more than {self.budget} right-hand sides without an answer",
             )
+
+
+class Account:
+    """Work of a motion in its regimes that a meter has been told of."""
+
+    def __init__(self, meter: Meter, regimes: Sequence[str]) -> None:
+        self._meter, self._regimes = meter, regimes
+        self._slow = self._fast = self._steps = self._jacobians = 0
+
+    def settle(self, slow: int, fast: int, steps: int, jacobians: int) -> int:
+        """Add what it has spent since the last time to the meter; returns what else is on that."""
+        meter = self._meter
+        before = meter.spent - self._slow - self._fast
+        if slow > self._slow:
+            meter.add(self._regimes[0], slow - self._slow)
+        if fast > self._fast:
+            meter.add(self._regimes[1], fast - self._fast)
+        meter.steps += steps - self._steps
+        meter.jacobians += jacobians - self._jacobians
+        self._slow, self._fast, self._steps, self._jacobians = slow, fast, steps, jacobians
+        return before

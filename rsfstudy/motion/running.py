@@ -18,13 +18,13 @@ from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
 from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.loop import advance
-from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
+from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Account, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, Recording
 from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.slider.equations import Equations, without_mass
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import RELIEF
+from rsfstudy.slider.places import ENDS_AT, RELIEF
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -53,7 +53,7 @@ _COLUMNS = {
     "": 0,
 }
 #: What is told beside what was asked for: the codes of these count from the end.
-_BESIDE = [(kind, None) for kind in (Kind.SEGMENT, Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
+_BESIDE = [(k, None) for k in (Kind.SEGMENT, Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
 #: Where the states of a point begin in a line of the table of events; and where the numbers of a
 #: `Point` are that come before its states, and behind them.
 _OF_STATES = layout.POINT + layout.PSIS
@@ -163,8 +163,7 @@ def chain(
     watches: Sequence[Watch],
     *,
     origin: Numbers,
-    lasts: float,
-    kinks: np.ndarray,
+    table: np.ndarray,
     told: int,
     clock: bool,
     recording: Recording | None,
@@ -178,17 +177,16 @@ def chain(
         As those of `course.follow`.
     origin : tuple of float
         Time, slip and spring stress where the first segment begins.
-    lasts : float
-        How long it lasts.
-    kinks : ndarray
-        The others, one row each (see `places`).
+    table : ndarray
+        The segments, one row each (see `places`).
     told : int
-        How many of them, the last ones, are told.
+        How many segments, the last ones, are told to begin.
     """
     plan = _planned(scene, accuracy, meter, clock=clock)
     count = max(len(system.unknowns) for system in plan.systems)
     begins = np.empty(2 * count), _columns_of(start)
-    return _events(plan, (lasts, *origin), begins, meter, watches, recording, (kinks, told))
+    lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
+    return _events(plan, (lasts, *origin), begins, meter, watches, recording, (table[1:], told))
 
 
 def path(
@@ -298,7 +296,7 @@ def _events(
     arrays = machine.passed(y, last, block)
     tables = machine.passed(asked.copy(), kinks[0], keeper.samples, events, keeper.rows)
     arguments = *arrays, called, *tables, stepper
-    run, end, account = machine.advance(), layout.HANDS_OVER, _Account(meter, regimes)
+    run, end, account = machine.advance(), layout.HANDS_OVER, Account(meter, regimes)
     while end == layout.HANDS_OVER:
         end = run(state.memory, *arguments)
         slow, fast, steps, happened, recorded, jacobians = state.says()
@@ -315,27 +313,6 @@ def _events(
         meter.check()
     if end != layout.ENDED:
         raise _halt(end, state, regimes, stepper)
-
-
-class _Account:
-    """Work of a motion in its regimes that a meter has been told of."""
-
-    def __init__(self, meter: Meter, regimes: Sequence[str]) -> None:
-        self._meter, self._regimes = meter, regimes
-        self._slow = self._fast = self._steps = self._jacobians = 0
-
-    def settle(self, slow: int, fast: int, steps: int, jacobians: int) -> int:
-        """Add what it has spent since the last time to the meter; returns what else is on that."""
-        meter = self._meter
-        before = meter.spent - self._slow - self._fast
-        if slow > self._slow:
-            meter.add(self._regimes[0], slow - self._slow)
-        if fast > self._fast:
-            meter.add(self._regimes[1], fast - self._fast)
-        meter.steps += steps - self._steps
-        meter.jacobians += jacobians - self._jacobians
-        self._slow, self._fast, self._steps, self._jacobians = slow, fast, steps, jacobians
-        return before
 
 
 class _Keeper:

@@ -73,7 +73,8 @@ class Scene(ShownAsTable):
         of your own. Stress is in units of the effective normal stress of steady sliding at V_*, so
         that pore pressure is counted from that of the surroundings, where it begins.
     dynamics, loading : type, optional
-        A class of your own in these slots, which other fields fill without it.
+        A class of your own in these slots, which other fields fill without it; or, as loading, what
+        `rsfstudy.protocol` or `rsfstudy.history` made.
     alpha : float, optional
         Strength of the normal stress effect on the state variable (not at constant normal stress;
         0.56). Zero leaves the effect out.
