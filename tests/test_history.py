@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from extensions.order_four import OrderFour
 from running import run
 
 from rsfstudy import (
@@ -26,7 +27,10 @@ from rsfstudy import (
 )
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.laws import PARTS as LAWS
 
 PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}
@@ -255,3 +259,16 @@ def test_the_files_that_ship_are_followed():
         scene = rig.scene(law="slowness", normal_stress="imposed", loading=loading)
         motion = rig.in_units(simulate(scene, rtol=1e-4, engine=COMPILED))
         assert float(motion.time[-1]) == pytest.approx(lasts)
+
+
+@pytest.mark.parametrize("method", ["Radau", "LSODA", "RK45", OrderFour])
+def test_other_steppers_follow_it_too(method):
+    """Those that cannot reach a kink in one step end there as they end a motion."""
+    scene = Scene(**PLAIN, law="slowness", loading=history(wave(12)))
+    known = told(history(wave(12)), "", law="slowness")[0, -1]
+    own = isinstance(method, type)
+    accuracy = Accuracy(1e-6, 10**6, **({"engine": method} if own else {}))
+    methods = {} if own else {"quasi_static": method}
+    meter = Meter(10**6, engine=accuracy.engine, methods=methods)
+    *_earlier, end = follow(scene, accuracy, meter, until=20.0)
+    assert scene.mu_star + end.point.spring == pytest.approx(known, abs=1e-7)
