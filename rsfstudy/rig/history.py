@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.table import Column, read_table
-from rsfstudy.slider.history import History, check_samples, sampled
+from rsfstudy.slider.history import History, sampled
 
 #: What a record may hold, and the units of the slider.
 _SCALES = {
@@ -76,11 +76,11 @@ def history(
         raise InvalidValue("record", [*found], rule)
     for key, column in found.items():
         wrong = ~np.isfinite(column.values)
-        check_samples(key, column.values, wrong, "must be a finite number", column.place)
+        _check(key, column.values, wrong, "must be a finite number", column.place)
     values = {key: _plain(key, column, laboratory) for key, column in found.items()}
     time, clock = values["time"], found["time"]
     late = np.append(False, np.diff(time) <= 0.0)
-    check_samples("time", clock.values, late, "must be later than the sample before", clock.place)
+    _check("time", clock.values, late, "must be later than the sample before", clock.place)
     velocity = _velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:
@@ -88,7 +88,7 @@ def history(
         fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
         rule = "leaves no normal stress: it must stay positive, less pore pressure"
-        check_samples(key, found[key].values, fall >= 1.0, rule, found[key].place)
+        _check(key, found[key].values, fall >= 1.0, rule, found[key].place)
     return sampled(time, velocity, fall, name)
 
 
@@ -141,10 +141,19 @@ def _velocity(values: Mapping[str, np.ndarray], found: Mapping[str, Column]) -> 
     rule = "moves the load point back: friction is that of forward slip"
     if key == "velocity":
         speeds = values[key]
-        check_samples(key, found[key].values, speeds < 0.0, rule, found[key].place)
+        _check(key, found[key].values, speeds < 0.0, rule, found[key].place)
         return np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
     steps = np.diff(values[key])
     back = np.append(False, steps < 0.0)
-    check_samples(key, found[key].values, back, rule, found[key].place)
+    _check(key, found[key].values, back, rule, found[key].place)
     speeds = steps / np.diff(time)
     return np.append(speeds, speeds[-1])
+
+
+def _check(
+    name: str, values: np.ndarray, wrong: np.ndarray, rule: str, place: Callable[[int], str]
+) -> None:
+    """Raise InvalidValue for the first sample that is wrong, with its place."""
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise InvalidValue(name, float(values[first]), rule).at(place(first))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -183,15 +183,6 @@ def of_samples(columns: np.ndarray, of_stress: bool, name: str) -> History:
     samples = np.ascontiguousarray(columns, dtype=float).tobytes()
     digest = hashlib.sha256(samples).hexdigest()[:16]
     return History(name=name, samples=samples, digest=digest, of_stress=of_stress)
-
-
-def check_samples(
-    name: str, values: np.ndarray, wrong: np.ndarray, rule: str, place: Callable[[int], str]
-) -> None:
-    """Raise InvalidValue for the first sample that is wrong, with its place."""
-    if wrong.any():
-        first = int(np.argmax(wrong))
-        raise InvalidValue(name, float(values[first]), rule).at(place(first))
 
 
 def _log(velocity: np.ndarray) -> np.ndarray:
