@@ -366,11 +366,12 @@ def test_the_command_simulates_a_rig(tmp_path):
 def test_what_options_of_a_rig_state_acts(stated, fields, tmp_path):
     words = ["simulate", *stated, "--output", tmp_path / "motion.png", "--duration", "1 s"]
     words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um"]
-    words += ["--reference-velocity", "1 um/s", "--rtol", "1e-3", "--set", "load_velocity_ratio=2"]
+    words += ["--reference-velocity", "1 um/s", "--rtol", "1e-3", "--load-velocity", "2 um/s"]
     code, said = called([str(word) for word in words])
     assert code == 0, said
     with xr.open_dataset(tmp_path / "motion.nc") as written:
         told = json.loads(written.attrs["scene"])
+    fields = {**fields, "load_velocity_ratio": 2.0}
     # sqrt(G rho)/2 = 4.5 MPa s/m, and V_*/sigma_* = 2e-13 m/s/Pa
     assert {name: told[name] for name in fields} == pytest.approx(fields, rel=1e-12)
 

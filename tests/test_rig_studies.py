@@ -6,14 +6,16 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from running import run
+from running import called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
 from rsfstudy.compute.plan import Plan, cell_key
+from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.rig import lattice
 
 STATED = {
     "normal_stress": "5 MPa",
@@ -222,6 +224,11 @@ def test_overrides_in_units():
     assert (base.normal_stress_ramp, base.ramp_duration) == pytest.approx((0.2, 2.0), rel=EXACT)
 
 
+def test_a_velocity_is_stated_once():
+    with pytest.raises(InvalidValue, match="load_velocity or load_velocity_ratio, not both"):
+        RIG.scene(load_velocity="2 um/s", load_velocity_ratio=3.0)
+
+
 @pytest.mark.parametrize(
     ("axis", "field", "rule"),
     [
@@ -339,3 +346,51 @@ def test_figures_and_tables_show_units(cycles, capsys):
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])
     assert f"{interval:.8g}" in said
+
+
+# ---- the command line ----------------------------------------------------------------------------
+
+OPTIONS = [
+    *("--normal-stress", "5 MPa"),
+    *("--slip-distance", "10 um"),
+    *("--reference-velocity", "1 um/s"),
+]
+
+
+def test_a_study_of_no_rig_is_put_on_one(tmp_path):
+    """Axes are in units then, what they hold is what they held; new values are in units."""
+    studied = catalogue.load("slide_hold_slide")
+    rig = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
+    there = lattice.on(studied, rig)
+    assert there.axes[2].units == {"hold_time": "s"}
+    for one, other in zip(studied.scenes(), there.scenes(), strict=True):
+        ours, theirs = numbers(one), numbers(other)
+        del ours["reference_rate"], theirs["reference_rate"]
+        assert ours == pytest.approx(theirs, rel=EXACT)
+
+    words = ["run", "slide_hold_slide", *OPTIONS, "--set", "case=slip law"]
+    words += ["--set", "stiffness=0.01 MPa/um", "--set", "hold_time=10 s,100 s"]
+    status, said = called([*words, "--serial", "--quiet", "--output", str(tmp_path)])
+    assert status == 0, said
+    results = rsfstudy.open(tmp_path / "slide_hold_slide.nc")
+    assert results["hold_time"].values.tolist() == [10.0, 100.0]
+    assert results["hold_time"].attrs["units"] == "s"
+    assert results["dimensionless_hold_time"].values == pytest.approx([1.0, 10.0])
+    assert float(results["dimensionless_stiffness"]) == pytest.approx(0.02)
+
+
+def test_options_of_the_rig_and_values_in_units_in_show():
+    words = ["show", "rig_recurrence", "--normal-stress", "7 MPa", "--slip-distance", "2e-5"]
+    words += ["--load-velocity", "3 um/s", "--set", "stiffness=1:10:3:log kPa/um"]
+    status, said = called(words)
+    assert status == 0
+    assert "axis sigma_star (1) 7 MPa" in said
+    assert "axis load_velocity (1) 3 um/s" in said
+    assert "axis stiffness (3) 1 kPa/um, 3.16228 kPa/um, 10 kPa/um" in said
+    assert "slip_distance = 2e-05 m" in said
+
+
+def test_a_rig_is_stated_by_three_at_least():
+    status, said = called(["show", "limit_cycles", "--normal-stress", "5 MPa"])
+    assert status == 2
+    assert "--slip-distance" in said

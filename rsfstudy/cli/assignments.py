@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.quantities import SCALES, STATED
 from rsfstudy.rig.units import number, spaced
 
 _FLAGS = {"true": True, "yes": True, "false": False, "no": False}
@@ -21,6 +23,17 @@ def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
             raise InvalidValue("--set", text, f"sets {name} twice")
         values_by_name[name] = values
     return values_by_name
+
+
+def laboratory(texts: Mapping[str, str]) -> Laboratory:
+    """The rig that options state."""
+    stated = {name: number_or_text(text) for name, text in texts.items() if name in STATED}
+    for name in SCALES:
+        if name not in stated:
+            remedy = "A rig is stated by these three at least."
+            option = f"--{name.replace('_', '-')}"
+            raise InvalidValue(option, None, "must be stated", remedy=remedy)
+    return Laboratory(**stated)
 
 
 def place(text: str) -> tuple[str, str]:
@@ -46,7 +59,7 @@ def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
             raise InvalidValue("--set", text, "leaves a value out")
         return name.strip(), [value(part) for part in parts]
     if ":" in values:
-        return name.strip(), spaced("--set", text, values.split(":"))
+        return name.strip(), spaced("--set", text, values)
     return name.strip(), value(parts[0])
 
 

@@ -152,6 +152,7 @@ def list_studies(context: click.Context) -> None:
 @options.settings
 @options.rtol
 @options.output
+@options.rig
 def show(**given: Any) -> int:
     """Show a study before it is run, or what is in a results file.
 
@@ -189,6 +190,7 @@ def show(**given: Any) -> int:
 @options.figure
 @options.style
 @options.quiet
+@options.rig
 def run(**given: Any) -> int:
     """Run a study: results, figure, slopes and claims.
 

@@ -11,26 +11,6 @@ from rsfstudy.cli import options
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
 
-#: What a laboratory may state, and an example of it.
-_RIG = {
-    "normal_stress": "5 MPa",
-    "slip_distance": "10 um",
-    "reference_velocity": "1 um/s",
-    "stiffness": "0.1 MPa/um",
-    "period": "10 ms",
-    "mass": "1e4 kg/m^2",
-    "shear_modulus": "30 GPa",
-    "density": "2700 kg/m^3",
-}
-
-
-def _of_rig(command: Any) -> Any:
-    """The options that state a laboratory."""
-    for name, example in reversed(_RIG.items()):
-        words = f"Of the rig, as in '{example}'; a plain number is in SI units."
-        command = click.option(f"--{name.replace('_', '-')}", name, help=words)(command)
-    return command
-
 
 @click.command()
 @click.option(
@@ -48,7 +28,7 @@ def _of_rig(command: Any) -> Any:
 )
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
 @options.against
-@_of_rig
+@options.rig
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")
 @click.option(
     "--budget",

@@ -8,7 +8,7 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import xarray as xr
 from rsfstudy.api import exchange, runs
 from rsfstudy.cli import assignments, commands_simulate, terminal, terminal_numbers
 from rsfstudy.cli.console import console, stderr
+from rsfstudy.cli.options import RIG
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
@@ -29,21 +30,27 @@ from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.motion.engines import lacking
+from rsfstudy.rig import lattice
+from rsfstudy.rig.quantities import STATED
+from rsfstudy.rig.units import number
 
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 _RESULTS = (".nc", ".zarr")
 
 
-def show(name: str, settings: tuple[str, ...], rtol: float | None, output: Path) -> int:
+def show(
+    name: str, settings: tuple[str, ...], rtol: float | None, output: Path, **rig: str | None
+) -> int:
     """Show a study, or a results file."""
     if Path(name).suffix in _RESULTS:
-        if settings or rtol is not None:
-            raise click.UsageError("a results file is shown as it is, without --set or --rtol")
+        if settings or rtol is not None or any(rig.values()):
+            text = "a results file is shown as it is, without --set, --rtol or a rig"
+            raise click.UsageError(text)
         dataset = store.read_any(Path(name))
         if contents.is_of_a_scene(dataset):
             return commands_simulate.show(dataset)
         return terminal.results(dataset, name)
-    terminal.declaration(_declared(catalogue.load(name), settings, rtol=rtol), output)
+    terminal.declaration(_declared(catalogue.load(name), settings, rig, rtol=rtol), output)
     return OK
 
 
@@ -65,9 +72,10 @@ def run(
     **choices: Any,
 ) -> int:
     """Run a study, or all."""
+    rig = {option: choices.pop(option, None) for option in RIG}
     names = _results(name, every)
     studies = [
-        _declared(catalogue.load(n), settings, rtol=rtol, engine=engine, budget=budget)
+        _declared(catalogue.load(n), settings, rig, rtol=rtol, engine=engine, budget=budget)
         for n in names
     ]
     left_out = _left_out(studies) if every and engine is None else []
@@ -280,8 +288,19 @@ def _results(name: str | None, every: bool) -> list[str]:
     return list(names.names()) if name is None else [name]
 
 
-def _declared(study: Study, settings: tuple[str, ...], **accuracy: Any) -> Study:
-    return runs.declaration(study, assignments.overrides(study, settings), **accuracy)
+def _declared(
+    study: Study, settings: tuple[str, ...], rig: Mapping[str, str | None], **accuracy: Any
+) -> Study:
+    """A study with the values that options set, on the rig that they state."""
+    stated = {name: text for name, text in rig.items() if text is not None}
+    if {*stated} - {"load_velocity"} and study.laboratory is None:
+        study = lattice.on(study, assignments.laboratory(stated))
+        study = replace(study, overrides={**study.overrides, **stated})
+        stated = {name: text for name, text in stated.items() if name == "load_velocity"}
+    in_si = {"load_velocity": "m/s", **{name: units for name, (units, *_) in STATED.items()}}
+    texts = {n: t if number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
+    changes = texts | assignments.overrides(study, settings)
+    return runs.declaration(study, changes, **accuracy)
 
 
 @contextlib.contextmanager

@@ -29,7 +29,6 @@ from rsfstudy.status import Status
 _NO_PHYSICS = 3
 #: Units of the rig in what is printed.
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
-_AT_LEAST = ("normal_stress", "slip_distance", "reference_velocity")
 
 
 def simulate(
@@ -47,8 +46,12 @@ def simulate(
     if output.suffix not in (".png", ".pdf", ".svg"):
         raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
     _check_replaceable(output.with_suffix(".nc"))
-    laboratory = _laboratory(rig)
-    scene = _scene(_fields(settings), protocol_file, laboratory)
+    fields, velocity = _fields(settings), rig.pop("load_velocity")
+    stated = {name: text for name, text in rig.items() if text is not None}
+    laboratory = assignments.laboratory(stated) if stated else None
+    if velocity is not None:
+        fields["load_velocity"] = assignments.number_or_text(velocity)
+    scene = _scene(fields, protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
     motion = motion.assign_attrs(provenance.attributes(shlex.join(["rsfstudy", *sys.argv[1:]])))
@@ -70,18 +73,6 @@ def _check_replaceable(data: Path) -> None:
         pass  # whatever it is, it is no motion
     remedy = "Choose another --output, or move it away first."
     raise InvalidValue("--output", str(data), "is there already, and no motion", remedy=remedy)
-
-
-def _laboratory(rig: dict[str, str | None]) -> Laboratory | None:
-    """The rig that the options state, if they state one."""
-    texts = {name: text for name, text in rig.items() if text is not None}
-    stated = {name: assignments.number_or_text(text) for name, text in texts.items()}
-    for name in _AT_LEAST if stated else ():
-        if name not in stated:
-            remedy = "A rig is stated by these three at least."
-            option = f"--{name.replace('_', '-')}"
-            raise InvalidValue(option, None, "must be stated", remedy=remedy)
-    return Laboratory(**stated) if stated else None
 
 
 def _scene(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -39,7 +40,8 @@ settings = click.option(
     "settings",
     multiple=True,
     metavar="AXIS=VALUES",
-    help="Other values: a comma list, start:stop:count or start:stop:count:log.",
+    help="Other values: a comma list, start:stop:count or start:stop:count:log; of a rig with "
+    "units, as in hold_time='10 s,100 s'.",
 )
 rtol = click.option(
     "--rtol",
@@ -119,3 +121,25 @@ figure = click.option(
     type=click.Choice(FIGURES),
     help="File format of figures.  [default: png]",
 )
+
+
+#: What a laboratory may state, and an example of it.
+RIG = {
+    "normal_stress": "5 MPa",
+    "slip_distance": "10 um",
+    "reference_velocity": "1 um/s",
+    "stiffness": "0.1 MPa/um",
+    "period": "10 ms",
+    "mass": "1e4 kg/m^2",
+    "shear_modulus": "30 GPa",
+    "density": "2700 kg/m^3",
+    "load_velocity": "10 um/s",
+}
+
+
+def rig(command: Any) -> Any:
+    """The options that state a laboratory."""
+    for name, example in reversed(RIG.items()):
+        words = f"Of the rig, as in '{example}'; a plain number is in SI units."
+        command = click.option(f"--{name.replace('_', '-')}", name, help=words)(command)
+    return command

@@ -108,6 +108,9 @@ class Laboratory:
             `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
             units. ``inertia=False`` leaves out the mass that the rig states.
         """
+        for name in FULL.keys() & fields.keys():
+            if FULL[name] in fields:
+                raise InvalidValue(name, fields[name], f"give {name} or {FULL[name]}, not both")
         fields = {FULL.get(n, n): self._field(FULL.get(n, n), v) for n, v in fields.items()}
         return Scene(**of_scene(self.as_dict()) | fields)
 

@@ -58,9 +58,7 @@ def axis(dimension: str, values: Any, units: str = "") -> Axis:
     if isinstance(values, Mapping):
         return _zipped(Axis(dimension, values))
     if isinstance(values, str) and ":" in values:
-        spacing, _, written = values.strip().partition(" ")
-        numbers = spaced(dimension, values, spacing.split(":"))
-        values = [f"{number!r} {written}" for number in numbers] if written.strip() else numbers
+        values = spaced(dimension, values, values)
     listed = [values] if isinstance(values, str) else values
     if not is_list(listed) or not len(listed):
         return Axis(dimension, values)
@@ -245,8 +243,7 @@ class Cells:
         held = {
             name: value * (base[FIELDS[name].scale] / here[FIELDS[name].scale])
             for name, value in self.base.as_dict().items()
-            if isinstance(value, float) and name in FIELDS and FIELDS[name].scale
-            if not name.endswith("_ratio") and value != 0.0
+            if _is_scaled(name) and isinstance(value, float) and value != 0.0
         }
         if "radiation_damping" in held:  # eta is held: its stress goes with V_*
             held["radiation_damping"] = held["radiation_damping"] * (here["V_*"] / base["V_*"])
@@ -313,6 +310,33 @@ def _squeezed(along: Sequence[Axis], values: np.ndarray) -> tuple[tuple[str, ...
         else:
             kept.insert(0, axis.dimension)
     return tuple(kept), values
+
+
+# ---- other rigs ----------------------------------------------------------------------------------
+
+
+def on(study: Study, laboratory: Laboratory) -> Study:
+    """A study of no rig on a rig: what its axes and its base hold without dimension is turned into
+    SI units, and what the rig states takes the place of theirs.
+    """
+    scales_ = _scales(laboratory.as_dict())
+    axes = []
+    for along in study.axes:
+        sizes = {n: scales_[FIELDS[n].scale] for n in along.fields if _is_scaled(n)}
+        rows = [
+            {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
+            for row in along.rows
+        ]
+        values = [row.get(along.dimension) for row in rows]
+        points = dict(zip(along.labels, rows, strict=True)) if along.labels else values
+        units = {n: UNITS[FIELDS[n].scale] for n in sizes}
+        axes.append(Axis(along.dimension, points, units))
+    base = study.base.with_(**of_scene(laboratory.as_dict()))
+    return replace(study, laboratory=laboratory, base=base, axes=axes)
+
+
+def _is_scaled(name: str) -> bool:
+    return name in FIELDS and bool(FIELDS[name].scale) and not name.endswith("_ratio")
 
 
 # ---- other values --------------------------------------------------------------------------------

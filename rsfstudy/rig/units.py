@@ -67,15 +67,23 @@ def parted(text: str) -> tuple[float | None, str]:
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
-def spaced(name: str, text: str, parts: Sequence[str]) -> list[float]:
-    """Numbers by their first, their last, how many there are and, perhaps, ``log``.
+def spaced(name: str, text: str, values: str) -> list[float] | list[str]:
+    """Numbers by their first, their last, how many there are and, perhaps, ``log``; with their
+    units, where such follow.
 
     Parameters
     ----------
     name, text : str
         What errors name.
-    parts : sequence of str
+    values : str
     """
+    *before, last = values.split(":")
+    last, _, units = last.strip().partition(" ")
+    found = _numbers(name, text, [*before, last])
+    return [f"{number!r} {units.strip()}" for number in found] if units.strip() else found
+
+
+def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
     spacing = parts[3].strip().lower() if len(parts) == 4 else ""
     if len(parts) not in (3, 4) or spacing not in ("", "log"):
         raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
