@@ -469,3 +469,20 @@ def test_names_of_others_are_answered_by_one_line(name: str, remedy: str) -> Non
         study.with_(**{name: 1.0})
     with pytest.raises(InvalidValue, match=remedy):
         Study(**about, axes=[Axis(name, [1.0])])
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({}, "constant"),
+        ({"hold_time": "10 s"}, "constant"),
+        ({"normal_stress_step": "1 MPa"}, "imposed"),
+        ({"alpha": 0.3}, "imposed"),
+        ({"phi": 50.0}, "variable"),
+        ({"normal_stress": "variable"}, "variable"),
+    ],
+)
+def test_a_rig_starts_from_constant_normal_stress(fields, expected):
+    assert RIG.scene(**fields).normal_stress == expected
+    with pytest.raises(InvalidValue, match="a = -1"):
+        RIG.scene(a=-1.0, **fields)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.wording import listed
@@ -42,7 +43,7 @@ def study_html(
     varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
     shared = registry.shown(fixed, base.own_parts)
-    along = [described(quantity(a.dimension, known), _along(a)) for a in axes]
+    along = [described(_about(a, known), _along(a)) for a in axes]
     measured = [quantity(name, known) for name in measure.variables]
     numbers = [(q.name, symbol(q.symbol), unit(q), q.long_name) for q in measured]
     return (
@@ -53,6 +54,12 @@ def study_html(
             table([heading for heading in HEADINGS if heading != "value"], numbers),
         )
     )
+
+
+def _about(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
+    """The quantity along an axis, without symbol and scale where the axis is in units."""
+    about, units = quantity(axis.dimension, known), axis.units.get(axis.dimension)
+    return about if units is None else replace(about, symbol="", units=units, scale="")
 
 
 def _along(axis: Axis) -> str:

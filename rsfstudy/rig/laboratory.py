@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -106,13 +107,18 @@ class Laboratory:
         **fields
             Those of `Scene`. One that is measured in a unit of the slider (`hold_time`,
             `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
-            units. ``inertia=False`` leaves out the mass that the rig states.
+            units. ``inertia=False`` leaves out the mass that the rig states. Normal stress is
+            constant, or imposed where the loading changes it, unless a field says otherwise.
         """
         for name in FULL.keys() & fields.keys():
             if FULL[name] in fields:
                 raise InvalidValue(name, fields[name], f"give {name} or {FULL[name]}, not both")
         fields = {FULL.get(n, n): self._field(FULL.get(n, n), v) for n, v in fields.items()}
-        return Scene(**of_scene(self.as_dict()) | fields)
+        fields = {**of_scene(self.as_dict()), **fields}
+        for simplest in ("constant", "imposed") if "normal_stress" not in fields else ():
+            with contextlib.suppress(InvalidValue):
+                return Scene(normal_stress=simplest, **fields)
+        return Scene(**fields)
 
     def axis(self, dimension: str, values: Any) -> Axis:
         """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.lattice.axis`.
