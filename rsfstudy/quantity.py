@@ -32,6 +32,8 @@ class Quantity:
         A phrase that stands alone.
     scale : str
         What a dimensionless quantity is measured in: multiply by this to return to SI.
+    flags : tuple of str
+        What 0, 1, 2 and so on mean, of a number that stands for a word.
     """
 
     name: str
@@ -39,6 +41,13 @@ class Quantity:
     units: str
     long_name: str
     scale: str = ""
+    flags: tuple[str, ...] = ()
+
+    @property
+    def flag_attributes(self) -> dict[str, Any]:
+        """The CF attributes that say what its values mean; none of a plain number."""
+        values = [float(number) for number in range(len(self.flags))]
+        return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
 
 
 @dataclass(frozen=True)

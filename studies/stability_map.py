@@ -1,5 +1,5 @@
-"""Maps of limit cycles over stiffness and load point velocity: where steady sliding, slow
-oscillation and stick-slip lie.
+"""Maps of limit cycles over stiffness and load point velocity: where steady sliding, damped
+oscillation, slow slip and stick-slip lie.
 """
 
 import math
@@ -16,7 +16,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
@@ -179,8 +179,11 @@ def _scene(values: Mapping[str, Any]) -> Scene:
 
 PLANE = ("stiffness_ratio", "load_velocity_ratio")
 PEAK = "max_log10_slip_rate"
-#: Stiffness ratio from which on the edge is shown enlarged.
-CLOSE = 0.8
+#: Stiffness ratios between which the edge is shown enlarged.
+CLOSE, CLOSE_BELOW = 0.8, 1.1
+#: Springs on both sides of where oscillation about steady sliding ends: at constant normal stress,
+#: where (k - k_cr)^2 = 4 a k, 5.83 k_cr for b = 2a.
+STIFF = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
 def is_beyond(softest: float, dataset: xr.Dataset) -> bool:
@@ -193,38 +196,42 @@ def mark_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
     """Peak slip rate from a stiffness on, with the linear boundary of steady sliding."""
     from rsfstudy.plots.maps import draw_map
 
-    stiffer = dataset["stiffness_ratio"] > softest
-    case = dataset.isel(stiffness_ratio=np.flatnonzero(stiffer)).transpose(*PLANE, ...)
+    ratio = dataset["stiffness_ratio"]
+    shown = (ratio > softest) & (ratio < CLOSE_BELOW) if softest else ratio > softest
+    case = dataset.isel(stiffness_ratio=np.flatnonzero(shown)).transpose(*PLANE, ...)
     draw_map(PEAK, PLANE, None, case, axes)
+    if not softest:  # the outermost cells may reach below zero
+        axes.set_ylim(float(ratio.min()), float(ratio.max()))
+        axes.set_yscale("log")
     axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
     if "cycling_edge_linear" in case:
         orange = {"color": "#D55E00", "linewidth": 1.3, "label": "linear boundary"}
         axes.plot(case["load_velocity_ratio"], case["cycling_edge_linear"], "-", **orange)
-    name_regimes(case, axes)
+    name_modes(case, axes)
 
 
-def name_regimes(case: xr.Dataset, axes: Axes) -> None:
-    """The peak slip rate at which the instability norm is reached, and names of the regimes."""
-    inertial_time = float(case["period"]) * float(case["reference_rate"]) / (2.0 * math.pi)
-    norm = math.log10(float(case["instability_norm"]) / inertial_time)
-    peak, (low, high) = case[PEAK], axes.get_ylim()
+def name_modes(case: xr.Dataset, axes: Axes) -> None:
+    """The bounds of the slip modes, and their names."""
     x, y = case["load_velocity_ratio"].values, case["stiffness_ratio"].values
-    if min(peak.shape) > 1 and float(peak.min()) < norm < float(peak.max()):
-        lines = axes.contour(x, y, peak, [norm], colors="black", linewidths=1.0, linestyles="--")
-        axes.clabel(lines, fmt="norm", fontsize=6)
-    regimes = {
-        "steady sliding": (case["status"] == Status.NO_LIMIT_CYCLE).values,
-        "slow oscillation": (peak < norm).values,
-        "stick-slip": (peak >= norm).values,
-    }
-    margin = 0.06 * (high - low)
+    # heights in parts of the panel, on any scale
+    to_panel = axes.transData + axes.transAxes.inverted()
+    heights = to_panel.transform(np.column_stack([np.full(len(y), x[0]), y]))[:, 1]
     box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0}
-    for name, here in regimes.items():
+    for mode, name in enumerate(SLIP_MODES):
+        here = (case["slip_mode"] == mode).values
+        if not here.any():
+            continue
+        if min(here.shape) > 1 and not here.all():
+            axes.contour(x, y, here, [0.5], colors="black", linewidths=0.8, linestyles="--")
         rows, columns = np.nonzero(here)
-        if rows.size > 0.02 * peak.size and np.ptp(y[rows]) > 2.0 * margin:
-            inside = low + margin, high - margin
-            middle = float(np.median(x[columns])), float(np.clip(np.median(y[rows]), *inside))
-            axes.text(*middle, name, bbox=box, ha="center", va="center", fontsize=6)
+        if rows.size > 0.02 * here.size and np.ptp(heights[rows]) > 0.08:
+            column = int(np.median(columns))
+            ends = heights[rows[np.abs(columns - column) == np.abs(columns - column).min()]]
+            middle = float(x[column]), float(np.clip(0.5 * (ends.min() + ends.max()), 0.06, 0.94))
+            words, where = name.replace("_", " "), axes.get_xaxis_transform()
+            axes.text(
+                *middle, words, transform=where, bbox=box, ha="center", va="center", fontsize=6
+            )
 
 
 def title(softest: float, case: xr.Dataset) -> str:
@@ -284,10 +291,12 @@ study = Study(
     summary=(
         "What a slider does in the end whose load point steps from V_* to V_0: it slides steadily "
         "where linear theory calls that stable, and cycles everywhere else. Cycles whose peak "
-        "slip rate stays below the instability norm are slow oscillation, those that reach it "
-        "stick-slip. The critical stiffness at V_0, from the eigenvalues of steady sliding, "
+        "slip rate stays below the instability norm are slow slip, those that reach it "
+        "stick-slip; motions that settle do so by a damped oscillation where the eigenvalues are "
+        "a complex pair, up to some six times the critical stiffness (slip_mode). The critical "
+        "stiffness at V_0, from the eigenvalues of steady sliding, "
         "bounds the cycling region in every column of the map; at variable normal stress it "
-        "falls with V_0, and slow oscillation lies in a narrow band below, while at constant "
+        "falls with V_0, and slow slip lies in a narrow band below, while at constant "
         "normal stress stick-slip reaches up to the boundary. Beside it cycles are approached "
         "slowly, over thousands of events, and small errors of a step move them far: motions "
         "are integrated 300 times more tightly than their numbers are asked for."
@@ -296,7 +305,7 @@ study = Study(
     axes=[
         Axis("law", ["slip", "slowness"]),
         Axis("normal_stress", ["constant", "variable"]),
-        Axis("stiffness_ratio", np.linspace(0.05, 1.05, 100)),
+        Axis("stiffness_ratio", [*np.linspace(0.05, 1.05, 100), *STIFF]),
         Axis("load_velocity_ratio", np.geomspace(1.01, 1000.0, 100)),
     ],
     measure=LimitCycle(phases=2, events=20_000),

@@ -86,7 +86,7 @@ ENOUGH = {
     "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},
     "slide_hold_slide": {"hold_time": [1.0, 1e4, 1e5, 1e6, 1e7, 1e8]},
     "stability_map": {
-        "stiffness_ratio": [0.2, 0.6, 0.8, 0.87, 0.96, 1.04],
+        "stiffness_ratio": [0.2, 0.6, 0.8, 0.87, 0.96, 1.04, 3.0, 8.0],
         "load_velocity_ratio": np.geomspace(1.01, 1000.0, 5),
     },
     "stress_drop": {

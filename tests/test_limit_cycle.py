@@ -4,6 +4,7 @@ published numbers.
 
 import functools
 import math
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -318,3 +319,43 @@ def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known)
     )
     assert found.status is Status.OK, found.message
     assert math.isfinite(found.values["healing_exponent"]) is known
+
+
+@pytest.mark.parametrize(
+    ("changes", "mode"),
+    [
+        # peaks at 10^4.4 and 10^3.3 V_*, on both sides of a/eta = 10^4.16
+        ({"radiation_damping": 1e-6, "stiffness_ratio": 0.9}, "stick_slip"),
+        ({"radiation_damping": 1e-6, "stiffness_ratio": 0.99}, "slow_slip"),
+        ({"inertia": True, "stiffness_ratio": 0.9}, "stick_slip"),
+        (
+            {"radiation_damping": 0.0, "inertia": True, "stiffness_ratio": 1.05},
+            "damped_oscillation",
+        ),
+        # p^2 + (k - 1) p + k = 0 in units of a, whose roots are complex below 3 + sqrt 8 = 5.83
+        ({"stiffness_ratio": 5.75}, "damped_oscillation"),
+        ({"stiffness_ratio": 5.9}, "steady"),
+    ],
+)
+def test_slip_modes(changes, mode):
+    scene = Scene(law="slowness", normal_stress="constant", b_over_a=2.0, load_velocity_ratio=2.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NoAnswer)
+        found = rsfstudy.limit_cycle(scene.with_(**changes), rtol=1e-4, engine="compiled").slip_mode
+    meanings = found.attrs["flag_meanings"].split()
+    assert found.attrs["flag_values"] == [0.0, 1.0, 2.0, 3.0]
+    assert meanings[int(found)] == mode
+
+
+def test_a_slow_peak_is_slow_by_the_norm_where_nothing_radiates():
+    """The norm is V T/(2 pi D_c), so the mode turns with the period that the scene states."""
+    scene = Scene(law="slowness", normal_stress="constant", stiffness_ratio=0.9, inertia=True,
+                  load_velocity_ratio=2.0)  # fmt: skip
+    cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
+    fastest = 10.0 ** float(cycle.max_log10_slip_rate)
+    for share, mode in ((0.5, 3.0), (2.0, 2.0)):
+        norm = share * fastest * scene.inertial_time
+        again = rsfstudy.limit_cycle(
+            scene.with_(instability_norm=norm), rtol=1e-4, engine="compiled"
+        )
+        assert float(again.slip_mode) == mode

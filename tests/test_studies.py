@@ -22,7 +22,7 @@ from rsfstudy import plots, vocabulary
 from rsfstudy.declare import catalogue, names
 from rsfstudy.status import Status
 
-FLAGS = {"status", "regime", "inertia", "regularised"}
+FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
 @pytest.fixture(scope="module", params=names.names())

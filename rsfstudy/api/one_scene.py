@@ -202,7 +202,8 @@ def _blank(measure: Measure) -> xr.Dataset:
         about = quantity(name, own)
         attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
         missing = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = (dims, missing, {k: v for k, v in attrs.items() if v})
+        attrs = {k: v for k, v in attrs.items() if v} | about.flag_attributes
+        variables[name] = (dims, missing, attrs)
     variables["rhs_evaluations"] = ((), 0)
     rate = ((), math.nan, {"units": "s-1"})
     return xr.Dataset(variables, coords={**inner, "reference_rate": rate})

@@ -157,6 +157,7 @@ def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[st
         attrs["units"] = about.units
     if about.scale:
         attrs["scale"] = about.scale
+    attrs |= about.flag_attributes
     if isinstance(value, bool):
         attrs |= {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "false true"}
     return attrs

@@ -36,6 +36,7 @@ from rsfstudy.motion.recording import OBSERVED, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
@@ -59,6 +60,10 @@ PEAK = 4
 
 #: How many events a motion takes to repeat itself.
 PERIOD = Output("period_events", "", "1", "number of events after which a motion repeats itself")
+#: What a slider does in the end: it slides steadily, which it comes to without or with oscillation,
+#: or it cycles, with a slower or a faster peak than what `LimitCycle` says.
+SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
+_STEADY, _DAMPED, _SLOW, _STICK_SLIP = map(float, range(len(SLIP_MODES)))
 _OUTPUTS = (
     *(Output(name, error=True) for name in _HEADLINES),
     Output("slip_per_event"),
@@ -78,6 +83,13 @@ _OUTPUTS = (
     PERIOD,
     Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
+    Output(
+        "slip_mode",
+        "",
+        "",
+        "what the slider does in the end, by its peak slip rate",
+        flags=SLIP_MODES,
+    ),
     *recorded(*OBSERVED),
 )
 
@@ -89,6 +101,11 @@ class LimitCycle(Measure):
     Where a motion of several states repeats itself after `period_events` events only, the numbers
     are those of the event with the fastest peak, from one maximum of spring stress to the next;
     where it never does, it ends as `not_periodic`, and the message tells the range of its events.
+
+    `slip_mode` is stick-slip where the peak slip rate reaches a sigma_*/eta with radiation damping,
+    at which waves take as much of a change of stress as the direct effect, else where it reaches
+    the instability norm; slow slip below. A motion that settles does so by a damped oscillation
+    where the eigenvalues of steady sliding that decay last are a complex pair, else steadily.
 
     Parameters
     ----------
@@ -140,7 +157,7 @@ class LimitCycle(Measure):
                 outcome = self._closed(scene, accuracy, meter, approach.orbit, len(approach.seen))
                 if outcome.status is not Status.UNVERIFIED:
                     return outcome
-        return outcome if found else SETTLES
+        return outcome if found else settled(scene)
 
     def _of_several_states(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events loosely up to a cycle of any period that attracts, and close it from its
@@ -148,7 +165,7 @@ class LimitCycle(Measure):
         """
         came = course(scene, replace(accuracy, rtol=max(accuracy.rtol, _LOW)), meter, self.events)
         if came is None:
-            return SETTLES
+            return settled(scene)
         if came.orbit is None:
             return without_period(scene, came, more_events(self.events))
         return self._closed(scene, accuracy, meter, came.orbit.from_largest, len(came.seen))
@@ -173,6 +190,7 @@ class LimitCycle(Measure):
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
         values |= _properties(scene, cycle)
+        values["slip_mode"] = _mode(scene, LN10 * float(one.numbers[PEAK]))
         values["period_events"] = float(one.period)
         values["events_until_repeat"] = float(events)
         values["work_per_cycle"] = one.work / one.period
@@ -181,6 +199,22 @@ class LimitCycle(Measure):
 
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+
+
+def settled(scene: Scene) -> Outcome:
+    """The outcome of a motion that comes to steady sliding: with an oscillation or without."""
+    try:
+        last = growth_rates(scene, scene.log_load_rate)[0]
+    except ValueError:  # there is none in closed form
+        return SETTLES
+    return replace(SETTLES, values={"slip_mode": _DAMPED if last.imag else _STEADY})
+
+
+def _mode(scene: Scene, log_peak: float) -> float:
+    """Slow slip or stick-slip, by the peak of ln V."""
+    damping = scene.parts.dynamics.damping(0.0)
+    limit = math.log(scene.a / damping) if damping else scene.log_norm_rate
+    return _STICK_SLIP if log_peak >= limit else _SLOW
 
 
 def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
