@@ -171,7 +171,7 @@ class Accessor:
         InvalidValue
             For a slip rate that is not positive and finite.
         """
-        from rsfstudy.api.events import of_motion
+        from rsfstudy.api.motion_events import of_motion
 
         if self._is_study:
             raise DataError("the dataset is of a study: events are told of a motion of one scene")
