@@ -2,7 +2,6 @@
 oscillation, slow slip and stick-slip lie.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
