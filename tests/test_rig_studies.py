@@ -224,6 +224,14 @@ def test_overrides_in_units():
     assert (base.normal_stress_ramp, base.ramp_duration) == pytest.approx((0.2, 2.0), rel=EXACT)
 
 
+def test_units_without_a_rig_are_answered_by_the_rig():
+    with pytest.raises(InvalidValue, match=r"must be a number. .*rsfstudy.Laboratory"):
+        Scene(hold_time="10 s")
+    status, said = called(["show", "slide_hold_slide", "--set", "hold_time=10 s,100 s"])
+    assert status == 2
+    assert "Units are those of a rig" in said
+
+
 def test_a_velocity_is_stated_once():
     with pytest.raises(InvalidValue, match="load_velocity or load_velocity_ratio, not both"):
         RIG.scene(load_velocity="2 um/s", load_velocity_ratio=3.0)

@@ -68,12 +68,17 @@ class Axis:
         object.__setattr__(self, "dimension", dimension)
         object.__setattr__(self, "rows", rows)
         object.__setattr__(self, "labels", labels)
-        object.__setattr__(self, "units", dict(units or {}))
+        object.__setattr__(self, "units", {} if units is None else units)
         self._check()
 
     def _check(self) -> None:
         if not self.rows:
             raise InvalidValue("axis", self.dimension, "has no values")
+        if not isinstance(self.units, Mapping) or not set(self.units) <= set(self.fields):
+            rule = "must map fields of the axis to their units"
+            raise InvalidValue("units", self.units, rule, choices=self.fields)
+        for name, text in self.units.items():
+            check_text(name, text)
         for row in self.rows:
             for name, value in row.items():
                 if not isinstance(value, float | str | bool | None):

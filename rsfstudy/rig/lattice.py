@@ -11,6 +11,7 @@ import numpy as np
 
 from rsfstudy.declare.axis import Axis, Row, alike, is_list, plain, spread
 from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import (
     FIELDS,
     FULL,
@@ -55,6 +56,8 @@ def axis(dimension: str, values: Any, units: str = "") -> Axis:
     InvalidValue
         For a value that is no quantity, of another kind, or of a rig and not positive.
     """
+    if not is_name(dimension):
+        return Axis(dimension, values)  # which refuses it
     if isinstance(values, Mapping):
         return _zipped(Axis(dimension, values))
     if isinstance(values, str) and ":" in values:
@@ -128,6 +131,8 @@ def _name(name: str, value: Any) -> str:
     quantity = not isinstance(value, str) or parted(value)[0] is not None
     if name in ON_AXIS and quantity:
         return ON_AXIS[name]
+    if not is_name(name):
+        return name  # which a scene refuses
     short = name.removesuffix("_ratio")
     return short if FULL.get(short) == name and units_of(name, value) else name
 
@@ -210,7 +215,8 @@ class Cells:
         for name in OF_AXIS:
             if name in units and row.get(name) is not None:
                 found[OF_AXIS[name]] = row[name] * _size(name, units[name])
-        if row.get("stiffness") is not None and is_friction(f"1 {units['stiffness']}"):
+        in_friction = is_friction(f"1 {units.get('stiffness', '')}")
+        if row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
         check_together(found)
         return found

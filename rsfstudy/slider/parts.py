@@ -172,7 +172,9 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
             raise InvalidValue(name, value, rule)
         return bool(value)
     if flagged or not isinstance(value, Real):
-        raise InvalidValue(name, value, "must be a number")
+        has_units = isinstance(value, str) and value.strip()[:1].isdigit()
+        remedy = "Units are those of a rig: state it, as rsfstudy.Laboratory." * has_units
+        raise InvalidValue(name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)
     except OverflowError:
