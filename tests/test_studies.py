@@ -52,6 +52,7 @@ def test_every_verdict_is_the_expected_one(result):
 #: Claims that are given more room than `called_for`, and why.
 WIDE = {
     "accuracy_cost A1": "what a user can plan with, not what integrators happen to do",
+    "coverage T3": "two standard errors of a median",
     "dilatancy D1": "eight decimals are given",
     "dilatancy D3": "truncation of differences, which is not the same at every place",
     "displacement_boundary C10": "the paper says 'a few percents'",

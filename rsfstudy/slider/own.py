@@ -141,7 +141,8 @@ def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, t
         raise InvalidValue(_field_of(part), name, rule)
     owner = owners.get(name)
     if owner is not None:
-        same = stated.metadata == owner.__dataclass_fields__[name].metadata
+        # a part of one's own may rule out more
+        same = stated.metadata["about"] == owner.__dataclass_fields__[name].metadata["about"]
         if not same or owner not in slot.choices.values():
             common = name in slot.base.__dataclass_fields__
             raise _taken(part, name, f"every {slot.long_name}" if common else owner.name)
