@@ -230,7 +230,8 @@ def fields_with(parts: Iterable[Own]) -> tuple[str, ...]:
         names[slot_of(kind).name] = None
         for name in names_of(kind):
             field_, names[name] = kind.__dataclass_fields__[name], None
-            if stated.setdefault(name, field_).metadata != field_.metadata:
+            known = stated.setdefault(name, field_).metadata
+            if known["about"] != field_.metadata["about"]:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", name, rule)
     return tuple(names)
