@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rsfstudy.api.events import events
+    from rsfstudy.api.fitting import fit
     from rsfstudy.api.one_scene import critical_step, limit_cycle, to_si
     from rsfstudy.api.runs import cell, check, compare, open, plot, rerun, run, studies
     from rsfstudy.api.trajectory import simulate
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rsfstudy.rig.history import history
     from rsfstudy.rig.laboratory import Laboratory
     from rsfstudy.rig.protocol_file import read_protocol
+    from rsfstudy.rig.records import read_record
     from rsfstudy.rig.table import read_table
     from rsfstudy.slider.loading import Segment
     from rsfstudy.slider.protocol import protocol
@@ -33,7 +35,9 @@ _HOMES = {
     "protocol": "slider.protocol",
     "Laboratory": "rig.laboratory",
     "read_protocol": "rig.protocol_file",
+    "read_record": "rig.records",
     "read_table": "rig.table",
+    "fit": "api.fitting",
     "history": "rig.history",
     "picture": "plots._motion",
     "Study": "declare.study",
@@ -64,6 +68,7 @@ __all__ = [
     "compare",
     "critical_step",
     "events",
+    "fit",
     "history",
     "limit_cycle",
     "open",
@@ -71,6 +76,7 @@ __all__ = [
     "plot",
     "protocol",
     "read_protocol",
+    "read_record",
     "read_table",
     "rerun",
     "run",

@@ -39,6 +39,8 @@ class Status(IntEnum):
         "the motion repeats itself after none of up to 16 events, or 4 periods of forcing",
     )
 
+    NOT_IDENTIFIED = 18, "the record does not tell a parameter, whose number means nothing"
+
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
     INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"

@@ -48,13 +48,18 @@ class Accessor:
     @property
     @door
     def scene(self) -> Scene:
-        """The scene: of results of a study that of the one cell that is selected.
+        """The scene: of results of a study that of the one cell that is selected, of a fit that
+        with the parameters found.
 
         Raises
         ------
         InvalidValue
             Where no single cell is selected, or a part is a user's own and not known here.
         """
+        if "rows_fitted" in self._dataset:
+            from rsfstudy.api import fitting
+
+            return fitting.scene(self._dataset)
         if self._is_study:
             return self.study.scene(_cell_of(self._dataset, self.study))
         return _scene_of(self._dataset)
@@ -192,6 +197,34 @@ class Accessor:
 
         self._must_be_ours()
         return to_dataframe(self._dataset)
+
+    @door
+    def table(self) -> pd.DataFrame:
+        """One row a fit of a record, with the columns that laboratories use; lengths in um.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``a``, ``a_std``, ``b``, ``b_std``, ``Dc``, ``Dc_std`` and so on, of what was looked
+            for; ``V0``, ``V1``, ``law``, ``window``, ``R2`` and ``status``.
+
+        Raises
+        ------
+        DataError
+            Where the dataset is no fit.
+        """
+        from rsfstudy.api import fitting
+
+        return fitting.table(self._dataset)
+
+    @door
+    def draw(self, n: int, seed: int = 0) -> xr.Dataset:
+        """Samples of the parameters of one fit, along ``draw``, as its errors let them be; see
+        `rsfstudy.api.fitting.draw`.
+        """
+        from rsfstudy.api import fitting
+
+        return fitting.draw(self._dataset, n, seed)
 
     @door
     def failures(self) -> pd.DataFrame:

@@ -116,7 +116,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
         coords[name] = (dims, values, _about(name.removeprefix(BESIDE), own))
     for name in study.scene_fields:
         present = {scene.get(name) for scene in sample} - {None}
-        if name not in coords and len(present) == 1:
+        if name not in {*coords, *study.measure.variables} and len(present) == 1:
             value = present.pop()
             coords[name] = ((), _array([value])[0], _about(name, own, value))
     for name, (source, formula) in DERIVED.items():

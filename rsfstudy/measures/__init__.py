@@ -205,7 +205,7 @@ class Measure:
         if self.headline not in self.variables:
             raise InvalidValue("headline", self.headline, "is not measured", choices=self.variables)
         for name in names:
-            if not is_name(name) or name in TAKEN or names.count(name) > 1:
+            if not is_name(name) or name in TAKEN - {*self.sought} or names.count(name) > 1:
                 rule = f"names something else, or nothing, in measure {self.name}"
                 raise InvalidValue("variable", name, rule)
         for name, dims in self.variables.items():

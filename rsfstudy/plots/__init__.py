@@ -8,6 +8,7 @@ dataset needs by ``panels(dataset)``; ``COLUMNS`` says how many stand beside eac
 
 from __future__ import annotations
 
+import importlib
 import io
 import os
 from collections.abc import Callable
@@ -168,6 +169,8 @@ def _fitting(
     """
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
     study = catalogue.load(name) if name in names.names() else None
+    if name == "fits" and own is variable is None:
+        own = importlib.import_module(f"{__name__}.fits")
     if own is None and study is None and name not in _ANY:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}

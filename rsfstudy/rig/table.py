@@ -53,7 +53,8 @@ class Column(NamedTuple):
 def read_table(
     path: str | Path, columns: Mapping[str, tuple[str, str]] | None = None
 ) -> dict[str, Column]:
-    """Columns of a CSV file by their names: numbers, units, and where each stands.
+    """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
+    stands.
 
     Parameters
     ----------
@@ -74,7 +75,10 @@ def read_table(
     check_file("table", path)
     try:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = [(n, row) for n, row in enumerate(csv.reader(file), start=1) if any(row)]
+            between = _delimiter(file.readline())
+            file.seek(0)
+            read = csv.reader(file, delimiter=between, skipinitialspace=between == " ")
+            rows = [(n, row) for n, row in enumerate(read, start=1) if any(row)]
     except (OSError, UnicodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV ({error})") from error
     if not rows:
@@ -99,6 +103,11 @@ def read_table(
             column.values[n] = _number(name, row[place], column, n)
         found[name] = column
     return found
+
+
+def _delimiter(header: str) -> str:
+    """What stands between columns: tabs, semicolons, commas, or blanks."""
+    return next((mark for mark in "\t;," if mark in header), " " if "(" not in header else ",")
 
 
 def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:

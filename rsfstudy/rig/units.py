@@ -30,7 +30,7 @@ _KNOWN: Mapping[str, Unit] = {
     "m": (1.0, _LENGTH),
     "cm": (1e-2, _LENGTH),
     "mm": (1e-3, _LENGTH),
-    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron"), (1e-6, _LENGTH)),
+    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), (1e-6, _LENGTH)),
     "nm": (1e-9, _LENGTH),
     "ms": (1e-3, _TIME),
     "s": (1.0, _TIME),

@@ -1,0 +1,1 @@
+"""Friction parameters from records of a laboratory, with errors that count correlated noise."""

@@ -1,0 +1,195 @@
+"""The friction that a scene shows along the rows of a record, and its derivatives by parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.recording import READ, Recording
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider import assembly
+from rsfstudy.slider.history import of_samples
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+Values = Mapping[str, float]
+#: Step over the size of a parameter; places and weights.
+Differences = tuple[float, tuple[tuple[int, float], ...]]
+
+#: What may be fitted.
+PARAMETERS = {
+    about.name: about
+    for about in (
+        Quantity("a", "$a$", "1", "direct effect parameter"),
+        Quantity("b", "$b$", "1", "evolution effect parameter"),
+        Quantity("b1", "$b_1$", "1", "evolution effect parameter of the first state"),
+        Quantity("b2", "$b_2$", "1", "evolution effect parameter of the second state"),
+        Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
+        Quantity("slip_distance_2", "$L_2$", "um", "slip distance of the second state"),
+        Quantity("mu_star", r"$\mu_*$", "1", "friction coefficient before the first step"),
+        Quantity("stiffness", "$k$", "um-1", "stiffness over normal stress"),
+        Quantity("alpha", r"$\alpha$", "1", "strength of the normal stress effect on state"),
+        Quantity("law_exponent", r"$\epsilon$", "1", "exponent of the family of laws"),
+        Quantity("step_time", r"$\Delta t$", "s", "time by which loading comes late"),
+        *(
+            Quantity(f"trend{n}", f"$c_{n}$", f"um-{n}", f"trend with power {n} of displacement")
+            for n in range(1, 6)
+        ),
+    )
+}
+#: Those whose logarithm is looked for.
+LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
+#: Central differences of fourth order: places and weights; and those of second order. Friction is
+#: smooth to 1e-11 in the accuracy of a fit: at these steps both lose less than 1e-6.
+FINE: Differences = (0.01, ((1, 2.0 / 3.0), (2, -1.0 / 12.0)))
+QUICK: Differences = (1e-3, ((1, 0.5),))
+#: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
+#: time in which the load point moves by a micrometre.
+_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
+
+
+@dataclass(frozen=True)
+class Model:
+    """The model of a window of a record.
+
+    Attributes
+    ----------
+    scene : Scene
+        The law and all that is not fitted.
+    time, displacement, friction : ndarray
+        Rows of the window: in s, in um from its first step, and 1.
+    loading : ndarray
+        Pieces as `loading_of` makes them.
+    accuracy : Accuracy
+    meter : Meter
+    """
+
+    scene: Scene
+    time: np.ndarray
+    displacement: np.ndarray
+    friction: np.ndarray
+    loading: np.ndarray
+    accuracy: Accuracy
+    meter: Meter
+
+    @property
+    def reference(self) -> float:
+        """Load point velocity at the beginning, in um/s."""
+        return float(self.loading[0, 1])
+
+    @cached_property
+    def is_stressed(self) -> bool:
+        """True if normal stress changes."""
+        return bool(np.ptp(self.loading[:, 2]) > 0.0 or self.loading[:, 3].any())
+
+    def is_linear(self, name: str) -> bool:
+        """True for a parameter in which friction is linear, whatever the others."""
+        return name.startswith("trend") or (name == "mu_star" and not self.is_stressed)
+
+    def scene_of(self, values: Values) -> Scene:
+        """The scene with parameters of a record, in units of its slip distance and velocity."""
+        distance, velocity = values["slip_distance"], self.reference
+        columns = np.empty((len(self.loading), 4))
+        columns[:, 0] = (self.loading[:, 0] - self.loading[0, 0]) * velocity / distance
+        columns[:, 1] = self.loading[:, 1] / velocity
+        columns[:, 2] = 1.0 - self.loading[:, 2]
+        columns[:, 3] = self.loading[:, 3] * distance / velocity
+        fields = {
+            "a": values["a"],
+            "mu_star": values["mu_star"],
+            "stiffness": values["stiffness"] * distance,
+            "reference_rate": velocity / distance,
+        }
+        if "b" in values:
+            fields["b_over_a"] = values["b"] / values["a"]
+        else:
+            fields["b1_over_a"] = values["b1"] / values["a"]
+            fields["b2_over_a"] = values["b2"] / values["a"]
+            fields["length_ratio"] = values["slip_distance_2"] / distance
+        fields |= {name: values[name] for name in ("alpha", "law_exponent") if name in values}
+        history = of_samples(columns, self.is_stressed, "record")
+        return Scene(assembly.with_numbers(self.scene.parts._replace(loading=history), fields))
+
+    def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
+        """Friction along the rows, without trend; NaN where there is no such motion.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+        refined : bool
+            At a tenth of all tolerances.
+        checked : bool
+            No motion is followed on a spring softer than the critical stiffness.
+        """
+        try:
+            scene = self.scene_of(values)
+            if checked and not scene.stiffness > scene.critical_stiffness:
+                return np.full(len(self.time), math.nan)
+            late = values.get("step_time", 0.0)
+            scale = self.reference / values["slip_distance"]
+            at = np.maximum(self.time - late - self.loading[0, 0], 0.0) * scale
+            accuracy = self.accuracy.refined() if refined else self.accuracy
+            recording, end = Recording(at=at), float(at[-1]) * (1.0 + 1e-12)
+            for _event in follow(scene, accuracy, self.meter, recording=recording, until=end):
+                pass
+        except Halt as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+            return np.full(len(self.time), math.nan)
+        except InvalidValue:
+            return np.full(len(self.time), math.nan)
+        found = recording.seen(scene)[:, READ.index("friction_coefficient")]
+        return found if len(found) == len(self.time) else np.full(len(self.time), math.nan)
+
+    def trend(self, values: Values) -> np.ndarray:
+        """The trend along the rows: of displacement from the first step."""
+        powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
+        found = np.zeros(len(self.time))
+        for power, coefficient in powers:
+            found += coefficient * self.displacement**power
+        return found
+
+    def jacobian(
+        self, values: Values, free: Sequence[str], differences: Differences = FINE
+    ) -> np.ndarray:
+        """Derivatives of friction along the rows by parameters, or by the logarithms of those in
+        `LOGARITHMIC`, shape (rows, parameters).
+        """
+        return np.column_stack([self._derivative(values, name, differences) for name in free])
+
+    def _derivative(self, values: Values, name: str, differences: Differences) -> np.ndarray:
+        if name.startswith("trend"):
+            return np.asarray(self.displacement ** int(name[5:]))
+        if self.is_linear(name):
+            return np.ones(len(self.time))
+        part, weights = differences
+        step = part * self._size(name, values)
+        found = np.zeros(len(self.time))
+        for place, weight in weights:
+            for sign in (1.0, -1.0):
+                moved = shifted(values, name, sign * place * step)
+                found += sign * weight / step * self.curve(moved)
+        return found
+
+    def _size(self, name: str, values: Values) -> float:
+        if name in LOGARITHMIC:
+            return 1.0
+        if name == "a":
+            return values["a"]
+        if name.startswith("b"):
+            return max(values["a"], abs(values[name]))
+        return _SIZES.get(name, 1.0 / self.reference)
+
+
+def shifted(values: Values, name: str, by: float) -> dict[str, float]:
+    """Values of which one, or its logarithm, is moved."""
+    moved = values[name] * math.exp(by) if name in LOGARITHMIC else values[name] + by
+    return {**values, name: moved}

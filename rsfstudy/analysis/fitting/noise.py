@@ -1,0 +1,294 @@
+"""The noise of a record: white, or an autoregressive process whose coefficients are found with what
+the fit takes up of the noise counted (restricted maximum likelihood, REML).
+
+With J the derivatives of the model, R the correlation of the noise up to its size, p parameters and
+n samples, REML minimises
+
+    (n - p) ln(S/(n - p)) + ln|R| + ln|J' R^-1 J|,
+
+S being the sum of squares that generalised least squares leaves. Samples taken at other intervals
+have noise of their own: another size, and other correlations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+
+from rsfstudy.errors import InvalidValue
+
+WHITE, AUTOREGRESSIVE = "white", "ar"
+#: Highest order that is looked for, and samples that each coefficient takes at least.
+HIGHEST, _SAMPLES = 12, 10
+#: Largest partial correlation, and slope of what REML minimises at which the search ends.
+_LARGEST, _ENOUGH = 0.999, 0.02
+#: Sampling intervals that differ by less than this factor are one; fewer samples than so many at
+#: another do not tell a process of their own.
+_ALIKE, _RARE = 2.0, 300
+
+
+def check_noise(name: str) -> None:
+    """Raise InvalidValue for what names no noise."""
+    order = name.removeprefix(AUTOREGRESSIVE) if isinstance(name, str) else ""
+    known = name in (WHITE, AUTOREGRESSIVE)
+    if not known and not (order.isdecimal() and name.startswith("ar") and int(order) <= HIGHEST):
+        choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{HIGHEST}")
+        raise InvalidValue("noise", name, "is unknown", choices=choices)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of samples, which come in runs of one sampling interval.
+
+    Attributes
+    ----------
+    runs : tuple of (int, int, int)
+        First row, row behind the last, and number of the process of each run.
+    partial : ndarray, shape (processes, order)
+        Partial autocorrelations of each process.
+    sizes : ndarray, shape (processes,)
+        Standard deviations, over that of the first one.
+    """
+
+    runs: tuple[tuple[int, int, int], ...]
+    partial: np.ndarray
+    sizes: np.ndarray
+
+    @property
+    def order(self) -> int:
+        """Order of the processes."""
+        return int(self.partial.shape[1])
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        """Columns freed of correlation: shape (samples, columns), each sample less what those
+        before tell of it, over the standard deviation of what is left.
+        """
+        found, predictors = np.empty_like(columns), [*map(_predictors, self.partial)]
+        for first, last, number in self.runs:
+            found[first:last] = _innovations(columns[first:last], *predictors[number])
+            found[first:last] /= self.sizes[number]
+        return found
+
+    @property
+    def log_determinant(self) -> float:
+        """``ln|R|``."""
+        total = 0.0
+        for first, last, number in self.runs:
+            variances = _predictors(self.partial[number])[1]
+            early = min(last - first, self.order)
+            total += math.fsum(map(math.log, variances[:early]))
+            total += (last - first - early) * math.log(variances[-1])
+            total += 2.0 * (last - first) * math.log(self.sizes[number])
+        return total
+
+    @property
+    def effective_samples(self) -> float:
+        """Number of independent samples that tell a mean as well."""
+        total = 0.0
+        for first, last, number in self.runs:
+            coefficients, variances = _predictors(self.partial[number])
+            at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
+            total += max(1.0, (last - first) / max(at_rest, 1.0))
+        return total
+
+    def draw(self, rng: np.random.Generator) -> np.ndarray:
+        """One sample of the noise, of unit size."""
+        found = np.empty(self.runs[-1][1])
+        for first, last, number in self.runs:
+            coefficients, variances = _predictors(self.partial[number])
+            for row in range(first, last):
+                told = coefficients[min(row - first, self.order)]
+                left = math.sqrt(variances[min(row - first, self.order)])
+                before = found[row - len(told) : row][::-1]
+                found[row] = np.dot(told, before) + left * rng.standard_normal()
+            found[first:last] *= self.sizes[number]
+        return found
+
+
+def white(time: np.ndarray) -> Noise:
+    """White noise of one size at samples taken at these times."""
+    return Noise(_runs(time), np.zeros((_count(time), 0)), np.ones(_count(time)))
+
+
+def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndarray) -> Noise:
+    """The noise that residuals of a fit tell, by REML.
+
+    Parameters
+    ----------
+    name : str
+        "white", "ar", whose order a criterion chooses (AIC), or "ar3" and so on.
+    time : ndarray, shape (samples,)
+    residuals : ndarray, shape (samples,)
+    jacobian : ndarray, shape (samples, parameters)
+        Derivatives of the model.
+    """
+    runs, count = _runs(time), _count(time)
+    parts = [[residuals[i:j] for i, j, number in runs if number == n] for n in range(count)]
+    stated = name.removeprefix(AUTOREGRESSIVE)
+    order = 0 if name == WHITE else int(stated) if stated else _order(parts)
+    sizes = np.array([max(float(np.std(np.concatenate(part))), 1e-300) for part in parts])
+    begin = np.array([_partial(part, order) for part in parts])
+    if not order and count == 1:
+        return Noise(runs, begin, np.ones(1))
+
+    def noise(x: np.ndarray) -> Noise:
+        partial = _LARGEST * np.tanh(x[: count * order]).reshape(count, order)
+        return Noise(runs, partial, np.exp(np.append(0.0, x[count * order :])))
+
+    products = _Products(runs, count, np.column_stack([jacobian, residuals]), order)
+
+    def misfit(x: np.ndarray) -> float:
+        return products.misfit(noise(x))
+
+    x = np.append(np.arctanh(begin.ravel() / _LARGEST), np.log(sizes[1:] / sizes[0]))
+    found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
+    return noise(found.x if found.fun <= misfit(x) else x)
+
+
+class _Products:
+    """Sums of products of columns, and of these some rows later, of which the squares of whitened
+    columns are made whatever the coefficients: the cost of a search does not grow with samples.
+
+    Parameters
+    ----------
+    runs : tuple of (int, int, int)
+        As those of `Noise`.
+    count : int
+        How many processes there are.
+    columns : ndarray, shape (samples, columns)
+        Derivatives, and residuals last.
+    order : int
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[tuple[int, int, int]],
+        count: int,
+        columns: np.ndarray,
+        order: int,
+    ) -> None:
+        self.runs, self.order = runs, order
+        self.rows, self.parameters = len(columns), columns.shape[1] - 1
+        self.sizes = np.linalg.norm(columns, axis=0)
+        self.sizes[self.sizes == 0.0] = 1.0
+        columns = columns / self.sizes
+        width = columns.shape[1]
+        self.sums = np.zeros((count, order + 1, order + 1, width, width))
+        self.early = [columns[first : min(first + order, last)] for first, last, _n in runs]
+        for first, last, number in runs:
+            part = columns[first:last]
+            later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
+            for i in range(order + 1 if len(part) > order else 0):
+                for j in range(i + 1):
+                    found = later[i].T @ later[j]
+                    self.sums[number, i, j] += found
+                    if i > j:
+                        self.sums[number, j, i] += found.T
+
+    def misfit(self, noise: Noise) -> float:
+        """What REML minimises, up to a constant; infinite where nothing is left."""
+        total = np.zeros(self.sums.shape[-2:])
+        predictors = [*map(_predictors, noise.partial)]
+        for number, (coefficients, variances) in enumerate(predictors):
+            full = np.append(1.0, -np.array(coefficients[-1]))
+            scale = variances[-1] * noise.sizes[number] ** 2
+            total += np.einsum("i,j,ijab->ab", full, full, self.sums[number]) / scale
+        for early, (_first, _last, number) in zip(self.early, self.runs, strict=True):
+            begun = _innovations(early, *predictors[number]) / noise.sizes[number]
+            total += begun.T @ begun
+        try:
+            triangle = np.diag(np.linalg.cholesky(total))
+        except np.linalg.LinAlgError:
+            return math.inf
+        free = self.rows - self.parameters
+        told = 2.0 * math.fsum(map(math.log, triangle[:-1]))
+        return float(2.0 * free * math.log(triangle[-1]) + noise.log_determinant + told)
+
+
+def _order(parts: Sequence[Sequence[np.ndarray]]) -> int:
+    """The order by which Akaike's criterion of what is left is least."""
+    shortest = min(max(map(len, part)) for part in parts)
+    highest = min(HIGHEST, shortest // _SAMPLES)
+    criterion = np.zeros(highest + 1)
+    for part in parts:
+        samples = sum(map(len, part))
+        left = np.cumsum(np.log1p(-(np.array(_partial(part, highest)) ** 2)))
+        criterion[1:] += samples * left + 2.0 * np.arange(1, highest + 1)
+    return int(np.argmin(criterion))
+
+
+def _partial(part: Sequence[np.ndarray], order: int) -> list[float]:
+    """Partial autocorrelations of residuals up to an order, by the recursion of Burg."""
+    forward, backward = [[p - p.mean() for p in part] for _ in range(2)]
+    found = []
+    for _ in range(order):
+        ahead = [f[1:] for f in forward if len(f) > 1]
+        behind = [b[:-1] for b in backward if len(b) > 1]
+        above = sum(float(f @ b) for f, b in zip(ahead, behind, strict=True))
+        below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        k = 2.0 * above / below if below > 0.0 else 0.0
+        found.append(min(max(k, -0.99 * _LARGEST), 0.99 * _LARGEST))
+        forward = [f - found[-1] * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b - found[-1] * f for f, b in zip(ahead, behind, strict=True)]
+    return found
+
+
+def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]], list[float]]:
+    """Coefficients that tell a sample from the 0, 1, 2 and so on before it, the last one first, and
+    the variance that each leaves of 1: the recursion of Levinson and Durbin.
+    """
+    coefficients: list[list[float]] = [[]]
+    variances = [1.0]
+    for k in map(float, partial):
+        last = coefficients[-1]
+        turned = [c - k * d for c, d in zip(last, reversed(last), strict=True)]
+        coefficients.append([*turned, k])
+        variances.append(variances[-1] * (1.0 - k * k))
+    return coefficients, variances
+
+
+def _innovations(
+    columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
+) -> np.ndarray:
+    """Columns less what the rows before tell of each row, over its standard deviation."""
+    full = np.append(1.0, -np.array(coefficients[-1]))
+    found = np.asarray(lfilter(full, [1.0], columns, axis=0)) if len(full) > 1 else columns.copy()
+    for row, told in enumerate(coefficients[: min(len(coefficients) - 1, len(columns))]):
+        found[row] = columns[row] - np.array(told) @ columns[:row][::-1]
+        found[row] /= math.sqrt(variances[row])
+    found[len(coefficients) - 1 :] /= math.sqrt(variances[-1])
+    return found
+
+
+def _kinds(time: np.ndarray) -> np.ndarray:
+    """The kind of sampling interval that each sample is taken at: 0, 1 and so on."""
+    gaps = np.diff(time)
+    kinds = np.rint(np.log(gaps / np.median(gaps)) / math.log(_ALIKE))
+    _names, kinds, counts = np.unique(
+        np.append(kinds[:1], kinds), return_inverse=True, return_counts=True
+    )
+    rows = np.flatnonzero(counts[kinds] >= _RARE)
+    if not len(rows):
+        return np.zeros(len(time), dtype=int)
+    nearest = np.minimum(np.searchsorted(rows, np.arange(len(time))), len(rows) - 1)
+    return np.asarray(np.unique(kinds[rows[nearest]], return_inverse=True)[1])
+
+
+def _count(time: np.ndarray) -> int:
+    return int(_kinds(time).max()) + 1
+
+
+def _runs(time: np.ndarray) -> tuple[tuple[int, int, int], ...]:
+    """First row, row behind the last and kind of the runs of samples of one kind."""
+    kinds = _kinds(time)
+    bounds = np.flatnonzero(np.diff(kinds)) + 1
+    firsts = [0, *bounds.tolist()]
+    return tuple(
+        (first, last, int(kinds[first]))
+        for first, last in zip(firsts, [*firsts[1:], len(time)], strict=True)
+    )

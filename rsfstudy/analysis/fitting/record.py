@@ -1,0 +1,186 @@
+"""A record of a laboratory as fits take it: rows against time, and the loading that it tells."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import isotonic_regression
+
+from rsfstudy.analysis.fitting.steps import Step, steps_of
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity, is_name
+
+#: Its columns.
+COLUMNS = (
+    Quantity("time", "$t$", "s", "time"),
+    Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
+    Quantity("friction", r"$\mu$", "1", "friction coefficient"),
+    Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A record of an experiment.
+
+    Attributes
+    ----------
+    columns : mapping of str to ndarray
+        ``time`` (s), ``displacement`` of the load point (um), ``friction``, and ``normal_stress``
+        (Pa) where it was recorded; all of one length.
+    name : str
+        What it is called in results.
+    stated : tuple of Step or None
+        The steps of its load point, where they are stated.
+
+    Raises
+    ------
+    InvalidValue
+        For columns that are missing, of other lengths or not finite, a clock that stands still or
+        runs back, and steps that are none.
+    """
+
+    columns: dict[str, np.ndarray]
+    name: str = "record"
+    stated: tuple[Step, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not is_name(self.name):
+            raise InvalidValue("name", self.name, "must be a Python identifier")
+        for about in COLUMNS[:3]:
+            if about.name not in self.columns:
+                rule = f"has no {about.name}"
+                raise InvalidValue("record", [*self.columns], rule, remedy=f"Give {about.name}.")
+        for name, values in self.columns.items():
+            if values.shape != self.time.shape:
+                rule = f"holds {values.size} samples, and time {self.time.size}"
+                raise InvalidValue(name, values.shape, rule)
+            if not np.isfinite(values).all():
+                row = int(np.argmin(np.isfinite(values)))
+                remedy = "Leave such rows out of the record."
+                rule = f"must be a finite number, and is none in row {row + 1}"
+                raise InvalidValue(name, float(values[row]), rule, remedy=remedy)
+        late = np.diff(self.time) <= 0.0
+        if late.any():
+            row = int(np.argmax(late)) + 1
+            rule = f"must be later in each row than in the row before, and is not in row {row + 1}"
+            raise InvalidValue("time", float(self.time[row]), rule)
+
+    @property
+    def time(self) -> np.ndarray:
+        """In s."""
+        return self.columns["time"]
+
+    @cached_property
+    def digest(self) -> str:
+        """Tells the record."""
+        told = hashlib.sha256(repr((sorted(self.columns), self.stated)).encode())
+        for name in sorted(self.columns):
+            told.update(np.ascontiguousarray(self.columns[name]).tobytes())
+        return told.hexdigest()[:16]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Record) and (self.name, self.digest) == (other.name, other.digest)
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def window(self, begins: float, ends: float) -> Record:
+        """The part between two times in s."""
+        if not begins < ends:
+            raise InvalidValue("window", (begins, ends), "must end after it begins")
+        rows = (self.time >= begins) & (self.time <= ends)
+        if not rows.any():
+            rule = f"lies outside the record, {self.time[0]:g} to {self.time[-1]:g} s"
+            raise InvalidValue("window", (begins, ends), rule)
+        return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
+
+    def with_steps(self, steps: Sequence[Any]) -> Record:
+        """The record with its steps stated: times in s at which velocity begins and ends to change,
+        and velocities before and after in um/s.
+        """
+        stated = tuple(Step(*map(float, step)) for step in steps)
+        for step in stated:
+            if not step.begins <= step.ends or min(step.before, step.after) < 0.0:
+                rule = "is no step: begins, ends, velocity before and after"
+                raise InvalidValue("step", tuple(step), rule)
+        return replace(self, stated=stated)
+
+    @cached_property
+    def found(self) -> tuple[Step, ...]:
+        """The steps of its load point: those stated, else those that displacement tells."""
+        if self.stated is not None:
+            return self.stated
+        return steps_of(self.time, self.columns["displacement"])
+
+    def steps(self) -> xr.Dataset:
+        """The steps of its load point, along ``step``, numbered from 1: ``begins``, ``ends`` (s),
+        ``velocity_before`` and ``velocity_after`` (um/s).
+        """
+        rows = np.array(self.found, dtype=float).reshape(-1, len(Step._fields))
+        names = ("begins", "ends", "velocity_before", "velocity_after")
+        units = ("s", "s", "um s-1", "um s-1")
+        data = {
+            name: ("step", rows[:, n], {"units": of})
+            for n, (name, of) in enumerate(zip(names, units, strict=True))
+        }
+        return xr.Dataset(data, coords={"step": np.arange(1, len(rows) + 1)})
+
+    def to_dataset(self) -> xr.Dataset:
+        """The record along ``time``."""
+        about = {column.name: column for column in COLUMNS}
+        data = {
+            name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
+            for name, values in self.columns.items()
+        }
+        return xr.Dataset(data)
+
+
+def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:
+    """The loading of a record between two times, by pieces: each with its beginning in s, load
+    point velocity in um/s, normal stress over that at first, and the rate of that in 1/s.
+
+    Parameters
+    ----------
+    record : Record
+    begins, ends : float
+        In s; before the first piece all slides steadily at its velocity, that before the first
+        step.
+    recorded : bool
+        Row by row, or by steps, at constant normal stress. Where noise moves the load point back it
+        rests: of displacements that never fall the closest ones are taken.
+    """
+    steps = [step for step in record.found if begins < step.begins and step.ends < ends]
+    first = steps[0].before if steps else 0.0
+    if recorded:
+        return _by_rows(record.window(begins, ends), first)
+    pieces = [(begins, first)]
+    for step in steps:
+        if step.ends > step.begins:
+            pieces.append((step.begins, 0.5 * (step.before + step.after)))
+        pieces.append((step.ends, step.after))
+    return np.array([(time, speed, 1.0, 0.0) for time, speed in pieces])
+
+
+def _by_rows(record: Record, first: float) -> np.ndarray:
+    """Pieces of loading from each row to the next."""
+    lasts = np.diff(record.time)
+    moved = isotonic_regression(record.columns["displacement"]).x
+    table = np.zeros((len(record), 4))
+    table[:, 0], table[:, 2] = record.time, 1.0
+    table[:-1, 1] = np.diff(moved) / lasts
+    table[-1, 1], table[0, 1] = table[-2, 1], first
+    if "normal_stress" in record.columns:
+        stress = record.columns["normal_stress"]
+        table[:, 2] = stress / stress[0]
+        table[:-1, 3] = np.diff(table[:, 2]) / lasts
+    return table

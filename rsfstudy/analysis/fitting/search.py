@@ -1,0 +1,340 @@
+"""The search for the parameters of a record: least squares under the noise that residuals tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from rsfstudy.analysis.fitting import noise as noises
+from rsfstudy.analysis.fitting.model import FINE, LOGARITHMIC, QUICK, Model, Values
+from rsfstudy.analysis.fitting.noise import Noise
+from rsfstudy.motion.meter import Halt
+from rsfstudy.status import Status
+
+#: Bounds of parameters; of those with a logarithm, over the first guess.
+_BOUNDS = {
+    "a": (1e-6, 1.0),
+    "b": (-1.0, 1.0),
+    "b1": (-1.0, 1.0),
+    "b2": (-1.0, 1.0),
+    "alpha": (0.0, 2.0),
+    "law_exponent": (0.0, 1.0),
+}
+_WIDE = math.log(1e4)
+#: Slip distances to begin with, over the first guess.
+_GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
+#: Passes in which noise and parameters are found in turn, until those move by this part of their
+#: standard errors; most curves of a pass, and where it ends; and steps of Newton at the end.
+_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, 2
+#: Fewest degrees of freedom of intervals, what they cover, and by how much of itself the squared
+#: distance to their ends may miss before the likelihood is followed there, how often, how closely.
+_FEWEST, COVERS, _PARABOLIC, _FOLLOWED, _CLOSE = 3.0, 0.95, 0.2, 6, 0.05
+#: Standard error of a logarithm, and of a or b over the larger of both, beyond which a record does
+#: not tell them; and the standard errors that b must differ from 0 by to have a slip distance.
+_TOLD, _ACTS = 0.5, 2.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit has found.
+
+    Attributes
+    ----------
+    values : dict
+        All parameters, those that were not free too.
+    free : tuple of str
+    covariance : ndarray
+        Of the free parameters, or of their logarithms (see `LOGARITHMIC`).
+    errors : dict
+        Numerical errors of the free parameters.
+    low, high : dict
+        Ends of their 95 % intervals.
+    noise : Noise
+    size : float
+        Standard deviation of the noise.
+    degrees : float
+        Degrees of freedom of the intervals.
+    curve : ndarray
+        Friction along the rows, without trend.
+    trend : ndarray
+    innovations : ndarray
+        Residuals freed of correlation, over their size.
+    band : ndarray
+        Standard error of the curve with trend.
+    jacobian : ndarray
+        Derivatives of the curve with trend by the free parameters, or their logarithms.
+    untold : tuple of str
+        Free parameters that the record does not tell.
+    """
+
+    values: dict[str, float]
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    errors: dict[str, float]
+    low: dict[str, float]
+    high: dict[str, float]
+    noise: Noise
+    size: float
+    degrees: float
+    curve: np.ndarray
+    trend: np.ndarray
+    innovations: np.ndarray
+    band: np.ndarray
+    jacobian: np.ndarray
+    untold: tuple[str, ...]
+
+    def stderr(self, name: str) -> float:
+        """Standard error of a parameter."""
+        place = self.free.index(name)
+        return float(math.sqrt(self.covariance[place, place]) * _slope(name, self.values[name]))
+
+
+class Search:
+    """The search for some parameters of a model.
+
+    Parameters
+    ----------
+    model : Model
+    values : mapping of str to float
+        All parameters; those that are free to begin with.
+    free : sequence of str
+    noise : str
+        As `noise.fitted` takes it.
+    """
+
+    def __init__(self, model: Model, values: Values, free: Sequence[str], noise: str) -> None:
+        self.model, self.free, self.name = model, tuple(free), noise
+        self.first = dict(values)
+        self.low, self.high = np.array([self._bounds(name) for name in free]).T
+
+    def _bounds(self, name: str) -> tuple[float, float]:
+        if name in LOGARITHMIC:
+            at = math.log(self.first[name])
+            return at - _WIDE, at + _WIDE
+        if name == "step_time":
+            late = self.model.time[0] - self.model.loading[0, 0]
+            return -late, late
+        return _BOUNDS.get(name, (-math.inf, math.inf))
+
+    def values(self, x: np.ndarray) -> dict[str, float]:
+        """All parameters, by the coordinates of the free ones."""
+        found = zip(self.free, x.tolist(), strict=True)
+        return self.first | {n: math.exp(v) if n in LOGARITHMIC else v for n, v in found}
+
+    def coordinates(self, values: Values) -> np.ndarray:
+        """Coordinates of the free parameters."""
+        return np.array([math.log(values[n]) if n in LOGARITHMIC else values[n] for n in self.free])
+
+    def residuals(self, values: Values, *, checked: bool = False) -> np.ndarray:
+        """What a model leaves of the record."""
+        curve = self.model.curve(values, checked=checked)
+        return np.asarray(self.model.friction - curve - self.model.trend(values))
+
+    def run(self) -> Fitted:
+        """The fit.
+
+        Raises
+        ------
+        Halt
+            Where no motion fits, the search does not end, or the work budget is spent.
+        """
+        x, noise = self._begin(), noises.white(self.model.time)
+        for number in range(1 if self.name == noises.WHITE and len(noise.sizes) == 1 else _PASSES):
+            before = x
+            x, jacobian = self._least_squares(x, noise)
+            left = self.residuals(self.values(x))
+            if number and _is_still(x - before, noise.whitened(np.column_stack([jacobian, left]))):
+                break
+            noise = noises.fitted(self.name, self.model.time, left, jacobian)
+        return self._ended(x, noise)
+
+    def _begin(self) -> np.ndarray:
+        """Coordinates to begin with: those of the slip distance with which the least is left."""
+        self.model.scene_of(self.first)  # whatever is wrong with it is said
+        scales = _GRID if "slip_distance" in self.free else (1.0,)
+        distances = [n for n in ("slip_distance", "slip_distance_2") if n in self.free]
+        linear = [n for n in self.free if self.model.is_linear(n)]
+        columns = self.model.jacobian(self.first, linear) if linear else None
+        best = (math.inf, self.first)
+        for scale in scales:
+            values = self.first | {n: self.first[n] * scale for n in distances}
+            left = self.residuals(values, checked=True)
+            if columns is not None and np.isfinite(left).all():
+                moved = np.linalg.lstsq(columns, left)[0]
+                left = left - columns @ moved
+                values |= {n: values[n] + v for n, v in zip(linear, moved.tolist(), strict=True)}
+            best = min(best, (float(left @ left), values), key=lambda found: (found[0],))
+        if not math.isfinite(best[0]):
+            text = "no motion with the first guess can be followed, or its spring is softer than "
+            raise Halt(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
+        return np.asarray(np.clip(self.coordinates(best[1]), self.low, self.high))
+
+    def _least_squares(self, x: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates that leave the least under a noise, and the derivatives there."""
+        model, derivatives = self.model, {}
+
+        def left(x: np.ndarray) -> np.ndarray:
+            found = self.residuals(self.values(x), checked=True)
+            return np.asarray(noise.whitened(found[:, None])[:, 0] / scale)
+
+        def slopes(x: np.ndarray) -> np.ndarray:
+            derivatives["last"] = model.jacobian(self.values(x), self.free, QUICK)
+            return -noise.whitened(derivatives["last"]) / scale
+
+        scale = 1.0
+        scale = math.sqrt(float(np.square(left(x)).mean())) or 1.0
+        inner = np.clip(x, self.low + 1e-9, self.high - 1e-9)
+        found = least_squares(
+            left,
+            inner,
+            slopes,
+            (self.low, self.high),
+            x_scale="jac",
+            xtol=_FOUND,
+            ftol=_FOUND,
+            gtol=1e-12,
+            max_nfev=_CURVES,
+        )
+        if found.status == 0:
+            text = f"the search did not end within {_CURVES} curves"
+            raise Halt(Status.ACCURACY_OUT_OF_REACH, text)
+        return found.x, derivatives["last"]
+
+    def _ended(self, x: np.ndarray, noise: Noise) -> Fitted:
+        """All that is told of the parameters with the least left."""
+        moved = np.zeros(len(x))
+        for _ in range(_POLISHED):
+            jacobian = self.model.jacobian(self.values(x), self.free, FINE)
+            left = self.residuals(self.values(x))
+            whitened = noise.whitened(np.column_stack([jacobian, left]))
+            if not np.isfinite(whitened).all():
+                text = "motions next to the best one cannot be followed"
+                raise Halt(Status.INTEGRATION_FAILED, text)
+            moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
+            beyond = np.clip(x + moved, self.low, self.high)
+            if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
+                x = beyond
+        values = self.values(x)
+        left = self.residuals(values)
+        innovations = noise.whitened(left[:, None])[:, 0]
+        free_of = len(left) - len(x)
+        size = math.sqrt(float(innovations @ innovations) / free_of)
+        inverse = _inverse(whitened[:, :-1])
+        covariance = size**2 * inverse
+        degrees = max(noise.effective_samples - len(x), _FEWEST)
+        finer = self.model.curve(values, refined=True) - self.model.curve(values)
+        off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
+        slopes = [_slope(name, values[name]) for name in self.free]
+        errors = (3.0 * off + np.abs(moved)) * slopes
+        band = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+        found = Fitted(
+            values=values,
+            free=self.free,
+            covariance=covariance,
+            errors=dict(zip(self.free, errors.tolist(), strict=True)),
+            low={},
+            high={},
+            noise=noise,
+            size=size,
+            degrees=degrees,
+            curve=self.model.friction - left - self.model.trend(values),
+            trend=self.model.trend(values),
+            innovations=innovations / size,
+            band=band,
+            jacobian=jacobian,
+            untold=self._untold(x, values, covariance),
+        )
+        ends = [self._ends(found, x, place) for place in range(len(x))]
+        low, high = ({n: e[side] for n, e in zip(self.free, ends, strict=True)} for side in (0, 1))
+        return replace(found, low=low, high=high)
+
+    def _untold(self, x: np.ndarray, values: Values, covariance: np.ndarray) -> tuple[str, ...]:
+        """Free parameters that the record does not tell."""
+        spread = dict(zip(self.free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        bound = (x - self.low < 1e-6) | (self.high - x < 1e-6)
+        effects = {"slip_distance": "b", "slip_distance_2": "b2"}
+        if "b" not in values:
+            effects["slip_distance"] = "b1"
+        largest = max(abs(v) for n, v in values.items() if n in ("a", "b", "b1", "b2"))
+        found = []
+        for name, at_bound in zip(self.free, bound.tolist(), strict=True):
+            told = math.isfinite(spread[name])
+            if name in LOGARITHMIC or name == "law_exponent":
+                told = spread[name] < _TOLD and not (at_bound and name in LOGARITHMIC)
+            elif name in ("a", "b", "b1", "b2"):
+                told = spread[name] < _TOLD * largest and not at_bound
+            effect = effects.get(name, "")
+            if effect in spread:
+                told = told and abs(values[effect]) > _ACTS * spread[effect]
+            if not told:
+                found.append(name)
+        return tuple(found)
+
+    def _ends(self, found: Fitted, x: np.ndarray, place: int) -> tuple[float, float]:
+        """Ends of the 95 % interval of a parameter: of the parabola that its likelihood is nearly,
+        else where the likelihood itself has fallen as far, or a bound.
+        """
+        name, reach = self.free[place], student.isf(0.5 * (1.0 - COVERS), found.degrees)
+        direction = found.covariance[:, place] / math.sqrt(found.covariance[place, place])
+        if not np.isfinite(direction).all():
+            low, high = self.low[place], self.high[place]
+        else:
+            low, high = (self._end(found, x, place, s * direction, reach) for s in (-1.0, 1.0))
+        return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
+
+    def _end(
+        self, found: Fitted, x: np.ndarray, place: int, direction: np.ndarray, reach: float
+    ) -> float:
+        with np.errstate(divide="ignore"):
+            room = np.where(direction > 0.0, self.high - x, self.low - x) / direction
+        most = float(np.min(room, where=direction != 0.0, initial=math.inf))
+        at = min(reach, most)
+        for number in range(0 if self.model.is_linear(self.free[place]) else _FOLLOWED):
+            fallen = self._fallen(found, x + at * direction, place)
+            if at == most and fallen < reach**2:
+                break
+            if abs(fallen / reach**2 - 1.0) < (_CLOSE if number else _PARABOLIC):
+                break
+            at = min(most, at * min(max(reach / math.sqrt(max(fallen, 1e-9)), 0.3), 3.0))
+        return float(x[place] + at * direction[place])
+
+    def _fallen(self, found: Fitted, x: np.ndarray, place: int) -> float:
+        """By how much the sum of squares has grown, in variances, where the other parameters move,
+        to first order, to where the least is left.
+        """
+        left = self.residuals(self.values(x), checked=True)
+        if not np.isfinite(left).all():
+            return math.inf
+        others = np.delete(found.jacobian, place, axis=1)
+        whitened = found.noise.whitened(np.column_stack([others, left])) / found.size
+        moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
+        rest = whitened[:, -1] - whitened[:, :-1] @ moved
+        return float(rest @ rest - np.square(found.innovations).sum())
+
+
+def _is_still(moved: np.ndarray, whitened: np.ndarray) -> bool:
+    """True if parameters have moved by little of their standard errors; residuals come last."""
+    size = np.linalg.norm(whitened[:, -1]) / math.sqrt(len(whitened))
+    spread = size * np.sqrt(np.diag(_inverse(whitened[:, :-1])))
+    return bool((np.abs(moved) <= _STILL * spread).all())
+
+
+def _inverse(columns: np.ndarray) -> np.ndarray:
+    """``(J'J)^-1``; infinite where a column tells nothing."""
+    sizes = np.linalg.norm(columns, axis=0)
+    if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
+        return np.full((columns.shape[1],) * 2, math.inf)
+    _u, values, turned = np.linalg.svd(columns / sizes, full_matrices=False)
+    values = np.maximum(values, 1e-14 * values[0])
+    root = turned.T / values
+    return np.asarray((root @ root.T) / np.outer(sizes, sizes))
+
+
+def _slope(name: str, value: float) -> float:
+    """Derivative of a parameter by its coordinate."""
+    return value if name in LOGARITHMIC else 1.0

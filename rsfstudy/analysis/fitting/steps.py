@@ -1,0 +1,181 @@
+"""Steps of load point velocity in a record: where straight pieces of displacement meet."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+#: Rows among which steps are looked for at once: of a longer record, the means of as many.
+_ROWS = 20_000
+#: Fewest rows of a piece, part of the faster velocity by which the next one must differ, and by how
+#: much that must move displacement, in standard deviations of what lines leave of it: displacement
+#: wanders about its set point.
+_FEWEST, _DIFFERS, _MOVES = 5, 0.2, 10.0
+#: What two lines must explain better than one, in variances of the noise over ln n.
+_WORTH = 12.0
+#: Part of the faster velocity below which the load point is held.
+_HELD = 0.01
+#: Part of both neighbours that a piece between two velocities lasts at most, where it is a ramp.
+_SHORT = 0.05
+#: Standard deviation over the median of absolute deviations of Gaussian noise.
+_NORMAL = 1.4826
+
+
+#: Displacement at time 0, and velocity.
+_Line = tuple[float, float]
+
+
+class Step(NamedTuple):
+    """A change of load point velocity.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Times in s; the same, unless velocity changes over several samples.
+    before, after : float
+        Velocities in um/s; 0 of a load point that is held.
+    """
+
+    begins: float
+    ends: float
+    before: float
+    after: float
+
+
+def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
+    """The steps of the load point in a record.
+
+    Displacement is taken for straight pieces with noise. A piece is parted in two where that lowers
+    the sum of squares by more than chance does, and where both velocities differ by a fifth.
+
+    Parameters
+    ----------
+    time, displacement : ndarray
+        In s and um.
+    """
+    every = max(1, math.ceil(len(time) / _ROWS))
+    count = len(time) // every * every
+    t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
+    if len(t) < 2 * _FEWEST:
+        return ()
+    t0, x0 = t[0], x[0]
+    sums = _Sums(t - t0, x - x0)
+    knots = _merged(sums, sorted(_parted(sums, 0, len(t), _noise(t, x))), t)
+    lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
+    meets = [
+        _meeting(lines[n], lines[n + 1], t[k - 1] - t0, t[k] - t0)
+        for n, k in enumerate(knots[1:-1])
+    ]
+    if every > 1:
+        meets = [_refined(time - t0, displacement - x0, at, 2 * every) for at in meets]
+    times = [t0 + at for at in meets]
+    fastest = max(abs(line[1]) for line in lines)
+    speeds = [line[1] if abs(line[1]) > _HELD * fastest else 0.0 for line in lines]
+    return tuple(_steps(times, speeds, (t[0], t[-1])))
+
+
+class _Sums:
+    """Running sums of samples, which tell the line through any part of them at once."""
+
+    def __init__(self, t: np.ndarray, x: np.ndarray) -> None:
+        columns = np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
+        self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
+
+    def between(self, i: np.ndarray | int, j: np.ndarray | int) -> tuple[np.ndarray, ...]:
+        """Means of t and x over rows i to j, and sums of squares about them."""
+        n, st, sx, stt, stx, sxx = (self.sums[j] - self.sums[i]).T
+        mt, mx = st / n, sx / n
+        return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
+
+    def left(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
+        """What the line through rows i to j leaves of the sum of squares."""
+        _mt, _mx, tt, tx, xx = self.between(i, j)
+        return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
+
+    def line(self, i: int, j: int) -> _Line:
+        """Displacement at time 0, and velocity, of the line through rows i to j."""
+        mt, mx, tt, tx, _xx = self.between(i, j)
+        return float(mx - tx / tt * mt), float(tx / tt)
+
+
+def _noise(t: np.ndarray, x: np.ndarray) -> float:
+    """Variance of the noise: of each sample about the line through its neighbours."""
+    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
+    off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
+    off /= np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
+    spread = _NORMAL * float(np.median(np.abs(off)))
+    least = 1e-9 * float(np.ptp(x))  # a record may be without noise
+    return max(spread, least) ** 2
+
+
+def _parted(sums: _Sums, first: int, last: int, variance: float) -> set[int]:
+    """The rows that part rows `first` to `last` into straight pieces, both of these among them."""
+    open_parts, found = [(first, last)], {first, last}
+    while open_parts:
+        i, j = open_parts.pop()
+        at = np.arange(i + _FEWEST, j - _FEWEST + 1)
+        if not len(at):
+            continue
+        both = sums.left(i, at) + sums.left(at, j)
+        best = int(at[np.argmin(both)])
+        if sums.left(i, j) - both.min() > _WORTH * math.log(j - i) * variance:
+            found.add(best)
+            open_parts += [(i, best), (best, j)]
+    return found
+
+
+def _merged(sums: _Sums, knots: list[int], t: np.ndarray) -> list[int]:
+    """Knots without those between pieces that tell no step, the least one first."""
+    while len(knots) > 2:
+        pieces = [*itertools.pairwise(knots)]
+        speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
+        left = math.sqrt(sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1])
+        change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*knots[:-1], -1]])
+        faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
+        differs = change / (_DIFFERS * np.maximum(faster, _HELD * np.abs(speeds).max()))
+        moves = change * np.minimum(lasts[1:], lasts[:-1]) / (_MOVES * left)
+        tells = np.minimum(differs, moves)
+        least = int(np.argmin(tells))
+        if tells[least] > 1.0:
+            break
+        del knots[least + 1]
+    return knots
+
+
+def _meeting(one: _Line, other: _Line, last: float, first: float) -> float:
+    """Time at which two lines meet; between the last sample of one and the first of the other, as
+    far as that is near.
+    """
+    middle, reach = 0.5 * (last + first), 3.0 * (first - last)
+    meet = (one[0] - other[0]) / (other[1] - one[1])
+    return float(min(max(meet, middle - reach), middle + reach))
+
+
+def _refined(time: np.ndarray, displacement: np.ndarray, at: float, reach: int) -> float:
+    """The meeting of two lines found anew among all rows near it."""
+    middle = int(np.searchsorted(time, at))
+    i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
+    t, x = time[i:j] - at, displacement[i:j]
+    sums, places = _Sums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
+    both = sums.left(0, places) + sums.left(places, j - i)
+    best = int(places[np.argmin(both)])
+    return at + _meeting(sums.line(0, best), sums.line(best, j - i), t[best - 1], t[best])
+
+
+def _steps(times: list[float], speeds: list[float], ends: tuple[float, float]) -> list[Step]:
+    """Steps at the times between pieces; a short piece between two others is a ramp."""
+    bounds, found, n = [ends[0], *times, ends[1]], [], 0
+    while n < len(times):
+        lasts = bounds[n + 2] - bounds[n + 1]
+        around = min(bounds[n + 1] - bounds[n], bounds[-1] - bounds[n + 2])
+        inner = (
+            n + 2 < len(speeds)
+            and (speeds[n + 1] - speeds[n]) * (speeds[n + 2] - speeds[n + 1]) > 0.0
+        )
+        ramp = inner and lasts < _SHORT * around
+        found.append(Step(times[n], times[n + ramp], speeds[n], speeds[n + 1 + ramp]))
+        n += 1 + ramp
+    return found

@@ -1,0 +1,374 @@
+"""A fit: the friction parameters that a record of a laboratory tells, with statistical errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.stats import chi2
+
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model
+from rsfstudy.analysis.fitting.noise import check_noise
+from rsfstudy.analysis.fitting.record import COLUMNS, Record, loading_of
+from rsfstudy.analysis.fitting.search import Fitted, Search
+from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+from rsfstudy.quantity import Output, Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Accuracy of motions at which their differences tell derivatives.
+_SMOOTH = 1e-9
+#: Part of the way back to the step before that the window begins at, least slip distance over the
+#: distance of rows, and rows for each parameter.
+_BACK, _POINTS, _ROWS = 0.5, 3.0, 3
+#: Part of the time before the first step by which loading may come late.
+_LATE = 0.2
+#: Lags at which residuals freed of correlation are tested for what is left of it.
+_LAGS = 20
+#: Standard errors that numerical errors are held to as to the parameter itself.
+_SMALL = 100.0
+LOADINGS = ("steps", "recorded")
+
+_NUMBERS = (
+    Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
+    Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
+    Output("noise_size", "", "1", "standard deviation of the noise"),
+    Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
+    Output("effective_samples", "", "1", "number of independent samples that tell as much"),
+    Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
+    Output("whiteness", "", "1", "chance of as much correlation in residuals freed of it"),
+    Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
+    Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Output("window_begins", "", "um", "load point displacement where the window begins"),
+    Output("window_ends", "", "um", "load point displacement where the window ends"),
+    Output("rows_fitted", "", "1", "number of rows in the window"),
+)
+_ROWS_OF = (
+    *(replace(about, name=f"record_{about.name}") for about in COLUMNS[:3]),
+    Quantity("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
+    Quantity("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
+    Quantity("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
+    Quantity("residual", "", "1", "friction less that of the fit"),
+    Quantity("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+)
+
+
+@dataclass(frozen=True)
+class Fit(Measure):
+    """Friction parameters by least squares, under the noise that the residuals tell.
+
+    The model is the motion of the scene under the loading that the record tells, read as the rig
+    reads it, plus a trend of powers of load point displacement from the step. Errors are standard
+    errors ``<name>_stderr`` and the ends of 95 % intervals, ``<name>_low`` and ``<name>_high``;
+    ``<name>_error`` is numerical. A parameter that the record does not tell makes the outcome
+    `not_identified`; the message names it.
+
+    Parameters
+    ----------
+    records : tuple of Record
+        What may be fitted.
+    free : tuple of str
+        Parameters to look for (see `analysis.fitting.model.PARAMETERS`). The others are those of
+        the scene.
+    slip_distance_guess : float
+        D_c in um of which the scene makes its unit of slip; the first guess where it is free.
+    slip_distance_2_guess : float
+        The same of the second state, where the law has two.
+    record : str
+        Name of the one to fit; the first one, if empty.
+    step : int
+        Number of the step that is fitted, from 1.
+    before, after : float
+        Load point displacement in um that is fitted before the step and after it. Zero: half the
+        way back to the step before, and up to the next.
+    noise : str
+        "white"; "ar", an autoregressive process whose order a criterion chooses; or "ar1" and so
+        on.
+    loading : {"steps", "recorded"}
+        The load point moves steadily between its steps; or as recorded, and normal stress with it,
+        unless that of the scene is constant.
+
+    References
+    ----------
+    Patterson and Thompson (1971), Biometrika 58, 545-554, for errors under correlated noise.
+    """
+
+    records: tuple[Record, ...]
+    free: tuple[str, ...] = ("a", "b", "slip_distance", "mu_star", "trend1")
+    slip_distance_guess: float = 10.0
+    slip_distance_2_guess: float = 100.0
+    record: str = ""
+    step: int = 1
+    before: float = 0.0
+    after: float = 0.0
+    noise: str = "ar"
+    loading: str = "steps"
+    name: ClassVar[str] = "fit"
+    typical_work = 250_000
+    dimensions = (
+        Quantity("parameter", "", "", "parameter that is fitted"),
+        Quantity("other_parameter", "", "", "parameter that is fitted"),
+        Quantity("row", "", "1", "row of the record"),
+        Quantity("record", "", "", "record that is fitted"),
+        Quantity("step", "", "1", "number of the step in the record"),
+        Quantity("before", "", "um", "load point displacement that is fitted before the step"),
+        Quantity("after", "", "um", "load point displacement that is fitted after the step"),
+        Quantity("noise", "", "", "model of the noise"),
+        Quantity("loading", "", "", "where the loading is taken from"),
+    )
+    sought: ClassVar[Sequence[str]] = (  # type: ignore[assignment]
+        *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
+        *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
+    )
+
+    def __post_init__(self) -> None:
+        if not self.records:
+            raise InvalidValue("records", self.records, "must hold a record at least")
+        names = [record.name for record in self.records]
+        if len(set(names)) < len(names):
+            raise InvalidValue("records", names, "must have names that differ")
+        if self.record and self.record not in names:
+            raise InvalidValue("record", self.record, "is unknown", choices=names)
+        if not self.free or len(set(self.free)) < len(self.free):
+            raise InvalidValue("free", self.free, "must name parameters, each once")
+        for name in self.free:
+            if name not in PARAMETERS:
+                raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS)
+        if self.step < 1:
+            raise InvalidValue("step", self.step, "must be at least 1")
+        for name in ("before", "after"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
+        for name in ("slip_distance_guess", "slip_distance_2_guess"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InvalidValue(name, getattr(self, name), "must be positive, in um")
+        if self.loading not in LOADINGS:
+            raise InvalidValue("loading", self.loading, "is unknown", choices=LOADINGS)
+        if "step_time" in self.free and self.loading == "recorded":
+            rule = "is that of a loading by steps"
+            raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
+        check_noise(self.noise)
+
+    @property
+    def headline(self) -> str:
+        """The first parameter."""
+        return self.free[0]
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        """Each parameter with its errors, what goes with all of them, and the rows."""
+        found = []
+        for name in self.free:
+            about = PARAMETERS[name]
+            found.append(Output(name, about.symbol, about.units, about.long_name, error=True))
+            for suffix, words in (
+                ("stderr", "standard error of the"),
+                ("low", "lower end of the 95 % interval of the"),
+                ("high", "upper end of the 95 % interval of the"),
+            ):
+                text = f"{words} {about.long_name}"
+                found.append(Output(f"{name}_{suffix}", "", about.units, text))
+        both = "parameter", "other_parameter"
+        rows = [Output(q.name, q.symbol, q.units, q.long_name, dims=("row",)) for q in _ROWS_OF]
+        return (
+            *found,
+            *_NUMBERS,
+            Output("covariance", "", "1", "covariance of parameters", dims=both),
+            Output("correlation", "", "1", "correlation of parameters", dims=both),
+            *rows,
+        )
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Names of the parameters, and numbers of rows."""
+        names = np.array(self.free, dtype=object)
+        rows = np.arange(max(map(len, self.records)))
+        return {"parameter": names, "other_parameter": names, "row": rows}
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """The parameter itself, or many of its standard errors."""
+        return {name: abs(values[name]) + _SMALL * values[f"{name}_stderr"] for name in self.free}
+
+    def describe(self) -> dict[str, Any]:
+        """The measure as plain data; records by their digests."""
+        plain = {f.name: getattr(self, f.name) for f in fields(self)}
+        records = {record.name: record.digest for record in self.records}
+        return {"name": self.name, **plain, "free": list(self.free), "records": records}
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Look for the parameters."""
+        record = next(r for r in self.records if r.name == (self.record or self.records[0].name))
+        steps = record.found
+        if self.step > len(steps):
+            text = f"the record has {len(steps)} steps of load point velocity"
+            return Outcome(Status.NO_STEP, message=text)
+        step = steps[self.step - 1]
+        begins, ends = self._window(record, step)
+        rows = np.flatnonzero((record.time >= begins) & (record.time <= ends))
+        if len(rows) < _ROWS * len(self.free) or not step.begins < ends:
+            text = f"the window holds {len(rows)} rows, too few for {len(self.free)} parameters"
+            return Outcome(Status.NOT_APPLICABLE, message=text)
+        loading = loading_of(record, begins, ends, recorded=self.loading == "recorded")
+        if not loading[0, 1] > 0.0:
+            text = "the window begins in a hold: a fit begins with steady sliding"
+            return Outcome(Status.NOT_APPLICABLE, message=text)
+        if scene.parts.normal_stress.name == "constant":
+            loading[:, 2:] = 1.0, 0.0  # what was recorded is noise
+        if "step_time" in self.free:
+            loading[0, 0] -= _LATE * (step.begins - begins)
+        moved = record.columns["displacement"][rows]
+        model = Model(
+            scene,
+            record.time[rows],
+            moved - np.interp(step.begins, record.time[rows], moved),
+            record.columns["friction"][rows],
+            loading,
+            replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH)),
+            meter,
+        )
+        found = Search(model, self._first(scene, model, step), self.free, self.noise).run()
+        untold = self._untold(found, model, step)
+        values = self._told(found, record, rows, model) | {
+            "velocity_before": step.before,
+            "velocity_after": step.after,
+            "window_begins": moved[0],
+            "window_ends": moved[-1],
+        }
+        if untold:
+            text = f"{', '.join(untold)}: the record does not tell"
+            return Outcome(Status.NOT_IDENTIFIED, values, text)
+        return Outcome(Status.OK, values)
+
+    def _window(self, record: Record, step: Step) -> tuple[float, float]:
+        """Times in s between which rows are fitted."""
+        earlier = [s.ends for s in record.found if s.ends < step.begins]
+        later = [s.begins for s in record.found if s.begins > step.ends]
+        first, last = max(earlier, default=record.time[0]), min(later, default=record.time[-1])
+        begins = step.begins - (_BACK if earlier else 1.0) * (step.begins - first)
+        moved = record.columns["displacement"]
+        at = np.interp(step.begins, record.time, moved)
+        if self.before:
+            begins = max(begins, record.time[np.argmax(moved >= at - self.before)])
+        if self.after:
+            beyond = (moved > at + self.after) & (record.time > step.begins)
+            last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
+        return float(begins), float(last)
+
+    def _first(self, scene: Scene, model: Model, step: Step) -> dict[str, float]:
+        """All parameters to begin with: what the record shows at a glance, else those of the
+        scene.
+        """
+        friction = model.friction
+        before, later = friction[model.time < step.begins], friction[model.time >= step.ends]
+        tail = later[-max(len(later) // 10, 1) :]
+        values = {
+            "a": scene.a,
+            "slip_distance": self.slip_distance_guess,
+            "mu_star": float(np.mean(before)) if len(before) else scene.mu_star,
+            "stiffness": scene.stiffness / self.slip_distance_guess,
+        }
+        effects = {"b": scene.b} if scene.parts.law.states == 1 else self._two(scene)
+        if "mu_star" not in self.free:
+            values["mu_star"] = scene.mu_star
+        if step.after > 0.0 and len(before):
+            ratio = math.log(step.after / step.before)
+            peak = later.max() if ratio > 0.0 else later.min()
+            read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
+            read_b = (peak - float(np.mean(tail))) / ratio
+            seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
+            values |= {n: v for n, v in seen.items() if n in self.free and n in {"a", *effects}}
+            effects |= {n: values.pop(n) for n in effects if n in values}
+        values |= effects
+        for name in ("alpha", "law_exponent"):
+            stated = scene.as_dict().get(name)
+            if stated is not None:
+                values[name] = stated
+        for name in self.free:
+            values.setdefault(name, 0.0)
+        return values
+
+    def _two(self, scene: Scene) -> dict[str, float]:
+        shares = scene.as_dict()
+        return {
+            "b1": scene.a * shares["b1_over_a"],
+            "b2": scene.a * shares["b2_over_a"],
+            "slip_distance_2": self.slip_distance_2_guess,
+        }
+
+    def _untold(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
+        """Parameters that the record does not tell; those of too few rows a slip distance too."""
+        apart = np.median(np.diff(model.displacement[model.time >= step.begins]))
+        sparse = [
+            name
+            for name in ("slip_distance", "slip_distance_2")
+            if name in found.free and found.values[name] < _POINTS * apart
+        ]
+        return tuple(n for n in found.free if n in (*found.untold, *sparse))
+
+    def _told(
+        self, found: Fitted, record: Record, rows: np.ndarray, model: Model
+    ) -> dict[str, Value]:
+        """Numbers and rows of what was found."""
+        values: dict[str, Value] = {}
+        slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in found.free])
+        for name in found.free:
+            values[name], values[f"{name}_error"] = found.values[name], found.errors[name]
+            values[f"{name}_stderr"] = found.stderr(name)
+            values[f"{name}_low"], values[f"{name}_high"] = found.low[name], found.high[name]
+        covariance = found.covariance * np.outer(slopes, slopes)
+        spread = np.sqrt(np.diag(covariance))
+        with np.errstate(invalid="ignore"):
+            correlation = covariance / np.outer(spread, spread)
+        signs = np.array(
+            [{"a": 1.0, "b": -1.0, "b1": -1.0, "b2": -1.0}.get(n, 0.0) for n in found.free]
+        )
+        b = found.values["b"] if "b" in found.values else found.values["b1"] + found.values["b2"]
+        left = model.friction - found.curve - found.trend
+        variance = float(np.var(model.friction)) or math.nan
+        values |= {
+            "a_minus_b": found.values["a"] - b,
+            "a_minus_b_stderr": math.sqrt(max(float(signs @ covariance @ signs), 0.0)),
+            "noise_size": found.size,
+            "noise_order": found.noise.order,
+            "effective_samples": found.noise.effective_samples,
+            "degrees_of_freedom": found.degrees,
+            "whiteness": _whiteness(found.innovations, found.noise.order),
+            "r_squared": 1.0 - float(np.var(left)) / variance,
+            "rows_fitted": len(rows),
+            "covariance": covariance,
+            "correlation": correlation,
+        }
+        columns = {
+            "fitted_friction": found.curve + found.trend,
+            "fitted_friction_stderr": found.band,
+            "detrended_friction": found.curve,
+            "residual": left,
+            "innovation": found.innovations,
+        }
+        shape = len(self.inner_coordinates["row"])
+        for name, column in columns.items():
+            whole = np.full(shape, math.nan)
+            whole[rows] = column
+            values[name] = whole
+        for about in COLUMNS[:3]:
+            whole = np.full(shape, math.nan)
+            whole[: len(record)] = record.columns[about.name]
+            values[f"record_{about.name}"] = whole
+        return values
+
+
+def _whiteness(innovations: np.ndarray, order: int) -> float:
+    """The chance that residuals freed of correlation are white (Ljung and Box, 1978)."""
+    count, seen = len(innovations), innovations - innovations.mean()
+    lags = np.arange(1, min(_LAGS + order, count // 4) + 1)
+    correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
+    size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
+    return float(chi2.sf(size, max(len(lags) - order, 1)))

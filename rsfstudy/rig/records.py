@@ -1,0 +1,210 @@
+"""Records of a laboratory from text files, from xlook's binary files, and from arrays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.analysis.fitting.record import COLUMNS, Record
+from rsfstudy.doors import check_file, door
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.table import Column, read_table
+from rsfstudy.rig.units import factor, in_si
+
+#: SI units of what a record may hold, and what turns them into those of `Record`.
+_UNITS = {
+    "time": ("s", 1.0),
+    "displacement": ("m", 1e6),
+    "friction": ("1", 1.0),
+    "shear_stress": ("Pa", 1.0),
+    "normal_stress": ("Pa", 1.0),
+}
+#: How headings of the usual files begin.
+_HEADINGS = {
+    "time": r"t(ime)?\b|time",
+    "displacement": r"(load.*)?disp|lp_?disp|l\.?p\.? disp|load.?point",
+    "friction": r"fric|mu\b|coeff",
+    "shear_stress": r"shear|tau",
+    "normal_stress": r"(eff\w*[ _])?norm|sigma",
+}
+_HEADING = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+#: Layout of xlook's files: bytes before the headers of columns and of each, how many there are, and
+#: where columns begin.
+_HEAD, _HEADER, _COLUMNS = 36, 84, 32
+_BEGIN = _HEAD + _HEADER * _COLUMNS
+
+
+@door
+def read_record(
+    source: Any,
+    columns: Mapping[str, tuple[Any, ...]] | None = None,
+    *,
+    normal_stress: Any = None,
+    name: str = "record",
+) -> Record:
+    """A record of an experiment, for `rsfstudy.fit`.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
+        the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
+        recorded. Plain arrays are in s, um, and MPa.
+    columns : mapping of str to (heading, units), optional
+        Heading in the file, and units, of each: ``{"time": ("t", "s")}``. Without it headings are
+        known by how they begin, and state their units, as in ``Displ (um)``. Columns of xlook's
+        files are named by their heading or number, with a scale and an offset where their numbers
+        are raw: ``{"displacement": ("LP_disp", "um", 0.1, 0.0)}``.
+    normal_stress : quantity, optional
+        By which shear stress is divided where no normal stress was recorded ("20 MPa").
+    name : str
+        What it is called in results.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    DataError
+        Where there is no such file.
+    InvalidValue
+        For missing columns or units, a field that is no number, with its line and column, and for
+        what `Record` refuses.
+    """
+    if isinstance(source, str | Path):
+        check_file("record", source)
+        binary = _is_binary(Path(source))
+        found = _of_xlook(Path(source), columns) if binary else _of_text(Path(source), columns)
+    elif isinstance(source, Mapping):
+        found = {key: Column(np.asarray(v, dtype=float), "") for key, v in source.items()}
+    else:
+        remedy = "Give the path of a file, or a mapping of arrays."
+        raise InvalidValue("record", source, "is no record", remedy=remedy)
+    values = {}
+    for key, column in found.items():
+        if key not in _UNITS:
+            raise InvalidValue("column", key, "is unknown", choices=_UNITS)
+        wrong = ~np.isfinite(column.values)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            rule = "must be a finite number"
+            raise InvalidValue(key, float(column.values[row]), rule).at(column.place(row))
+        values[key] = column.values * _scale(key, column.units)
+    return _record(values, normal_stress, name)
+
+
+def _scale(key: str, units: str) -> float:
+    """What turns a column into units of `Record`; without units it is in those of laboratories."""
+    si, ours = _UNITS[key]
+    if not units:
+        return {"Pa": 1e6}.get(si, 1.0)
+    if si == "1":
+        return 1.0 if units in ("1", "-") else factor(key, units, si)
+    return factor(key, units, si) * ours
+
+
+def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Record:
+    if "friction" not in values:
+        if "shear_stress" not in values:
+            rule = "tells no friction: it needs friction, or shear_stress"
+            raise InvalidValue("record", [*values], rule)
+        stress = values.get("normal_stress")
+        if stress is None:
+            if normal_stress is None:
+                remedy = "Give normal_stress, as in '20 MPa'."
+                raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
+            stress = np.full(
+                len(values["shear_stress"]), in_si("normal_stress", normal_stress, "Pa")
+            )
+        if not (stress > 0.0).all():
+            row = int(np.argmax(~(stress > 0.0)))
+            rule = f"must be positive, and is not in row {row + 1}"
+            raise InvalidValue("normal_stress", float(stress[row]), rule)
+        values["friction"] = values["shear_stress"] / stress
+    return Record({q.name: values[q.name] for q in COLUMNS if q.name in values}, name)
+
+
+def _of_text(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mapping[str, Column]:
+    """Columns of a text file, by headings that are known."""
+    if columns is not None:
+        return read_table(
+            path, {key: (heading, units) for key, (heading, units) in columns.items()}
+        )
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        header = file.readline()
+    between = next((c for c in "\t;," if c in header), None)
+    wanted: dict[str, tuple[str, str]] = {}
+    for text in header.rstrip("\n").split(between):
+        match = _HEADING.fullmatch(text)
+        for key, begins in _HEADINGS.items():
+            if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
+                units = (match[2] or "").strip()
+                if not units and key != "friction":
+                    rule = "states no units"
+                    remedy = f"Write them behind it, as in {text.strip()} (um), or give columns."
+                    raise InvalidValue("heading", text.strip(), rule, remedy=remedy).at(
+                        f"{path}, line 1"
+                    )
+                wanted[key] = (text.strip(), units)
+                break
+    if {"time", "displacement"} - set(wanted):
+        remedy = (
+            "Say which is which: columns={'time': ('t', 's'), 'displacement': ('lp', 'um'), ...}."
+        )
+        rule = "does not name time and displacement"
+        raise InvalidValue("header", header.strip()[:200], rule, remedy=remedy).at(
+            f"{path}, line 1"
+        )
+    return read_table(path, wanted)
+
+
+def _is_binary(path: Path) -> bool:
+    with path.open("rb") as file:
+        return b"\0" in file.read(_BEGIN)
+
+
+def _of_xlook(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mapping[str, Column]:
+    """Columns of a binary file of xlook: big-endian, headers of 84 bytes, then float32 one column
+    after the other. Its first column is the time that each sample takes.
+    """
+    data = path.read_bytes()
+    if len(data) < _BEGIN:
+        raise DataError(f"{path}: ends within the headers of an xlook file")
+    used = int.from_bytes(data[24:28], "big")
+    if not 0 < used <= _COLUMNS:
+        raise DataError(f"{path}: states {used} columns, which no xlook file has")
+    headings, begin, found = [], _BEGIN, {}
+    for number in range(used):
+        header = data[_HEAD + _HEADER * number : _HEAD + _HEADER * (number + 1)]
+        heading, units = (
+            part.split(b"\0")[0].decode("ascii", "replace").strip()
+            for part in (header[:13], header[13:26])
+        )
+        count = int.from_bytes(header[80:84], "big")
+        if begin + 4 * count > len(data):
+            raise DataError(f"{path}: ends within column {number + 1}, {heading!r}")
+        values = np.frombuffer(data, ">f4", count, begin).astype(float)
+        headings.append((heading, units, values))
+        begin += 4 * count
+    if columns is None:
+        names = ", ".join(f"{n}: {h} ({u})" for n, (h, u, _v) in enumerate(headings, start=1))
+        remedy = f"Name them by columns=. It holds {names}."
+        raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
+    for key, (heading, units, *line) in columns.items():
+        places = [n for n, (h, _u, _v) in enumerate(headings, 1) if heading in (n, h)]
+        if len(places) != 1:
+            known = [h for h, _u, _v in headings]
+            raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)
+        scale, offset = (*line, 1.0, 0.0)[:2] if len(line) != 1 else (line[0], 0.0)
+        values = headings[places[0] - 1][2] * scale + offset
+        found[key] = Column(np.cumsum(values) if key == "time" else values, units, places[0])
+    shortest = min(len(column.values) for column in found.values())
+    if any(len(column.values) - shortest > 1 for column in found.values()):
+        rule = "have lengths that differ by more than one"
+        raise InvalidValue("columns", [*found], rule).at(str(path))
+    return {key: column._replace(values=column.values[:shortest]) for key, column in found.items()}
