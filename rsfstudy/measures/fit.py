@@ -44,6 +44,7 @@ _NUMBERS = (
     Output("effective_samples", "", "1", "number of independent samples that tell as much"),
     Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
     Output("whiteness", "", "1", "chance of as much correlation in residuals freed of it"),
+    Output("criterion", "", "1", "Akaike's criterion, in which the noise counts; less is better"),
     Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
     Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
     Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
@@ -234,7 +235,8 @@ class Fit(Measure):
             replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH)),
             meter,
         )
-        found = Search(model, self._first(scene, model, step), self.free, self.noise).run()
+        search = Search(model, self._first(scene, model, step), self.free, self.noise)
+        found = search.run()
         untold = self._untold(found, model, step)
         values = self._told(found, record, rows, model) | {
             "velocity_before": step.before,
@@ -242,6 +244,8 @@ class Fit(Measure):
             "window_begins": moved[0],
             "window_ends": moved[-1],
         }
+        for name in self.free:
+            values[f"{name}_low"], values[f"{name}_high"] = search.interval(found, name)
         if untold:
             text = f"{', '.join(untold)}: the record does not tell"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
@@ -322,7 +326,6 @@ class Fit(Measure):
         for name in found.free:
             values[name], values[f"{name}_error"] = found.values[name], found.errors[name]
             values[f"{name}_stderr"] = found.stderr(name)
-            values[f"{name}_low"], values[f"{name}_high"] = found.low[name], found.high[name]
         covariance = found.covariance * np.outer(slopes, slopes)
         spread = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore"):
@@ -343,6 +346,7 @@ class Fit(Measure):
             "whiteness": _whiteness(found.innovations, found.noise.order),
             "r_squared": 1.0 - float(np.var(left)) / variance,
             "rows_fitted": len(rows),
+            "criterion": found.criterion,
             "covariance": covariance,
             "correlation": correlation,
         }

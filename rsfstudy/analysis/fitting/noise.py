@@ -268,6 +268,7 @@ def _innovations(
 def _kinds(time: np.ndarray) -> np.ndarray:
     """The kind of sampling interval that each sample is taken at: 0, 1 and so on."""
     gaps = np.diff(time)
+    gaps[gaps <= 0.0] = np.median(gaps)
     kinds = np.rint(np.log(gaps / np.median(gaps)) / math.log(_ALIKE))
     _names, kinds, counts = np.unique(
         np.append(kinds[:1], kinds), return_inverse=True, return_counts=True
@@ -284,9 +285,11 @@ def _count(time: np.ndarray) -> int:
 
 
 def _runs(time: np.ndarray) -> tuple[tuple[int, int, int], ...]:
-    """First row, row behind the last and kind of the runs of samples of one kind."""
+    """First row, row behind the last and kind of the runs of samples of one kind; where the clock
+    begins again there is another run.
+    """
     kinds = _kinds(time)
-    bounds = np.flatnonzero(np.diff(kinds)) + 1
+    bounds = np.flatnonzero((np.diff(kinds) != 0) | (np.diff(time) <= 0.0)) + 1
     firsts = [0, *bounds.tolist()]
     return tuple(
         (first, last, int(kinds[first]))

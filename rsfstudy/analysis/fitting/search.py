@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from rsfstudy.analysis.fitting import noise as noises
+from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import FINE, LOGARITHMIC, QUICK, Model, Values
 from rsfstudy.analysis.fitting.noise import Noise
 from rsfstudy.motion.meter import Halt
@@ -52,8 +53,6 @@ class Fitted:
         Of the free parameters, or of their logarithms (see `LOGARITHMIC`).
     errors : dict
         Numerical errors of the free parameters.
-    low, high : dict
-        Ends of their 95 % intervals.
     noise : Noise
     size : float
         Standard deviation of the noise.
@@ -68,6 +67,8 @@ class Fitted:
         Standard error of the curve with trend.
     jacobian : ndarray
         Derivatives of the curve with trend by the free parameters, or their logarithms.
+    criterion : float
+        Akaike's, of the likelihood of this record with this noise: less is better.
     untold : tuple of str
         Free parameters that the record does not tell.
     """
@@ -76,8 +77,6 @@ class Fitted:
     free: tuple[str, ...]
     covariance: np.ndarray
     errors: dict[str, float]
-    low: dict[str, float]
-    high: dict[str, float]
     noise: Noise
     size: float
     degrees: float
@@ -86,6 +85,7 @@ class Fitted:
     innovations: np.ndarray
     band: np.ndarray
     jacobian: np.ndarray
+    criterion: float
     untold: tuple[str, ...]
 
     def stderr(self, name: str) -> float:
@@ -99,7 +99,7 @@ class Search:
 
     Parameters
     ----------
-    model : Model
+    model : Model or Joint
     values : mapping of str to float
         All parameters; those that are free to begin with.
     free : sequence of str
@@ -107,7 +107,9 @@ class Search:
         As `noise.fitted` takes it.
     """
 
-    def __init__(self, model: Model, values: Values, free: Sequence[str], noise: str) -> None:
+    def __init__(
+        self, model: Model | Joint, values: Values, free: Sequence[str], noise: str
+    ) -> None:
         self.model, self.free, self.name = model, tuple(free), noise
         self.first = dict(values)
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
@@ -116,8 +118,8 @@ class Search:
         if name in LOGARITHMIC:
             at = math.log(self.first[name])
             return at - _WIDE, at + _WIDE
-        if name == "step_time":
-            late = self.model.time[0] - self.model.loading[0, 0]
+        if name.startswith("step_time"):
+            late = self.model.latest(name)
             return -late, late
         return _BOUNDS.get(name, (-math.inf, math.inf))
 
@@ -155,7 +157,7 @@ class Search:
 
     def _begin(self) -> np.ndarray:
         """Coordinates to begin with: those of the slip distance with which the least is left."""
-        self.model.scene_of(self.first)  # whatever is wrong with it is said
+        self.model.check(self.first)  # whatever is wrong with it is said
         scales = _GRID if "slip_distance" in self.free else (1.0,)
         distances = [n for n in ("slip_distance", "slip_distance_2") if n in self.free]
         linear = [n for n in self.free if self.model.is_linear(n)]
@@ -232,13 +234,11 @@ class Search:
         slopes = [_slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
         band = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
-        found = Fitted(
+        return Fitted(
             values=values,
             free=self.free,
             covariance=covariance,
             errors=dict(zip(self.free, errors.tolist(), strict=True)),
-            low={},
-            high={},
             noise=noise,
             size=size,
             degrees=degrees,
@@ -247,11 +247,9 @@ class Search:
             innovations=innovations / size,
             band=band,
             jacobian=jacobian,
+            criterion=_criterion(innovations, noise, len(x)),
             untold=self._untold(x, values, covariance),
         )
-        ends = [self._ends(found, x, place) for place in range(len(x))]
-        low, high = ({n: e[side] for n, e in zip(self.free, ends, strict=True)} for side in (0, 1))
-        return replace(found, low=low, high=high)
 
     def _untold(self, x: np.ndarray, values: Values, covariance: np.ndarray) -> tuple[str, ...]:
         """Free parameters that the record does not tell."""
@@ -275,11 +273,12 @@ class Search:
                 found.append(name)
         return tuple(found)
 
-    def _ends(self, found: Fitted, x: np.ndarray, place: int) -> tuple[float, float]:
+    def interval(self, found: Fitted, name: str) -> tuple[float, float]:
         """Ends of the 95 % interval of a parameter: of the parabola that its likelihood is nearly,
         else where the likelihood itself has fallen as far, or a bound.
         """
-        name, reach = self.free[place], student.isf(0.5 * (1.0 - COVERS), found.degrees)
+        x, place = self.coordinates(found.values), self.free.index(name)
+        reach = student.isf(0.5 * (1.0 - COVERS), found.degrees)
         direction = found.covariance[:, place] / math.sqrt(found.covariance[place, place])
         if not np.isfinite(direction).all():
             low, high = self.low[place], self.high[place]
@@ -315,6 +314,16 @@ class Search:
         moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         rest = whitened[:, -1] - whitened[:, :-1] @ moved
         return float(rest @ rest - np.square(found.innovations).sum())
+
+
+def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
+    """Minus twice the logarithm of the likelihood, and twice the number of parameters, those of the
+    noise too, corrected for few independent samples (Hurvich and Tsai, 1989).
+    """
+    count, size = len(innovations), float(innovations @ innovations)
+    every = parameters + noise.order * len(noise.sizes) + len(noise.sizes)
+    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
+    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 def _is_still(moved: np.ndarray, whitened: np.ndarray) -> bool:

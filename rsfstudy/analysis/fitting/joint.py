@@ -1,0 +1,110 @@
+"""Windows of records in one fit: parameters of the material are shared, and each of several windows
+has friction before its step, trends and the time of its step for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
+
+#: What parameters that each window may have for itself begin with.
+_OWN = ("mu_star", "step_time", "trend")
+
+
+def is_own(name: str) -> bool:
+    """True for a parameter that each window may have for itself."""
+    return name.startswith(_OWN)
+
+
+def numbered(names: Sequence[str], windows: int) -> tuple[str, ...]:
+    """Names of the parameters of so many windows: ``mu_star_1``, ``mu_star_2`` and so on."""
+    if windows == 1:
+        return tuple(names)
+    own = [name for name in names if is_own(name)]
+    each = [f"{name}_{number}" for number in range(1, windows + 1) for name in own]
+    return (*(name for name in names if not is_own(name)), *each)
+
+
+def plain(name: str) -> str:
+    """A parameter without the number of its window."""
+    before, _, number = name.rpartition("_")
+    return before if number.isdecimal() and is_own(name) else name
+
+
+@dataclass(frozen=True)
+class Joint:
+    """The models of one window or several, with the interface of a model."""
+
+    parts: tuple[Model, ...]
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """Times of all rows: a clock that begins again is that of another window."""
+        return np.concatenate([part.time - part.time[0] for part in self.parts])
+
+    @cached_property
+    def friction(self) -> np.ndarray:
+        """Friction of all rows."""
+        return np.concatenate([part.friction for part in self.parts])
+
+    def is_linear(self, name: str) -> bool:
+        """True for a parameter in which friction is linear, whatever the others."""
+        return all(part.is_linear(plain(name)) for part in self.parts)
+
+    def latest(self, name: str) -> float:
+        """By how much the loading of a window may come late."""
+        number = name.rpartition("_")[2]
+        return self.parts[int(number) - 1 if number.isdecimal() else 0].latest(plain(name))
+
+    def check(self, values: Values) -> None:
+        """Raise InvalidValue for parameters that make no scene."""
+        for number, part in enumerate(self.parts, start=1):
+            part.check(_of_window(values, number))
+
+    def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
+        """Friction along the rows of all windows, without trends (see `Model.curve`)."""
+        return np.concatenate(
+            [
+                part.curve(_of_window(values, number), refined=refined, checked=checked)
+                for number, part in enumerate(self.parts, start=1)
+            ]
+        )
+
+    def trend(self, values: Values) -> np.ndarray:
+        """The trends along the rows of all windows."""
+        return np.concatenate(
+            [part.trend(_of_window(values, n)) for n, part in enumerate(self.parts, start=1)]
+        )
+
+    def jacobian(
+        self, values: Values, free: Sequence[str], differences: Differences = FINE
+    ) -> np.ndarray:
+        """Derivatives along the rows of all windows (see `Model.jacobian`)."""
+        blocks = []
+        for number, part in enumerate(self.parts, start=1):
+            block = np.zeros((len(part.time), len(free)))
+            acting = [
+                place
+                for place, name in enumerate(free)
+                if plain(name) == name or name.endswith(f"_{number}")
+            ]
+            names = [plain(free[place]) for place in acting]
+            block[:, acting] = part.jacobian(_of_window(values, number), names, differences)
+            blocks.append(block)
+        return np.concatenate(blocks)
+
+
+def _of_window(values: Values, number: int) -> dict[str, float]:
+    """The parameters of one window, by their plain names."""
+    ending, found = f"_{number}", {}
+    for name, value in values.items():
+        if plain(name) == name:
+            found[name] = value
+        elif name.endswith(ending):
+            found[name.removesuffix(ending)] = value
+    return found

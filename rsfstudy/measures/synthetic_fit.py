@@ -1,0 +1,316 @@
+"""A fit of a synthetic record, whose parameters are known: does it find them within its errors?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_toeplitz, toeplitz
+from scipy.stats import t as student
+
+from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values
+from rsfstudy.analysis.fitting.noise import check_noise
+from rsfstudy.analysis.fitting.search import Fitted, Search
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+from rsfstudy.quantity import Output, Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Correlation of an autoregressive process of order one, and coefficients of a moving average.
+_AR1, _MA3 = 0.9, (1.0, 0.8, 0.5, 0.2)
+#: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
+ONE, TWO = 0.6827, 0.9545
+#: Slip distance that a search begins with, over the true one.
+_OFF = 1.5
+
+_OF_PARAMETER = (
+    ("estimate", "parameter, or its logarithm"),
+    ("deviation", "parameter, or its logarithm, less the true one"),
+    ("spread", "standard error of the parameter, or of its logarithm"),
+    ("promised_spread", "standard error that Fisher's information promises"),
+    ("inside_one", "whether the truth lies within the 68.3 % interval"),
+    ("inside_two", "whether the truth lies within the 95.4 % interval"),
+    ("naive_inside_one", "the same, residuals taken for white noise"),
+    ("naive_inside_two", "the same, residuals taken for white noise"),
+    ("told", "whether the record tells the parameter"),
+)
+
+
+class _Piece(NamedTuple):
+    """A piece of a protocol: velocity in um/s, how long it lasts in s, and its rows."""
+
+    velocity: float
+    lasts: float
+    rows: int
+
+
+@dataclass(frozen=True)
+class SyntheticFit(Measure):
+    """What a fit makes of a record that was computed, with noise that was drawn.
+
+    The record is that of the scene, whose unit of slip is `slip_distance`, under a protocol; rows
+    are evenly spaced in load point displacement, in a hold in time.
+
+    Parameters
+    ----------
+    protocol : str
+        Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um; a hold
+        states its time, ``"0:100 s"``. Windows that are fitted together are parted by semicolons.
+    free : tuple of str
+        Parameters to look for.
+    slip_distance : float
+        D_c in um.
+    rows : int
+        Rows of each window.
+    noise_size : float
+        Standard deviation of the noise.
+    process : {"white", "ar1", "ma3"}
+        The noise that is drawn: white, autoregressive with a correlation of 0.9, or a moving
+        average of the last four.
+    noise : str
+        The noise that the fit looks for, as `Fit` takes it.
+    fitted_law : str
+        The law that is fitted; that of the scene, if empty.
+    seed : int
+        Tells the noise.
+    """
+
+    protocol: str = "1:30, 10:270"
+    free: tuple[str, ...] = ("a", "b", "slip_distance", "mu_star", "trend1")
+    slip_distance: float = 10.0
+    rows: int = 500
+    noise_size: float = 5e-4
+    process: str = "white"
+    noise: str = "ar"
+    fitted_law: str = ""
+    seed: int = 0
+    name: ClassVar[str] = "synthetic_fit"
+    headline = "deviation"
+    typical_work = 400_000
+    dimensions = (
+        Quantity("parameter", "", "", "parameter that is fitted"),
+        Quantity("protocol", "", "", "load point velocities and displacements"),
+        Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
+        Quantity("rows", "", "1", "rows of a window"),
+        Quantity("noise_size", "", "1", "standard deviation of the noise"),
+        Quantity("process", "", "", "noise that is drawn"),
+        Quantity("noise", "", "", "model of the noise"),
+        Quantity("fitted_law", "", "", "law that is fitted"),
+        Quantity("seed", "", "1", "number of the noise that is drawn"),
+    )
+
+    def __post_init__(self) -> None:
+        windows = self._windows()
+        for name in self.free:
+            if name not in PARAMETERS:
+                raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS)
+        if self.process not in ("white", "ar1", "ma3"):
+            choices = ("white", "ar1", "ma3")
+            raise InvalidValue("process", self.process, "is unknown", choices=choices)
+        for name in ("slip_distance", "noise_size"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InvalidValue(name, getattr(self, name), "must be positive")
+        if self.rows < 10 * len(windows[0]):
+            raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
+        if self.seed < 0:
+            raise InvalidValue("seed", self.seed, "must be 0 or more")
+        check_noise(self.noise)
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        """By parameter, how far off it is and how far it may be; and what laws are compared by."""
+        by = [Output(n, "", "1", text, dims=("parameter",)) for n, text in _OF_PARAMETER]
+        text = "Akaike's criterion, in which the noise counts"
+        return (*by, Output("criterion", "", "1", text), Output("noise_order"))
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """The parameters; of those that each window has for itself, that of the first one."""
+        return {"parameter": np.array(self.free, dtype=object)}
+
+    def _shown(self, values: np.ndarray) -> np.ndarray:
+        """Values of all parameters as they are shown."""
+        windows = len(self._windows())
+        names = [name if name in self._free else f"{name}_1" for name in self.free]
+        return values if windows == 1 else values[[self._free.index(name) for name in names]]
+
+    @property
+    def _free(self) -> tuple[str, ...]:
+        return numbered(self.free, len(self._windows()))
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Draw a record, and fit it."""
+        true = self._true(scene)
+        truth = self._joint(scene, accuracy, meter)
+        clean = truth.curve(true)
+        if not np.isfinite(clean).all():
+            return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be followed")
+        rng, size = np.random.default_rng(self.seed), self.noise_size
+        root = _root(self.process, self.rows)
+        noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.parts])
+        fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
+        model = self._joint(fitted, accuracy, meter, clean + size * noise)
+        first = self._first(fitted, true)
+        found = Search(model, first, self._free, self.noise).run()
+        naive = found
+        if self.noise != "white":
+            naive = Search(model, found.values, self._free, "white").run()
+        values: dict[str, Value] = {
+            **self._held(found, true, ""),
+            **{f"naive_{n}": v for n, v in self._held(naive, true, "inside").items()},
+            "promised_spread": self._shown(self._promised(truth, true)),
+            "told": self._shown(np.array([n not in found.untold for n in self._free], dtype=float)),
+            "criterion": found.criterion,
+            "noise_order": found.noise.order,
+        }
+        return Outcome(Status.OK, values)
+
+    def _windows(self) -> list[list[_Piece]]:
+        """The pieces of each window."""
+        return [_pieces(text, self.rows) for text in self.protocol.split(";")]
+
+    def _true(self, scene: Scene) -> dict[str, float]:
+        """All parameters of the scene, with the numbers of windows."""
+        stated = scene.as_dict()
+        plainly = {
+            "a": scene.a,
+            "b": scene.b,
+            "slip_distance": self.slip_distance,
+            "stiffness": scene.stiffness / self.slip_distance,
+            "mu_star": scene.mu_star,
+        }
+        if scene.parts.law.states > 1:
+            del plainly["b"]
+            plainly |= {n: scene.a * stated[f"{n}_over_a"] for n in ("b1", "b2")}
+            plainly["slip_distance_2"] = self.slip_distance * stated["length_ratio"]
+        named = ("law_exponent", "alpha")
+        plainly |= {n: stated[n] for n in named if stated.get(n) is not None}
+        plainly |= {name: 0.0 for name in self.free if name not in plainly}
+        names = numbered(tuple(plainly), len(self._windows()))
+        return {name: plainly[plain(name)] for name in names}
+
+    def _first(self, scene: Scene, true: Values) -> dict[str, float]:
+        """Where the search begins: near the truth, and not at it."""
+        first = {
+            n: v * (_OFF if n in LOGARITHMIC and n in self.free else 1.0) for n, v in true.items()
+        }
+        if scene.law != "family":
+            first.pop("law_exponent", None)
+        elif "law_exponent" in self.free:
+            first["law_exponent"] = 0.5
+        return first
+
+    def _joint(
+        self, scene: Scene, accuracy: Accuracy, meter: Meter, friction: np.ndarray | None = None
+    ) -> Joint:
+        """The model of the windows, with friction along their rows."""
+        smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
+        parts = []
+        for number, pieces in enumerate(self._windows()):
+            time, moved, loading = _rows(pieces)
+            rows = slice(number * self.rows, (number + 1) * self.rows)
+            seen = np.zeros(self.rows) if friction is None else friction[rows]
+            parts.append(Model(scene, time, moved, seen, loading, smooth, meter))
+        return Joint(tuple(parts))
+
+    def _held(self, found: Fitted, true: Values, only: str) -> dict[str, np.ndarray]:
+        """Deviations, spreads, and whether the truth lies within the intervals."""
+        at, truth = (
+            np.array([math.log(v[n]) if n in LOGARITHMIC else v[n] for n in self._free])
+            for v in (found.values, true)
+        )
+        spread = np.sqrt(np.diag(found.covariance))
+        off = at - truth
+        one, two = (student.isf(0.5 * (1.0 - p), found.degrees) * spread for p in (ONE, TWO))
+        values = {
+            "estimate": at,
+            "deviation": off,
+            "spread": spread,
+            "inside_one": (np.abs(off) <= one).astype(float),
+            "inside_two": (np.abs(off) <= two).astype(float),
+        }
+        return {name: self._shown(v) for name, v in values.items() if name.startswith(only)}
+
+    def _promised(self, truth: Joint, true: Values) -> np.ndarray:
+        """Standard errors by Fisher's information, the noise being known."""
+        correlations = _correlations(self.process, self.rows)
+        jacobian = truth.jacobian(true, self._free)
+        information = np.zeros((len(self._free),) * 2)
+        for first in range(0, len(jacobian), self.rows):
+            part = jacobian[first : first + self.rows]
+            information += part.T @ solve_toeplitz(correlations, part)
+        scales = np.sqrt(np.diag(information))
+        inverse = np.linalg.pinv(information / np.outer(scales, scales), hermitian=True)
+        return np.asarray(self.noise_size * np.sqrt(np.diag(inverse)) / scales)
+
+
+def _pieces(text: str, rows: int) -> list[_Piece]:
+    """The pieces of a window."""
+    stated = [part.partition(":") for part in text.split(",")]
+    rule, remedy = "is no protocol", "Write it as in '1:30, 10:270', or '1:30, 0:100 s, 1:270'."
+    found: list[tuple[float, float, float]] = []
+    for velocity, _colon, length in stated:
+        try:
+            speed, holds = float(velocity), length.strip().endswith("s")
+            size = float(length.strip().removesuffix("s"))
+        except ValueError as error:
+            raise InvalidValue("protocol", text, rule, remedy=remedy) from error
+        if not (size > 0.0 and math.isfinite(size) and 0.0 <= speed < math.inf):
+            raise InvalidValue("protocol", text, rule, remedy=remedy)
+        if (speed == 0.0) != holds:
+            remedy = "A hold states its time, as in '0:100 s', and others displacements."
+            raise InvalidValue("protocol", text, rule, remedy=remedy)
+        found.append((speed, size if holds else size / speed, size))
+    if len(found) < 2 or not found[0][0] > 0.0:
+        raise InvalidValue("protocol", text, "must begin with sliding, and change then")
+    moved = math.fsum(size for speed, _lasts, size in found if speed)
+    held = sum(1 for speed, _lasts, _size in found if not speed)
+    each = rows // (len(found) + 1) if held else 0
+    counts = [
+        each if not speed else int((rows - held * each) * size / moved) for speed, _l, size in found
+    ]
+    counts[-1] += rows - sum(counts)
+    return [_Piece(s, lasts, n) for (s, lasts, _size), n in zip(found, counts, strict=True)]
+
+
+def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, displacements from the first step, and the loading of a window."""
+    begins = np.cumsum([0.0, *(piece.lasts for piece in pieces)])
+    moved = np.cumsum([0.0, *(piece.lasts * piece.velocity for piece in pieces)])
+    time, displacement = [], []
+    for number, piece in enumerate(pieces):
+        part = (np.arange(piece.rows) + 0.5) / max(piece.rows, 1)
+        time.append(begins[number] + part * piece.lasts)
+        displacement.append(moved[number] + part * piece.lasts * piece.velocity)
+    loading = np.array(
+        [(t, p.velocity, 1.0, 0.0) for t, p in zip(begins[:-1], pieces, strict=True)]
+    )
+    return np.concatenate(time), np.concatenate(displacement) - moved[1], loading
+
+
+@lru_cache(maxsize=8)
+def _root(process: str, rows: int) -> np.ndarray:
+    """Matrix that makes white noise that of a process."""
+    return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
+
+
+def _correlations(process: str, rows: int) -> np.ndarray:
+    """Autocorrelations of a process at each lag."""
+    found = np.zeros(rows)
+    if process == "ar1":
+        found[:] = _AR1 ** np.arange(rows)
+    elif process == "ma3":
+        weights = np.array(_MA3)
+        told = np.correlate(weights, weights, "full")[len(weights) - 1 :]
+        found[: len(told)] = told / told[0]
+    else:
+        found[0] = 1.0
+    return found

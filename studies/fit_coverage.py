@@ -1,0 +1,163 @@
+"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of three kinds."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.synthetic_fit import ONE, TWO, SyntheticFit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction
+from rsfstudy.slider.scene import Scene
+
+RECORDS = 24
+PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
+#: Of which shares of records are told, with what Gaussian errors cover.
+INTERVALS = {"inside_one": ONE, "inside_two": TWO}
+#: Standard deviations of a binomial share by which ours may be off.
+CHANCE = 3.5
+
+
+@dataclass(frozen=True)
+class ShareInside(Reduction):
+    """Share of records whose truth lies within an interval.
+
+    Parameters
+    ----------
+    name : str
+        Gives the share ``<name>``; and ``<name>_least``, how far that of the parameter with the
+        least is above `covers`, in binomial standard deviations.
+    of : str
+        Variable that is 1 inside and 0 outside.
+    covers : float
+        Share that the interval promises.
+    """
+
+    covers: float = ONE
+    kind: ClassVar[str] = "share_inside"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Mean over records."""
+        share = dataset[self.of].mean("seed")
+        spread = np.sqrt(self.covers * (1.0 - self.covers) / dataset.sizes["seed"])
+        least = (share.min("parameter") - self.covers) / spread
+        return xr.Dataset({self.name: share, f"{self.name}_least": least})
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The share, and how far it is from what is promised."""
+        words = "least share above what is promised, in standard deviations"
+        return (
+            Quantity(self.name, "", "1", "share of records with the truth inside"),
+            Quantity(f"{self.name}_least", "", "1", words),
+        )
+
+
+def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
+    """Shares by parameter, of the fit and of the naive formula."""
+    from rsfstudy.plots import look, marker
+
+    places = np.arange(dataset.sizes["parameter"])
+    for number, process in enumerate(dataset["process"].values):
+        for prefix, fill in (("", "full"), ("naive_", "none")):
+            share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
+            axes.plot(
+                places + 0.15 * (number - 1),
+                share,
+                marker=marker(number),
+                color=look(number)["color"],
+                linestyle="",
+                fillstyle=fill,
+                label=f"{process}{', naive' * bool(prefix)}",
+            )
+    axes.axhline(100.0 * ONE, color="0.4", linestyle="--", linewidth=0.8)
+    names = [MODEL[str(name)].symbol or str(name) for name in dataset["parameter"].values]
+    axes.set_xticks(places, names)
+
+
+figure = Figure(
+    [
+        Panel(
+            each=["law"],
+            marks=[mark_shares],
+            y_label="Truth inside 68.3 % interval (%)",
+            y_limits=(0.0, 100.0),
+            alike="share",
+        )
+    ]
+)
+
+
+def covers(process: str, law: str) -> list[Claim]:
+    """F1 and F2: intervals cover what they promise, within chance."""
+    return [
+        Claim(
+            id=f"F{number}",
+            statement=f"{process} noise, {law} law: {100 * share:.1f} % intervals cover as much",
+            source="this project's promise for the errors of fits",
+            variable=f"share_{name.removeprefix('inside_')}_least",
+            where={"process": process, "law": law},
+            relation="above",
+            published=0.0,
+            tolerance=CHANCE,
+            reason="binomial standard deviations, of the parameter covered least",
+        )
+        for number, (name, share) in enumerate(INTERVALS.items(), start=1)
+    ]
+
+
+def naive_fails(process: str, law: str) -> Claim:
+    """F3: residuals taken for white noise make errors too small."""
+    return Claim(
+        id="F3",
+        statement=f"{process} noise, {law} law: naive 68.3 % intervals cover far less",
+        source="of n samples with correlated noise fewer count",
+        variable="naive_share_one_least",
+        where={"process": process, "law": law},
+        relation="below",
+        published=-CHANCE,
+        tolerance=0.0,
+        reason="beyond chance",
+    )
+
+
+study = Study(
+    name="fit_coverage",
+    title="Shares of synthetic records whose truth lies within the errors of the fit",
+    summary=(
+        "A velocity step from 1 to 10 um/s with noise that is white, autoregressive with a "
+        "correlation of 0.9, or a moving average, is fitted by the law that made it. Errors that "
+        "count the correlation of the noise (full markers) cover the truth as often as they "
+        "promise; those of the usual formula, which takes residuals for white noise (open "
+        "markers), cover it far less often where noise is correlated."
+    ),
+    base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03),
+    axes=[
+        Axis("process", list(PROCESSES)),
+        Axis("law", list(LAWS)),
+        Axis("seed", list(range(RECORDS))),
+    ],
+    measure=SyntheticFit(),
+    reductions=[
+        ShareInside(f"{prefix}share_{name.removeprefix('inside_')}", f"{prefix}{name}", share)
+        for prefix in ("", "naive_")
+        for name, share in INTERVALS.items()
+    ],
+    claims=[
+        *(c for process in PROCESSES for law in LAWS for c in covers(process, law)),
+        *(naive_fails(p, law) for p in PROCESSES[1:] for law in LAWS),
+    ],
+    plot=figure,
+    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    references=[
+        "Patterson and Thompson (1971), Biometrika 58, 545-554",
+        "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",
+    ],
+)

@@ -1,0 +1,145 @@
+"""Which steps tell the evolution law? Its exponent, and how well, by three designs."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.synthetic_fit import SyntheticFit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction
+from rsfstudy.slider.scene import Scene
+
+RECORDS = 12
+STEP, BACK = "1:30, 10:270", "10:30, 1:270"
+DESIGNS = {
+    "one step up": STEP,
+    "a pair, up and back": f"{STEP}; {BACK}",
+    "two steps up": f"{STEP}; {STEP}",
+}
+#: Standard errors of the exponent by Fisher's information.
+PROMISED = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
+#: Standard deviations of chance.
+CHANCE = 3.5
+
+
+@dataclass(frozen=True)
+class ScatterOverPromise(Reduction):
+    """Scatter of an estimate over records, over the standard error promised.
+
+    Parameters
+    ----------
+    name : str
+        Gives ``<name>``, the root of the mean square of deviations over what is promised, and
+        ``<name>_off``: how far that is from 1, in its own standard deviations.
+    of : str
+        Deviations of the estimate.
+    """
+
+    kind: ClassVar[str] = "scatter_over_promise"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Over records."""
+        square = (dataset[self.of] / dataset["promised_spread"]) ** 2
+        found = np.sqrt(square.mean("seed"))
+        off = (found - 1.0) * np.sqrt(2.0 * dataset.sizes["seed"])
+        return xr.Dataset({self.name: found, f"{self.name}_off": off})
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The scatter, and how far it is from 1."""
+        words = "scatter over what is promised, less 1, in standard deviations"
+        return (
+            Quantity(self.name, "", "1", "scatter of estimates over what is promised"),
+            Quantity(f"{self.name}_off", "", "1", words),
+        )
+
+
+def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
+    """Estimates of the exponent by design, and bars of what is promised."""
+    from rsfstudy.plots import look, marker
+
+    seen = dataset.sel(parameter="law_exponent")
+    for number in range(seen.sizes["design"]):
+        one = seen.isel(design=number)
+        spread = np.linspace(-0.2, 0.2, one.sizes["seed"])
+        style = {"color": look(number)["color"], "linestyle": ""}
+        axes.plot(number + spread, one["estimate"], marker=marker(number), markersize=4, **style)
+        promise = float(one["promised_spread"].isel(seed=0))
+        axes.errorbar(number + 0.35, EXPONENT, promise, color="0.2", capsize=4, marker="_")
+        text = f"{promise:.3f}"
+        axes.annotate(text, (number + 0.35, EXPONENT + promise), (0, 4), textcoords="offset points")
+    axes.set_xticks(range(len(DESIGNS)), list(DESIGNS))
+    axes.set_xlim(-0.4, len(DESIGNS) - 0.3)
+    axes.axhline(EXPONENT, color="0.6", linewidth=0.8)
+
+
+EXPONENT = 0.5
+figure = Figure(
+    [Panel(marks=[mark_estimates], y_label="Exponent of the law", y_limits=(0.0, 1.0))], columns=1
+)
+
+
+def claims(design: str) -> list[Claim]:
+    """I1 and I2: what steps tell, and that fits find as much."""
+    where = {"design": design, "parameter": "law_exponent"}
+    return [
+        Claim(
+            id="I1",
+            statement=f"{design}: standard error of the exponent by Fisher's information",
+            source="augmented equations of the sensitivities, 500 rows a step, white noise of 5e-4",
+            variable="promised_spread",
+            where={**where, "seed": 0},
+            published=PROMISED[design],
+            tolerance=0.02 * PROMISED[design],
+            reason="two digits are told",
+        ),
+        Claim(
+            id="I2",
+            statement=f"{design}: estimates scatter by as much",
+            source="Fisher's information",
+            variable="scatter_off",
+            where=where,
+            published=0.0,
+            tolerance=CHANCE,
+            reason="standard deviations of a standard deviation",
+        ),
+    ]
+
+
+study = Study(
+    name="law_identification",
+    title="Estimates of the exponent of the evolution law by three designs of velocity steps",
+    summary=(
+        "Velocity steps of ten with white noise of 5e-4, each with its own friction before it and "
+        "its own trend. The exponent of the law is 0 for the slip law and 1 for the slowness law. "
+        "One step up tells it poorly, since slip distance makes up for it; a second one like it "
+        "helps as any repetition does. A step back tells it ten times better."
+    ),
+    base=Scene(
+        law="family",
+        law_exponent=EXPONENT,
+        normal_stress="constant",
+        a=0.01,
+        b_over_a=1.3,
+        stiffness=0.03,
+    ),
+    axes=[
+        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        Axis("seed", list(range(RECORDS))),
+    ],
+    measure=SyntheticFit(
+        free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
+    ),
+    reductions=[ScatterOverPromise("scatter", "deviation")],
+    claims=[claim for design in DESIGNS for claim in claims(design)],
+    plot=figure,
+    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
+)
