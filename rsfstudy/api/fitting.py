@@ -44,6 +44,7 @@ def fit(
     laws: Sequence[str] = ("slip", "slowness"),
     free: Sequence[str] = FREE,
     steps: Sequence[int] = (),
+    together: bool = False,
     before: Any = 0.0,
     after: Any = 0.0,
     noise: str = "ar",
@@ -72,6 +73,9 @@ def fit(
     steps : sequence of int
         Numbers of the steps to fit, from 1; all of them, if none is given. ``record.steps()``
         lists them.
+    together : bool
+        Fit these steps, of all records, as one: with one a, b and slip distance, and friction
+        before it, trends and time of its own for each step (``mu_star_1``, ``mu_star_2``).
     before, after : quantity
         Load point displacement that is fitted around each ("100 um"); 0: all up to the next step,
         and half the way back to the one before.
@@ -117,15 +121,16 @@ def fit(
         slip_distance_guess=guess,
         slip_distance_2_guess=10.0 * guess,
         step=numbers[0],
+        together=_together(records, numbers) if together else (),
         before=_micrometres("before", before),
         after=_micrometres("after", after),
         noise=noise,
         loading=loading,
     )
     axes = [Axis("law", list(laws))]
-    if len(records) > 1:
+    if len(records) > 1 and not together:
         axes.append(Axis("record", [one.name for one in records]))
-    if len(numbers) > 1:
+    if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     engine = engine or (COMPILED if is_installed(COMPILED) else SCIPY)
     study = Study(
@@ -152,6 +157,11 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
             rule = f"is not the number of a step: the record has {count}"
             raise InvalidValue("steps", number, rule)
     return numbers
+
+
+def _together(records: Sequence[Record], numbers: Sequence[int]) -> tuple[tuple[str, int], ...]:
+    """The steps of all records, those that there are."""
+    return tuple((r.name, n) for r in records for n in numbers if n <= len(r.found))
 
 
 def _guess(record: Record, rig: Laboratory | None, number: int) -> float:
@@ -220,7 +230,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     ``_std`` are standard errors; NaN stands where something was not looked for.
     """
     names = {"a": "a", "b": "b", "b1": "b1", "b2": "b2", "slip_distance": "Dc"}
-    names |= {"slip_distance_2": "Dc2", "stiffness": "k", "mu_star": "mu_0", "trend1": "trend"}
+    names |= {"slip_distance_2": "Dc2", "stiffness": "k", "law_exponent": "exponent"}
+    names |= {"mu_star": "mu_0", "trend1": "trend"}
     rows = []
     for one in cells(dataset):
         row: dict[str, Any] = {n: one[n].item() for n in ("record", "step") if n in one.coords}
@@ -235,7 +246,7 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
-        row["R2"] = one["r_squared"].item()
+        row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
         row["status"] = _label(one)
         rows.append(row)
     return pd.DataFrame(rows)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.stats import chi2
 
+from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.record import COLUMNS, Record, loading_of
@@ -33,7 +34,11 @@ _LATE = 0.2
 #: Lags at which residuals freed of correlation are tested for what is left of it.
 _LAGS = 20
 #: Standard errors that numerical errors are held to as to the parameter itself.
-_SMALL = 100.0
+_SMALL = 1000.0
+_SOUGHT = (
+    *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
+    *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
+)
 LOADINGS = ("steps", "recorded")
 
 _NUMBERS = (
@@ -87,6 +92,9 @@ class Fit(Measure):
         Name of the one to fit; the first one, if empty.
     step : int
         Number of the step that is fitted, from 1.
+    together : tuple of (str, int)
+        Records and numbers of steps that are fitted together, instead: each has friction before it,
+        trends and the time of the step for itself, as ``mu_star_1`` and so on.
     before, after : float
         Load point displacement in um that is fitted before the step and after it. Zero: half the
         way back to the step before, and up to the next.
@@ -108,6 +116,7 @@ class Fit(Measure):
     slip_distance_2_guess: float = 100.0
     record: str = ""
     step: int = 1
+    together: tuple[tuple[str, int], ...] = ()
     before: float = 0.0
     after: float = 0.0
     noise: str = "ar"
@@ -125,10 +134,6 @@ class Fit(Measure):
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
     )
-    sought: ClassVar[Sequence[str]] = (  # type: ignore[assignment]
-        *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
-        *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
-    )
 
     def __post_init__(self) -> None:
         if not self.records:
@@ -136,15 +141,16 @@ class Fit(Measure):
         names = [record.name for record in self.records]
         if len(set(names)) < len(names):
             raise InvalidValue("records", names, "must have names that differ")
-        if self.record and self.record not in names:
-            raise InvalidValue("record", self.record, "is unknown", choices=names)
         if not self.free or len(set(self.free)) < len(self.free):
             raise InvalidValue("free", self.free, "must name parameters, each once")
         for name in self.free:
             if name not in PARAMETERS:
                 raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS)
-        if self.step < 1:
-            raise InvalidValue("step", self.step, "must be at least 1")
+        for name, step in self._windows:
+            if name not in names:
+                raise InvalidValue("record", name, "is unknown", choices=names)
+            if step < 1:
+                raise InvalidValue("step", step, "must be at least 1")
         for name in ("before", "after"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
@@ -159,16 +165,31 @@ class Fit(Measure):
         check_noise(self.noise)
 
     @property
+    def sought(self) -> tuple[str, ...]:
+        """Fields of the scene that are found, or follow from what is."""
+        return (*_SOUGHT, *(name for name in ("alpha", "law_exponent") if name in self.free))
+
+    @property
     def headline(self) -> str:
         """The first parameter."""
-        return self.free[0]
+        return self.parameters[0]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of what is looked for."""
+        return numbered(self.free, len(self._windows))
+
+    @property
+    def _windows(self) -> tuple[tuple[str, int], ...]:
+        """Records and steps that are fitted."""
+        return self.together or ((self.record or self.records[0].name, self.step),)
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Each parameter with its errors, what goes with all of them, and the rows."""
         found = []
-        for name in self.free:
-            about = PARAMETERS[name]
+        for name in self.parameters:
+            about = PARAMETERS[plain(name)]
             found.append(Output(name, about.symbol, about.units, about.long_name, error=True))
             for suffix, words in (
                 ("stderr", "standard error of the"),
@@ -190,66 +211,93 @@ class Fit(Measure):
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters, and numbers of rows."""
-        names = np.array(self.free, dtype=object)
-        rows = np.arange(max(map(len, self.records)))
+        names = np.array(self.parameters, dtype=object)
+        together = sum(map(len, self._involved))
+        rows = np.arange(together if self.together else max(map(len, self.records)))
         return {"parameter": names, "other_parameter": names, "row": rows}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The parameter itself, or many of its standard errors."""
-        return {name: abs(values[name]) + _SMALL * values[f"{name}_stderr"] for name in self.free}
+        return {
+            name: abs(values[name]) + _SMALL * values[f"{name}_stderr"] for name in self.parameters
+        }
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data; records by their digests."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self)}
+        stated = {f.name: getattr(self, f.name) for f in fields(self)}
         records = {record.name: record.digest for record in self.records}
-        return {"name": self.name, **plain, "free": list(self.free), "records": records}
+        return {"name": self.name, **stated, "free": list(self.free), "records": records}
+
+    @property
+    def _involved(self) -> tuple[Record, ...]:
+        """The records that are fitted, each once."""
+        by_name = {record.name: record for record in self.records}
+        return tuple(by_name[name] for name in dict(self._windows))
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Look for the parameters."""
-        record = next(r for r in self.records if r.name == (self.record or self.records[0].name))
-        steps = record.found
-        if self.step > len(steps):
-            text = f"the record has {len(steps)} steps of load point velocity"
-            return Outcome(Status.NO_STEP, message=text)
-        step = steps[self.step - 1]
-        begins, ends = self._window(record, step)
-        rows = np.flatnonzero((record.time >= begins) & (record.time <= ends))
-        if len(rows) < _ROWS * len(self.free) or not step.begins < ends:
-            text = f"the window holds {len(rows)} rows, too few for {len(self.free)} parameters"
-            return Outcome(Status.NOT_APPLICABLE, message=text)
-        loading = loading_of(record, begins, ends, recorded=self.loading == "recorded")
-        if not loading[0, 1] > 0.0:
-            text = "the window begins in a hold: a fit begins with steady sliding"
-            return Outcome(Status.NOT_APPLICABLE, message=text)
-        if scene.parts.normal_stress.name == "constant":
-            loading[:, 2:] = 1.0, 0.0  # what was recorded is noise
-        if "step_time" in self.free:
-            loading[0, 0] -= _LATE * (step.begins - begins)
-        moved = record.columns["displacement"][rows]
-        model = Model(
-            scene,
-            record.time[rows],
-            moved - np.interp(step.begins, record.time[rows], moved),
-            record.columns["friction"][rows],
-            loading,
-            replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH)),
-            meter,
-        )
-        search = Search(model, self._first(scene, model, step), self.free, self.noise)
+        smooth = replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH))
+        parts, firsts, rows, steps = [], [], [], []
+        for name, number in self._windows:
+            record = next(record for record in self._involved if record.name == name)
+            if number > len(record.found):
+                text = f"{name} has {len(record.found)} steps of load point velocity"
+                return Outcome(Status.NO_STEP, message=text)
+            step = record.found[number - 1]
+            seen, loading, wrong = self._part(record, step, scene)
+            if wrong:
+                return Outcome(Status.NOT_APPLICABLE, message=wrong)
+            part = _model(record, seen, step, loading, scene, smooth, meter)
+            parts.append(part)
+            firsts.append(self._first(scene, part, step))
+            rows.append(seen + self._begins(name))
+            steps.append(step)
+        first = dict(firsts[0])
+        for number, guess in enumerate(firsts if self.together else (), start=1):
+            first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
+        model = Joint(tuple(parts))
+        search = Search(model, first, self.parameters, self.noise)
         found = search.run()
-        untold = self._untold(found, model, step)
-        values = self._told(found, record, rows, model) | {
-            "velocity_before": step.before,
-            "velocity_after": step.after,
-            "window_begins": moved[0],
-            "window_ends": moved[-1],
-        }
-        for name in self.free:
+        untold = self._untold(found, parts[0], steps[0])
+        values = self._told(found, np.concatenate(rows), model)
+        values |= self._place(parts[0], rows[0] - self._begins(self._windows[0][0]), steps[0])
+        for name in self.parameters:
             values[f"{name}_low"], values[f"{name}_high"] = search.interval(found, name)
         if untold:
             text = f"{', '.join(untold)}: the record does not tell"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         return Outcome(Status.OK, values)
+
+    def _begins(self, name: str) -> int:
+        """First row of a record among those that are fitted together."""
+        names = [record.name for record in self._involved]
+        return sum(map(len, self._involved[: names.index(name)]))
+
+    def _place(self, part: Model, rows: np.ndarray, step: Step) -> dict[str, Value]:
+        """Velocities of a step, and its window."""
+        moved = self._involved[0].columns["displacement"][rows]
+        return {
+            "velocity_before": step.before,
+            "velocity_after": step.after,
+            "window_begins": moved[0],
+            "window_ends": moved[-1],
+        }
+
+    def _part(self, record: Record, step: Step, scene: Scene) -> tuple[np.ndarray, np.ndarray, str]:
+        """Rows and loading around a step; and what is wrong with them, in words."""
+        begins, ends = self._window(record, step)
+        rows = np.flatnonzero((record.time >= begins) & (record.time <= ends))
+        if len(rows) < _ROWS * len(self.free) or not step.begins < ends:
+            text = f"the window holds {len(rows)} rows, too few for {len(self.free)} parameters"
+            return rows, np.empty((0, 4)), text
+        loading = loading_of(record, begins, ends, recorded=self.loading == "recorded")
+        if scene.parts.normal_stress.name == "constant":
+            loading[:, 2:] = 1.0, 0.0  # what was recorded is noise
+        if "step_time" in self.free:
+            loading[0, 0] -= _LATE * (step.begins - begins)
+        holds = not loading[0, 1] > 0.0
+        text = "the window begins in a hold: a fit begins with steady sliding" if holds else ""
+        return rows, loading, text
 
     def _window(self, record: Record, step: Step) -> tuple[float, float]:
         """Times in s between which rows are fitted."""
@@ -317,9 +365,7 @@ class Fit(Measure):
         ]
         return tuple(n for n in found.free if n in (*found.untold, *sparse))
 
-    def _told(
-        self, found: Fitted, record: Record, rows: np.ndarray, model: Model
-    ) -> dict[str, Value]:
+    def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
         """Numbers and rows of what was found."""
         values: dict[str, Value] = {}
         slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in found.free])
@@ -363,10 +409,33 @@ class Fit(Measure):
             whole[rows] = column
             values[name] = whole
         for about in COLUMNS[:3]:
+            column = np.concatenate([record.columns[about.name] for record in self._involved])
             whole = np.full(shape, math.nan)
-            whole[: len(record)] = record.columns[about.name]
+            whole[: len(column)] = column
             values[f"record_{about.name}"] = whole
         return values
+
+
+def _model(
+    record: Record,
+    rows: np.ndarray,
+    step: Step,
+    loading: np.ndarray,
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+) -> Model:
+    """The model of some rows of a record, with displacement from a step."""
+    time, moved = record.time[rows], record.columns["displacement"][rows]
+    return Model(
+        scene,
+        time,
+        moved - np.interp(step.begins, time, moved),
+        record.columns["friction"][rows],
+        loading,
+        accuracy,
+        meter,
+    )
 
 
 def _whiteness(innovations: np.ndarray, order: int) -> float:

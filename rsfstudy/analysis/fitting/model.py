@@ -51,6 +51,8 @@ LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
 #: smooth to 1e-11 in the accuracy of a fit: at these steps both lose less than 1e-6.
 FINE: Differences = (0.01, ((1, 2.0 / 3.0), (2, -1.0 / 12.0)))
 QUICK: Differences = (1e-3, ((1, 0.5),))
+#: Differences of fourth order to one side.
+_AHEAD = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 #: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
 #: time in which the load point moves by a micrometre.
 _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
@@ -135,11 +137,13 @@ class Model:
         refined : bool
             At a tenth of all tolerances.
         checked : bool
-            No motion is followed on a spring softer than the critical stiffness.
+            No motion is followed on a spring softer than the critical stiffness, nor with the
+            longer of two slip distances first.
         """
         try:
             scene = self.scene_of(values)
-            if checked and not scene.stiffness > scene.critical_stiffness:
+            swapped = values.get("slip_distance_2", math.inf) <= values["slip_distance"]
+            if checked and (swapped or not scene.stiffness > scene.critical_stiffness):
                 return np.full(len(self.time), math.nan)
             late = values.get("step_time", 0.0)
             scale = self.reference / values["slip_distance"]
@@ -181,10 +185,8 @@ class Model:
         part, weights = differences
         step = part * self._size(name, values)
         found = np.zeros(len(self.time))
-        for place, weight in weights:
-            for sign in (1.0, -1.0):
-                moved = shifted(values, name, sign * place * step)
-                found += sign * weight / step * self.curve(moved)
+        for place, weight in _inside(name, values[name], step, weights):
+            found += weight / step * self.curve(shifted(values, name, place * step))
         return found
 
     def _size(self, name: str, values: Values) -> float:
@@ -195,6 +197,19 @@ class Model:
         if name.startswith("b"):
             return max(values["a"], abs(values[name]))
         return _SIZES.get(name, 1.0 / self.reference)
+
+
+def _inside(
+    name: str, value: float, step: float, weights: Sequence[tuple[int, float]]
+) -> Sequence[tuple[int, float]]:
+    """Places and weights of differences, of which none leaves the range of an exponent."""
+    if name == "law_exponent":
+        reach = max(place for place, _weight in weights) * step
+        if value < reach:
+            return _AHEAD
+        if value > 1.0 - reach:
+            return [(-place, -weight) for place, weight in _AHEAD]
+    return [(s * place, s * weight) for place, weight in weights for s in (1, -1)]
 
 
 def shifted(values: Values, name: str, by: float) -> dict[str, float]:

@@ -30,8 +30,10 @@ _WIDE = math.log(1e4)
 #: Slip distances to begin with, over the first guess.
 _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Passes in which noise and parameters are found in turn, until those move by this part of their
-#: standard errors; most curves of a pass, and where it ends; and steps of Newton at the end.
-_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, 2
+#: standard errors; most curves of a pass, and where it ends; and the fewest and most steps of
+#: Newton at the end, of which the last one moves by less than a part of standard errors.
+_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 8)
+_DONE = 1e-3
 #: Fewest degrees of freedom of intervals, what they cover, and by how much of itself the squared
 #: distance to their ends may miss before the likelihood is followed there, how often, how closely.
 _FEWEST, COVERS, _PARABOLIC, _FOLLOWED, _CLOSE = 3.0, 0.95, 0.2, 6, 0.05
@@ -210,7 +212,7 @@ class Search:
     def _ended(self, x: np.ndarray, noise: Noise) -> Fitted:
         """All that is told of the parameters with the least left."""
         moved = np.zeros(len(x))
-        for _ in range(_POLISHED):
+        for number in range(_POLISHED[1]):
             jacobian = self.model.jacobian(self.values(x), self.free, FINE)
             left = self.residuals(self.values(x))
             whitened = noise.whitened(np.column_stack([jacobian, left]))
@@ -221,6 +223,8 @@ class Search:
             beyond = np.clip(x + moved, self.low, self.high)
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
                 x = beyond
+            if number + 1 >= _POLISHED[0] and _is_still(moved, whitened, _DONE):
+                break
         values = self.values(x)
         left = self.residuals(values)
         innovations = noise.whitened(left[:, None])[:, 0]
@@ -326,11 +330,11 @@ def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
     return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
-def _is_still(moved: np.ndarray, whitened: np.ndarray) -> bool:
+def _is_still(moved: np.ndarray, whitened: np.ndarray, part: float = _STILL) -> bool:
     """True if parameters have moved by little of their standard errors; residuals come last."""
     size = np.linalg.norm(whitened[:, -1]) / math.sqrt(len(whitened))
     spread = size * np.sqrt(np.diag(_inverse(whitened[:, :-1])))
-    return bool((np.abs(moved) <= _STILL * spread).all())
+    return bool((np.abs(moved) <= part * spread).all())
 
 
 def _inverse(columns: np.ndarray) -> np.ndarray:
