@@ -1,0 +1,171 @@
+"""Which experiment tells the parameters? Designs of steps and machines, before any is run."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.analysis.fitting.model import LOGARITHMIC
+from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.synthetic_fit import SyntheticFit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction
+from rsfstudy.slider.scene import Scene
+
+RECORDS, DISTANCE = 4, 10.0
+UP, DOWN, HOLD = "1:30, 10:270", "10:30, 1:270", "1:30, 0:1000 s, 1:270"
+DESIGNS = {
+    "step up": UP,
+    "step back": DOWN,
+    "hold": HOLD,
+    "two steps up": f"{UP}; {UP}",
+    "up and back": f"{UP}; {DOWN}",
+    "up and hold": f"{UP}; {HOLD}",
+}
+#: Stiffness over normal stress in 1/um.
+MACHINES = (1e-3, 3e-3)
+#: Standard deviations of chance.
+CHANCE = 3.5
+
+
+@dataclass(frozen=True)
+class Kept(Reduction):
+    """Root mean square of deviations over the errors promised, over all of some records.
+
+    Parameters
+    ----------
+    name : str
+        Gives ``<name>``, and ``<name>_off``: how far it is from 1, in its standard deviations.
+    of : str
+        Deviations.
+    """
+
+    kind: ClassVar[str] = "kept"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Over records and designs of each machine, for each parameter."""
+        square = (dataset[self.of] / dataset["promised_spread"]) ** 2
+        found = np.sqrt(square.mean(["seed", "design"]))
+        records = dataset.sizes["seed"] * dataset.sizes["design"]
+        return xr.Dataset(
+            {self.name: found, f"{self.name}_off": (found - 1.0) * np.sqrt(2.0 * records)}
+        )
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The ratio, and how far it is from 1."""
+        words = "scatter over what is promised, less 1, in standard deviations"
+        return (
+            Quantity(self.name, "", "1", "scatter of estimates over what is promised"),
+            Quantity(f"{self.name}_off", "", "1", words),
+        )
+
+
+def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
+    """Standard errors promised for each design, by parameter, over those of the first design."""
+    from rsfstudy.plots import look, marker
+
+    promised = dataset["promised_spread"].isel(seed=0)
+    for number, name in enumerate(("a", "b", "slip_distance", "law_exponent")):
+        one = promised.sel(parameter=name)
+        label = MODEL[name].symbol
+        label = rf"$\ln$ {label}" if name in LOGARITHMIC else label
+        style = look(number) | {"marker": marker(number), "label": label}
+        axes.plot(range(len(DESIGNS)), one, **style)
+    axes.set_yscale("log")
+    axes.set_xticks(range(len(DESIGNS)), list(DESIGNS), rotation=30, ha="right")
+
+
+def machine(dataset: xr.Dataset) -> str:
+    """The machine of a panel."""
+    return f"k = {float(dataset['stiffness']) / DISTANCE:g} per um"
+
+
+figure = Figure(
+    [
+        Panel(
+            each=["stiffness"],
+            marks=[mark_promises],
+            title=machine,
+            y_label="Standard error promised",
+            alike="error",
+        )
+    ]
+)
+
+
+def promise(design: str, k: float, published: float) -> Claim:
+    """D1: what a design promises for the exponent of the law."""
+    return Claim(
+        id="D1",
+        statement=f"{design}, k = {k:g} per um: standard error of the exponent",
+        source="Fisher's information with 500 rows a step and white noise of 5e-4",
+        variable="promised_spread",
+        where={
+            "design": design,
+            "stiffness": k * DISTANCE,
+            "parameter": "law_exponent",
+            "seed": 0,
+        },
+        published=published,
+        tolerance=0.1 * published,
+        reason="rows before the step are not told; 10 to 100 um of them move it by as much",
+    )
+
+
+def kept(k: float, parameter: str) -> Claim:
+    """D2: fits keep the promise."""
+    return Claim(
+        id="D2",
+        statement=f"k = {k:g} per um: estimates of {parameter} scatter as promised",
+        source="Fisher's information",
+        variable="kept_off",
+        where={"stiffness": k * DISTANCE, "parameter": parameter},
+        published=0.0,
+        tolerance=CHANCE,
+        reason="standard deviations of a standard deviation",
+    )
+
+
+study = Study(
+    name="design_of_steps",
+    title="Standard errors that steps, holds and machines promise",
+    summary=(
+        "Fisher's information tells the errors of an experiment before it is made: steps up, back, "
+        "holds and pairs of them, on a stiff and on a compliant machine. A step up and one back "
+        "tell the exponent of the law seven times better than two steps up; a compliant machine "
+        "tells it better by one step. Fits of synthetic records keep what is promised."
+    ),
+    base=Scene(
+        law="family",
+        law_exponent=0.5,
+        normal_stress="constant",
+        a=0.01,
+        b_over_a=1.3,
+        stiffness=0.03,
+    ),
+    axes=[
+        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        Axis("stiffness", [k * DISTANCE for k in MACHINES]),
+        Axis("seed", list(range(RECORDS))),
+    ],
+    measure=SyntheticFit(
+        free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
+    ),
+    reductions=[Kept("kept", "deviation")],
+    claims=[
+        promise("step up", 3e-3, 0.087),
+        promise("step up", 1e-3, 0.018),
+        promise("up and back", 3e-3, 0.009),
+        promise("two steps up", 3e-3, 0.062),
+        *(kept(k, name) for k in MACHINES for name in ("a", "b", "slip_distance", "law_exponent")),
+    ],
+    plot=figure,
+    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+)

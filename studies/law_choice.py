@@ -1,0 +1,148 @@
+"""Slip law or slowness law? How often a record tells, and how often it misleads."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.study import Study
+from rsfstudy.measures.synthetic_fit import SyntheticFit
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction
+from rsfstudy.slider.scene import Scene
+
+RECORDS = 6
+LAWS = ("slip", "slowness")
+DESIGNS = {"one step up": "1:30, 10:270", "a pair, up and back": "1:30, 10:270; 10:30, 1:270"}
+NOISE = (5e-4, 5e-3)
+#: Difference of the criterion that decides: the other law is then e^2 times less likely.
+DECIDES = 4.0
+
+
+@dataclass(frozen=True)
+class Choice(Reduction):
+    """Shares of records that tell the law that made them, tell the other one, or tell neither.
+
+    Parameters
+    ----------
+    name : str
+        Gives ``<name>_right``, ``<name>_wrong`` and ``<name>_open``.
+    of : str
+        The criterion, by law and by fitted law.
+    """
+
+    kind: ClassVar[str] = "choice"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Over records."""
+        of = dataset[self.of]
+        other = of.sel(fitted_law=list(reversed(LAWS))).assign_coords(fitted_law=list(LAWS))
+        ahead = xr.concat(
+            [(other - of).sel(law=law, fitted_law=law, drop=True) for law in LAWS],
+            xr.Variable("law", np.array(LAWS, dtype=object)),
+        )
+        return xr.Dataset(
+            {
+                f"{self.name}_right": (ahead > DECIDES).mean("seed"),
+                f"{self.name}_wrong": (ahead < -DECIDES).mean("seed"),
+                f"{self.name}_open": (abs(ahead) <= DECIDES).mean("seed"),
+            }
+        )
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The shares."""
+        words = {"right": "the law that made them", "wrong": "the other law", "open": "neither law"}
+        return tuple(
+            Quantity(f"{self.name}_{key}", "", "1", f"share of records that tell {text}")
+            for key, text in words.items()
+        )
+
+
+def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
+    """Bars of right, open and wrong choices."""
+    names: list[str] = []
+    begin = np.zeros(len(DESIGNS) * len(NOISE))
+    colours = {"right": "#0072b2", "open": "0.8", "wrong": "#d55e00"}
+    for key, colour in colours.items():
+        shares: list[float] = []
+        names.clear()
+        for design in dataset["design"].values:
+            for size in dataset["noise_size"].values:
+                one = dataset[f"chosen_{key}"].sel(design=design, noise_size=size)
+                shares.append(100.0 * float(one))
+                names.append(f"{design}\nnoise {size:g}")
+        axes.barh(range(len(names)), shares, left=begin, color=colour, label=key, height=0.6)
+        begin = begin + np.array(shares)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xlim(0.0, 100.0)
+    axes.invert_yaxis()
+
+
+figure = Figure(
+    [Panel(each=["law"], marks=[mark_shares], x_label="Records (%)", y_label="")], columns=1
+)
+
+
+def told(law: str, design: str, size: float) -> Claim:
+    """L1: where the exponent is known to a tenth, all records tell the law."""
+    return Claim(
+        id="L1",
+        statement=f"{law} law, {design}, noise {size:g}: every record tells it",
+        source="the standard error of the exponent is below .1",
+        variable="chosen_right",
+        where={"law": law, "design": design, "noise_size": size},
+        published=1.0,
+        tolerance=0.0,
+        reason="ten standard errors lie between the laws",
+    )
+
+
+def seldom_wrong(law: str) -> Claim:
+    """L2: where noise hides it, a record is seldom taken for one of the other law."""
+    return Claim(
+        id="L2",
+        statement=f"{law} law, one step up, noise 0.005: fewer than half mislead",
+        source="likelihood: the other law leads by e^2 in one record of nine at most",
+        variable="chosen_wrong",
+        where={"law": law, "design": "one step up", "noise_size": 5e-3},
+        relation="below",
+        published=0.5,
+        tolerance=0.0,
+        reason="four of six mislead by chance once in 500",
+    )
+
+
+study = Study(
+    name="law_choice",
+    title="Records that tell the evolution law, mislead, or leave it open",
+    summary=(
+        "Velocity steps made by one law and fitted by both; Akaike's criterion, in which the noise "
+        f"counts, decides where it differs by {DECIDES:g}. At the noise of a good rig one step "
+        "tells the law. At ten times that noise a step leaves it open, and a pair, up and back, "
+        "tells it."
+    ),
+    base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03),
+    axes=[
+        Axis("law", list(LAWS)),
+        Axis("fitted_law", list(LAWS)),
+        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        Axis("noise_size", list(NOISE)),
+        Axis("seed", list(range(RECORDS))),
+    ],
+    measure=SyntheticFit(noise="white"),
+    reductions=[Choice("chosen", "criterion")],
+    claims=[
+        *(told(law, design, NOISE[0]) for law in LAWS for design in DESIGNS),
+        *(told(law, "a pair, up and back", NOISE[1]) for law in LAWS),
+        *(seldom_wrong(law) for law in LAWS),
+    ],
+    plot=figure,
+    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    references=["Bhattacharya et al. (2015), J. Geophys. Res. 120, 6365-6385"],
+)
