@@ -52,6 +52,11 @@ class Joint:
         """Friction of all rows."""
         return np.concatenate([part.friction for part in self.parts])
 
+    @cached_property
+    def displacement(self) -> np.ndarray:
+        """Displacements of all rows, in um from the step of each window."""
+        return np.concatenate([part.displacement for part in self.parts])
+
     def is_linear(self, name: str) -> bool:
         """True for a parameter in which friction is linear, whatever the others."""
         return all(part.is_linear(plain(name)) for part in self.parts)

@@ -17,7 +17,7 @@ from rsfstudy.analysis.fitting.noise import Noise
 from rsfstudy.motion.meter import Halt
 from rsfstudy.status import Status
 
-#: Bounds of parameters; of those with a logarithm, over the first guess.
+#: Bounds of parameters; those of stiffness are over the first guess.
 _BOUNDS = {
     "a": (1e-6, 1.0),
     "b": (-1.0, 1.0),
@@ -27,6 +27,8 @@ _BOUNDS = {
     "law_exponent": (0.0, 1.0),
 }
 _WIDE = math.log(1e4)
+#: Longest slip distance over the displacement of the window; the shortest is the distance of rows.
+_LONG = 10.0
 #: Slip distances to begin with, over the first guess.
 _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Passes in which noise and parameters are found in turn, until those move by this part of their
@@ -117,6 +119,10 @@ class Search:
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
+        if name.startswith("slip_distance"):
+            moved = self.model.displacement
+            extent = float(np.ptp(moved))
+            return math.log(extent / len(moved)), math.log(_LONG * extent)
         if name in LOGARITHMIC:
             at = math.log(self.first[name])
             return at - _WIDE, at + _WIDE
