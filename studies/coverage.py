@@ -1,7 +1,10 @@
 """Coverage: do error estimates cover the errors, over random scenes?"""
 
-from dataclasses import dataclass
-from typing import ClassVar
+import math
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -10,9 +13,256 @@ from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
-from rsfstudy.measures.coverage import QUESTIONS, Coverage
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.meter import Meter
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce.base import Reduction
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: What draws a number.
+Draw = Callable[[np.random.Generator], float]
+
+
+def between(low: float, high: float) -> Draw:
+    """Any number between two, as likely as another."""
+    return lambda draw: float(draw.uniform(low, high))
+
+
+def decades(low: float, high: float) -> Draw:
+    """Any number between two, each decade as likely as another."""
+    exponent = between(math.log(low), math.log(high))
+    return lambda draw: math.exp(exponent(draw))
+
+
+def either_way(size: Draw) -> Draw:
+    """A size, and a sign."""
+    return lambda draw: size(draw) * (1.0 if draw.uniform() < 0.5 else -1.0)
+
+
+class Question(NamedTuple):
+    """Question that may be asked of a random scene: a measure, and what is drawn of the spring and
+    the loading; numbers of the measure's own choice of scene are given as they are.
+    """
+
+    measure: Measure
+    scene: Mapping[str, Draw | float]
+
+
+_UNSTABLE, _STABLE = between(0.3, 0.97), between(1.0, 2.5)
+#: Rigs from soft to stiff.
+_RIG = decades(1.1, 300.0)
+_FASTER, _ANY_RATE = decades(1.1, 100.0), decades(0.03, 30.0)
+
+QUESTIONS: Mapping[str, Question] = {
+    "limit cycle": Question(
+        LimitCycle(phases=2), {"stiffness_ratio": _UNSTABLE, "load_velocity_ratio": _FASTER}
+    ),
+    "step response": Question(
+        StepResponse(peaks=3, phases=2),
+        {"stiffness_ratio": _STABLE, "load_velocity_ratio": _FASTER},
+    ),
+    "rate step": Question(CriticalStep(), {"stiffness_ratio": _STABLE}),
+    "displacement step": Question(
+        CriticalStep(of="displacement_step"), {"stiffness_ratio": _STABLE}
+    ),
+}
+#: The same of the readings of a laboratory.
+READINGS: Mapping[str, Question] = {
+    "rigid response": Question(
+        RigidResponse(points=2), {"load_velocity_ratio": decades(1e-4, 1e4)}
+    ),
+    "velocity step": Question(
+        VelocityStep(phases=2), {"stiffness_ratio": _RIG, "load_velocity_ratio": _ANY_RATE}
+    ),
+    "healing": Question(
+        Healing(phases=2),
+        {
+            "stiffness_ratio": _RIG,
+            "load_velocity_ratio": _ANY_RATE,
+            "hold_time": decades(1.0, 1e5),
+        },
+    ),
+    "normal stress transient": Question(
+        NormalStressTransient(phases=2),
+        {
+            "stiffness_ratio": _RIG,
+            "load_velocity_ratio": 1.0,
+            "normal_stress_step": either_way(decades(0.003, 0.3)),
+        },
+    ),
+    "normal stress response": Question(
+        NormalStressResponse(),
+        {
+            "stiffness_ratio": _RIG,
+            "load_velocity_ratio": _ANY_RATE,
+            "oscillation_amplitude": decades(1e-4, 0.03),
+            "oscillation_period": decades(0.3, 300.0),
+        },
+    ),
+}
+_ALL = {**QUESTIONS, **READINGS}
+_ESTIMATED = tuple(
+    dict.fromkeys(name for question in _ALL.values() for name in question.measure.estimated)
+)
+_TIGHTER = 0.01
+#: Work the tighter run may cost, over that of the run it judges.
+_PATIENCE = 6
+
+
+#: What its numbers are.
+_OUTPUTS = (
+    Output("status_kept", long_name="whether a tighter run ends with the same status", error=True),
+    Output("ended_as"),
+    Output("error_over_estimate", "", "1", "error over its own estimate", dims=("number",)),
+    Output(
+        "error_over_request",
+        "",
+        "1",
+        "relative error over the accuracy asked for",
+        dims=("number",),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Coverage(Measure):
+    """Errors of a measure in a random scene, over its own estimates of them.
+
+    The scene shares law, normal stress condition and dynamics with the scene of the cell; its
+    numbers are drawn from wide ranges, the same whenever it is asked for. The true numbers are
+    those of a run a hundred times tighter, within its error estimate.
+
+    Parameters
+    ----------
+    question : str
+        What is measured; one of `QUESTIONS` or `READINGS`.
+    sample : int
+        Number of the draw.
+    requested_digits : int
+        Accuracy asked for: rtol = 10**-digits.
+    """
+
+    question: str = "limit cycle"
+    sample: int = 0
+    requested_digits: int = 7
+    name: ClassVar[str] = "coverage"
+    headline = "status_kept"
+    typical_work = 60_000
+    outputs = _OUTPUTS
+    dimensions = (
+        Quantity("question", "", "", "what is measured in a random scene"),
+        Quantity("sample", "", "1", "number of the random scene"),
+        Quantity("number", "", "", "name of the number"),
+    )
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+
+    def __post_init__(self) -> None:
+        if self.question not in _ALL:
+            raise InvalidValue("question", self.question, "is unknown", choices=_ALL)
+        if self.sample < 0:
+            raise InvalidValue("sample", self.sample, "must be 0 or greater")
+        if not 2 <= self.requested_digits <= 9:
+            rule = "must lie between 2 and 9: the tighter run needs two more"
+            raise InvalidValue("requested_digits", self.requested_digits, rule)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"number": np.array(_ESTIMATED, dtype=object)}
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Measure twice, and compare each number that both give."""
+        measure = _ALL[self.question].measure
+        try:
+            drawn = random_scene(scene, self.question, self.sample)
+        except InvalidValue as error:  # a step of normal stress that is constant
+            return Outcome(Status.NOT_APPLICABLE, message=str(error))
+        asked = replace(accuracy, rtol=10.0**-self.requested_digits)
+        rtol = max(_TIGHTER * asked.rtol, TIGHTEST_RTOL)
+        tighter = replace(asked, rtol=rtol, budget=_PATIENCE * asked.budget)
+        (outcome, spent), (truth, more) = (measure.metered(drawn, a) for a in (asked, tighter))
+        meter.by_regime["asked"], meter.by_regime["tighter"] = spent.spent, more.spent
+        meter.spent = spent.spent + more.spent
+        values: dict[str, Any] = {
+            "ended_as": float(outcome.status),
+            "status_kept_error": 0.0,
+            # a failure claims nothing, and nothing is known where the tighter run fails
+            "status_kept": float(
+                outcome.status is truth.status
+                or not (outcome.status.is_answer and truth.status.is_answer)
+            ),
+        }
+        if outcome.status is truth.status is Status.OK:
+            values |= _compared(outcome.values, truth.values, asked.rtol)
+        return Outcome(Status.OK, values)
+
+
+def _compared(
+    measured: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
+) -> dict[str, np.ndarray]:
+    """Errors beyond what the truth itself is uncertain by, over their estimates, and over the
+    accuracy asked for.
+    """
+    over_estimate, over_request = (np.full(len(_ESTIMATED), math.nan) for _ in range(2))
+    for i, name in enumerate(_ESTIMATED):
+        if f"{name}_error" in measured:
+            uncertain = truth[f"{name}_error"]
+            error = max(abs(measured[name] - truth[name]) - uncertain, 0.0)
+            over_estimate[i] = _over(error, measured[f"{name}_error"])
+            over_request[i] = _over(error, rtol * abs(truth[name]))
+    return {"error_over_estimate": over_estimate, "error_over_request": over_request}
+
+
+def _over(error: float, allowed: float) -> float:
+    if not error:
+        return 0.0
+    return error / allowed if allowed else math.inf
+
+
+def random_scene(like: Scene, question: str, sample: int) -> Scene:
+    """A scene of the same law, normal stress condition and dynamics as another, with numbers drawn
+    from wide ranges.
+
+    Raises
+    ------
+    InvalidValue
+        Where the question is of a loading that has no meaning for that normal stress condition.
+    """
+    kind = f"{question} {like.law} {' '.join(like.effects)}"
+    draw = np.random.default_rng([sample, zlib.crc32(kind.encode())])
+    ranges: Mapping[str, Draw | float] = {
+        "a": decades(0.003, 0.025),
+        "b_over_a": decades(0.1, 4.5),
+        "mu_star": between(0.5, 0.85),
+        "period": decades(0.1, 1000.0),
+        "reference_rate": decades(1e-10, 1e-6),
+        **_ALL[question].scene,
+    }
+    fields = {name: by(draw) if callable(by) else by for name, by in ranges.items()}
+    fields["b_over_a"] += 1.0
+    angle, alpha = between(0.05, 0.95)(draw), between(0.0, 0.6)(draw)
+    if like.alpha is not None:
+        fields["alpha"] = alpha
+    if like.phi is not None:
+        lowest = math.degrees(math.atan(fields["mu_star"]))
+        fields["phi"] = lowest + angle * (90.0 - lowest)
+    if like.radiation_damping:
+        # about the impedance of spring and mass
+        inertial_time = fields["period"] * fields["reference_rate"] / (2.0 * math.pi)
+        impedance = fields.get("stiffness_ratio", 1.0) * fields["a"] * inertial_time
+        fields["radiation_damping"] = impedance * (fields["b_over_a"] - 1.0)
+    return like.with_(**fields)
+
 
 DYNAMICS: dict[str, dict[str, bool | float]] = {
     "quasi-static": {"inertia": False},

@@ -11,7 +11,7 @@ import xarray as xr
 from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
 from rsfstudy.named_studies import accuracy_cost
-from rsfstudy.named_studies.accuracy_cost import WorkPrecision
+from rsfstudy.named_studies.accuracy_cost import Cheapest, WorkPrecision
 
 import rsfstudy
 from rsfstudy import Scene
@@ -26,7 +26,7 @@ from rsfstudy.motion.course import along
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.reduce import Cheapest, reduced
+from rsfstudy.reduce import reduced
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.status import Status
 

@@ -16,6 +16,7 @@ import agreement
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
+from rsfstudy.named_studies.coverage import QUESTIONS, random_scene
 from running import LEFT_TO_COMPILED, SMALL, enough, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
@@ -25,7 +26,6 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import DataError, Incomplete, InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.coverage import QUESTIONS, random_scene
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion import engines

@@ -6,12 +6,11 @@ import xarray as xr
 from agreement import LIKE
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies.coverage import Covered
+from rsfstudy.named_studies.coverage import QUESTIONS, READINGS, Coverage, Covered, random_scene
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import limit_cycle
-from rsfstudy.measures.coverage import QUESTIONS, READINGS, Coverage, random_scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.reduce import reduced

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 from full_equations import FullEquations
+from rsfstudy.named_studies.two_states import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.analysis.approach import Approach
 from rsfstudy.analysis.return_map import ReturnMap, product, section
-from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES

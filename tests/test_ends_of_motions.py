@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies.triggering import Triggers
 from scipy.optimize import brentq
 
 import rsfstudy
@@ -13,7 +14,6 @@ from rsfstudy import Scene, protocol
 from rsfstudy.analysis.swing import swing
 from rsfstudy.errors import Incomplete, NoAnswer
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, SCIPY

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.effects import EffectCost
+from rsfstudy.named_studies.hard_cases import HardCase
 from running import named_results
 
 import rsfstudy
@@ -18,7 +19,6 @@ from rsfstudy import Scene
 from rsfstudy.analysis.cycles import cycles
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.hard_case import HardCase
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse

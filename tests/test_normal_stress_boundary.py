@@ -11,6 +11,7 @@ import agreement
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rsfstudy.named_studies.triggering import Triggers
 
 import rsfstudy
 from rsfstudy import Scene
@@ -18,7 +19,6 @@ from rsfstudy.analysis.swing import friction_acts_alone, neutral, orbits_may_clo
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
-from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import closed_forms, stability, steady

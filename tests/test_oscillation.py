@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies.two_states import Bifurcation
 
 from rsfstudy import Axis, Scene, Study, simulate
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies.triggering import Triggers
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggers import Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import laws, registry, stability, steady
 from rsfstudy.slider.equations import evolution_of, relation_of

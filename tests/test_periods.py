@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies.two_states import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
@@ -12,7 +13,6 @@ from rsfstudy.analysis.cycles import Cycle
 from rsfstudy.analysis.periods import course, recurrence
 from rsfstudy.analysis.return_map import ReturnMap, product, section
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES

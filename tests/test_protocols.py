@@ -9,11 +9,11 @@ import pstats
 import cloudpickle
 import numpy as np
 import pytest
+from rsfstudy.named_studies.two_states import Bifurcation
 from running import run
 
 from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.bifurcation import Bifurcation
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from rsfstudy.named_studies.triggering import TRIGGERS, Triggers
 
 from rsfstudy import Scene
 from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.triggers import TRIGGERS, Triggers
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES

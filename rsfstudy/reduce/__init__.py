@@ -17,13 +17,11 @@ from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
-from rsfstudy.reduce.work import Cheapest
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage, quantity
 
 __all__ = [
     "Boundary",
-    "Cheapest",
     "DecadeFit",
     "Difference",
     "Inverse",

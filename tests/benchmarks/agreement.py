@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rsfstudy.named_studies.coverage import QUESTIONS, random_scene
 
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.coverage import QUESTIONS, random_scene
 from rsfstudy.motion.accuracy import Accuracy
 
 #: What random scenes are like.
