@@ -194,25 +194,6 @@ _QUANTITIES = (
         "decimal logarithm of the peak slip rate with mass, less that without",
     ),
     Quantity(
-        "paths_parting",
-        "",
-        "1",
-        "log10(V/V_star) at which mass makes the path leave its massless twin",
-    ),
-    Quantity(
-        "paths_merging",
-        "",
-        "1",
-        "log10(V/V_star) at which mass lets the path join its massless twin",
-    ),
-    Quantity(
-        "paths_offset",
-        "",
-        "1",
-        "stress after the rupture with mass, less that without",
-        "sigma_*",
-    ),
-    Quantity(
         "separation",
         "",
         "1",
@@ -254,17 +235,6 @@ _QUANTITIES = (
     # checks of accuracy
     Quantity("ended_as", "", "1", "status the measure ended with, as its flag value"),
     Quantity("requested_digits", "", "1", "decimal digits asked for: -log10(rtol)"),
-    # whether error estimates cover
-    *(
-        Quantity(f"{name}_{what}", "", "1", f"{text}{among}")
-        for name, among in (("covered", ""), ("covered_by_question", ", by question"))
-        for what, text in (
-            ("share", "share of errors within their estimates"),
-            ("worst", "largest error over its estimate"),
-            ("typical", "median of estimates over errors"),
-            ("numbers", "how many numbers have an error and an estimate"),
-        )
-    ),
     # every lattice
     Quantity("status", "", "", "outcome of the cell"),
     Quantity("rhs_evaluations", "", "1", "right-hand sides evaluated"),

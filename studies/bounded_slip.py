@@ -1,6 +1,7 @@
 """Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -13,6 +14,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Difference
 from rsfstudy.reduce.base import Reduction, failed
 from rsfstudy.slider.scene import Scene
@@ -51,6 +53,24 @@ class Parting(Reduction):
     along: str = "inertia"
     tolerance: float = 1e-3
     kind: ClassVar[str] = "parting"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Both places, and the difference of stress."""
+        name, at = self.name, "log10(V/V_star) at which mass"
+        return (
+            Quantity(
+                f"{self.name}_parting", "", "1", f"{at} makes the path leave its massless twin"
+            ),
+            Quantity(f"{name}_merging", "", "1", f"{at} lets the path join its massless twin"),
+            Quantity(
+                f"{name}_offset",
+                "",
+                "1",
+                "stress after the rupture with mass, less that without",
+                "sigma_*",
+            ),
+        )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare the two points of `along`; nothing unless there are two."""

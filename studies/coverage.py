@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -291,6 +291,18 @@ class Covered(Reduction):
 
     by: tuple[str, ...] = ()
     kind: ClassVar[str] = "covered"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Statistics, and what is counted apart."""
+        among = ", by question" if "question" in self.by else ""
+        texts = {
+            "share": "share of errors within their estimates",
+            "worst": "largest error over its estimate",
+            "typical": "median of estimates over errors",
+            "numbers": "how many numbers have an error and an estimate",
+        }
+        return [Quantity(f"{self.name}_{k}", "", "1", f"{t}{among}") for k, t in texts.items()]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Count over all other dimensions."""

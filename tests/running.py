@@ -25,6 +25,7 @@ import rsfstudy
 # what prints takes its width from the environment when it is loaded: not from that of a test
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
+from rsfstudy.compute import plan
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
@@ -48,6 +49,11 @@ HANGS = 1200.0
 def run(study=SMALL, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def cell_key(scene, measure) -> bytes:
+    """Name of a cell that is planned alone."""
+    return next(plan._digests(plan._values(scene, measure), (), np.empty((0, 1))))
 
 
 def run_with_failures(*words, **options) -> xr.Dataset:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from rsfstudy.named_studies.rigid_response import Spread
 from running import command, ended, named_results
 
 from rsfstudy.files import store
@@ -16,7 +17,6 @@ from rsfstudy.reduce import (
     OverClosedForm,
     ProportionalFit,
     RelativeDifference,
-    Spread,
     reduced,
 )
 from rsfstudy.reduce.carried import COMMENT

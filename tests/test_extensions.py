@@ -266,7 +266,7 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn = call("plot", figure)
     assert drawn.returncode == 0
-    assert "drawn as lines. plot = 'stiffness_map': is no figure of rsfstudy" in drawn.stderr
+    assert "drawn as maps or lines. plot = 'stiffness_map': is no figure of" in drawn.stderr
     assert "--study" in drawn.stderr
     as_lines = Path(figure).with_suffix(".png").read_bytes()
     assert call("plot", figure, "--study", outside["own_figure"].study).stderr == ""
@@ -619,8 +619,8 @@ def test_a_module_or_a_function_draws(tmp_path):
     assert plots.figure(dataset, squares).axes[0].get_title() == "squares"
     with pytest.raises(InvalidValue, match="plot = 'squares': is unknown"):
         plots.figure(dataset)
-    module = SimpleNamespace(__name__="mine.squares", draw=squares, PANELS=(None, squares))
-    assert len(plots.figure(dataset, module).axes) == 2
+    module = SimpleNamespace(__name__="mine.squares", draw=squares)
+    assert plots.figure(dataset, module).axes[0].get_title() == "squares"
     partial = dataset.assign_attrs(completeness="partial: 1 of 2 cells")
     assert "partial" in plots.figure(partial, squares).axes[0].get_title()
 

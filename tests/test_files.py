@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, SMALL, call, run, run_with_failures
+from running import FAULTY, SMALL, call, cell_key, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Scene, plots
-from rsfstudy.compute.plan import cell_key
 from rsfstudy.compute.provenance import git_state
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue

@@ -6,6 +6,7 @@ import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import Parting
+from rsfstudy.named_studies.rigid_response import Spread
 from rsfstudy.named_studies.stability_map import CyclingEdge
 from scipy.stats import linregress
 
@@ -20,7 +21,6 @@ from rsfstudy.reduce import (
     OverClosedForm,
     ProportionalFit,
     RelativeDifference,
-    Spread,
     reduced,
 )
 from rsfstudy.status import Status

@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from running import called, run
+from running import called, cell_key, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
-from rsfstudy.compute.plan import Plan, cell_key
+from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle

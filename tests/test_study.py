@@ -11,16 +11,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rsfstudy.named_studies.rigid_response import Spread
+from running import cell_key
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.compute.plan import Batch, Plan, cell_key
+from rsfstudy.compute.plan import Batch, Plan
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import Spread
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
 

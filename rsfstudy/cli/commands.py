@@ -315,9 +315,8 @@ def _client(scheduler: str | None, serial: bool) -> Iterator[Any]:
 
 
 def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
-    """What draws a figure that is not part of rsfstudy: the study file's own, or plain lines."""
+    """What draws a figure that is not part of rsfstudy: the study file's own, or maps or lines."""
     from rsfstudy import plots
-    from rsfstudy.plots import lines
 
     if contents.declaration(dataset).plot in plots.NAMES:
         if study is not None:
@@ -328,8 +327,8 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     except RsfStudyError as error:
         if study is not None:
             raise
-        stderr.print(f"note: drawn as lines. {error}")
-        return lines
+        stderr.print(f"note: drawn as maps or lines. {error}")
+        return "lines"
 
 
 def _drawn(dataset: xr.Dataset, path: Path, look: Look, own: Any = None) -> list[Path]:

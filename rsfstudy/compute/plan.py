@@ -26,13 +26,8 @@ _SECONDS_PER_RHS = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
 _NAMED_AT_A_TIME = 50_000
 
 
-def cell_key(scene: Scene, measure: Measure) -> bytes:
-    """Name of a cell: a digest of the exact values of its scene and of its measure's fields."""
-    return next(_digests(_values(scene, measure), (), np.empty((0, 1))))
-
-
 def _values(scene: Scene, measure: Measure) -> dict[tuple[str, str], Any]:
-    """All that a cell is named by."""
+    """All that a cell is named by: the exact values of its scene and of its measure's fields."""
     of_scene = {("scene", name): value for name, value in scene.as_dict().items()}
     return of_scene | {("measure", name): value for name, value in measure.plain_fields.items()}
 

@@ -1,9 +1,6 @@
 """Figures of results: the `Figure` that a study declares, lines or maps of any lattice, or a
-function ``draw(dataset, axes)`` or a module of the user's own.
-
-A module with several panels lists its functions of that kind in ``PANELS``, or gives those that a
-dataset needs by ``panels(dataset)``; ``COLUMNS`` says how many stand beside each other, and
-``HEIGHT`` how many mm one is high. How figures look is in ``rsfstudy.mplstyle``.
+function ``draw(dataset, axes)`` of the user's own, or a module with one. How figures look is in
+``rsfstudy.mplstyle``.
 """
 
 from __future__ import annotations
@@ -57,8 +54,6 @@ NAMES = (*_ANY, *names.names())
 _ON_SCREEN = 150
 #: What would make two files of one figure differ.
 _DATES: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-#: Most panels beside each other.
-_COLUMNS = 2
 
 
 class Drawing(Figure):
@@ -180,12 +175,10 @@ def _fitting(
             known = set(study.dimensions)
     elif isinstance(own, Declared):
         known -= set(declaration(dataset).overrides) - own.dimensions
-    else:
-        known = set(getattr(own, "DIMENSIONS", known))
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     if variable is not None or own is None or isinstance(own, str) or not varied <= known:
         return _of_any(dataset, variable), dataset
-    drawing = own if isinstance(own, Declared) else _of_module(own, dataset)
+    drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
     return drawing, dataset.squeeze(sorted(set(map(str, sizes)) - known), drop=False)
 
 
@@ -203,17 +196,6 @@ def _with_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     }
     measured = dataset[cells].drop_vars(derived).expand_dims(gone)
     return dataset.drop_vars([*cells, *derived, *gone]).merge(measured).assign_coords(derived)
-
-
-def _of_module(own: Any, dataset: xr.Dataset) -> Declared:
-    """A function or module of the user's own."""
-    if hasattr(own, "panels"):
-        found = list(own.panels(dataset))
-    else:
-        draw = getattr(own, "draw", own)
-        found = [panel or draw for panel in getattr(own, "PANELS", (None,))]
-    columns = getattr(own, "COLUMNS", Declared.columns)
-    return Declared(found, columns, getattr(own, "HEIGHT", None))
 
 
 def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:

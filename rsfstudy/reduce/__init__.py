@@ -15,7 +15,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
-from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference, Spread
+from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -30,7 +30,6 @@ __all__ = [
     "ProportionalFit",
     "Reduction",
     "RelativeDifference",
-    "Spread",
     "reduced",
 ]
 

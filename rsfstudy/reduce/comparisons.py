@@ -1,17 +1,14 @@
-"""Comparisons: with a reference point of the lattice, with a closed form, and among the points of
-one dimension.
-"""
+"""Comparisons: with a reference point of the lattice, and with a closed form."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import Derivatives, Reduction
 from rsfstudy.slider.closed_forms import FORMS
 
 
@@ -152,58 +149,3 @@ class OverClosedForm(Reduction):
         fields = [dataset[name].astype(float) for name in form.fields]
         exact: xr.DataArray = xr.apply_ufunc(form.value, *fields, vectorize=True)
         return exact
-
-
-@dataclass(frozen=True)
-class Spread(Reduction):
-    """Spread of the values along one coordinate: the largest less the smallest.
-
-    Parameters
-    ----------
-    name : str
-        Name of the result; ``<name>_points``, the number of values, comes with it.
-    of : str
-        Variable to compare.
-    on : str
-        Coordinate along one dimension.
-    within : tuple of float
-        Range of `on`, both ends included; all of it by default.
-    """
-
-    on: str = ""
-    within: tuple[float, float] | None = None
-    kind: ClassVar[str] = "spread"
-
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
-        """The points in range."""
-        return within(status, self.on, self.within)
-
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Along the dimension of `on`; nothing where fewer than two points are in range."""
-        dimension = dimension_of(dataset, self.on)
-        support = within(dataset, self.on, self.within)
-        if support.sizes[dimension] < 2:
-            return xr.Dataset()
-        values = support[self.of]
-        spread = values.max(dimension) - values.min(dimension)
-        answered = values.notnull().sum(dimension)
-        spread = spread.where(~refused(support, self.of, dimension) & (answered > 1))
-        span = "" if self.within is None else f" from {self.within[0]:g} to {self.within[1]:g}"
-        note = f"largest less smallest {self.of} over {self.on}{span}"
-        return xr.Dataset(
-            {
-                self.name: spread.assign_attrs(comment=note),
-                f"{self.name}_points": answered.astype("int32").assign_attrs(comment=note),
-            }
-        )
-
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """By the cells that, within their errors, may be the largest and the smallest."""
-        dimension = dimension_of(dataset, self.on)
-        support = within(dataset, self.on, self.within)
-        values, errors = support[self.of], support[f"{self.of}_error"]
-        number = xr.DataArray(
-            np.arange(support.sizes[dimension]), {dimension: support[dimension]}, dimension
-        )
-        reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
-        return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
