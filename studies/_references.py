@@ -1,13 +1,13 @@
 """Numbers known to more digits than anything measured, and how they were made.
 
-Cycles and the critical step come from `tests/extended_precision.py`: the paper's own unknowns
-instead of ours, extrapolated midpoint steps in 64-bit mantissas instead of SciPy's, the error of
-leaving the slow manifold removed by Richardson extrapolation. Two such computations, with the
-switch at slip rate norms of 0.02 and 0.01, agree to the uncertainty given here. The others are
+Cycles and the critical step come from `tests/benchmarks/extended_precision.py`: the paper's own
+unknowns instead of ours, extrapolated midpoint steps in 64-bit mantissas instead of SciPy's, the
+error of leaving the slow manifold removed by Richardson extrapolation. Two such computations, with
+the switch at slip rate norms of 0.02 and 0.01, agree to the uncertainty given here. The others are
 closed forms, evaluated to 30 digits.
 """
 
-EXTENDED = "other unknowns, extrapolation method, 64-bit mantissas (tests/extended_precision.py)"
+EXTENDED = "other unknowns, extrapolation method, 64-bit mantissas (extended_precision.py)"
 
 #: Slip law, constant normal stress, b/a = 2, k = 1.25 k_cr, norm 5e-4, without mass: critical
 #: V_0/V_*, by bisection between motions; bisection ends at 1e-18.

@@ -23,7 +23,6 @@ from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.cli.console import console
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider.registry import FIELDS
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
@@ -115,23 +114,6 @@ def test_an_axis_may_be_unsorted():
     )
 
 
-@pytest.mark.parametrize(
-    ("words", "suggestion"),
-    [
-        (["run", "rate_step_bondary"], "rate_step_boundary"),
-        (["show", "limit_cycle"], "limit_cycles"),
-        (["run", "rate_step_boundary", "--set", "b_over=2"], "b_over_a"),
-        (["run", "rate_step_boundary", "--set", "alhpa=0.3"], "alpha"),
-        (["run", "rate_step_boundary", "--set", "law=slipp"], "slip"),
-        (["run", "rate_step_boundary", "--set", "case=alpha = 0.2"], "alpha = 0.25"),
-    ],
-)
-def test_unknown_names_come_with_suggestions(words, suggestion):
-    code, said = called(words)
-    assert code == 2
-    assert f"Did you mean '{suggestion}'" in said or f"'{suggestion}'" in said
-
-
 # ---- the command line ---------------------------------------------------------------------------
 
 
@@ -165,37 +147,6 @@ def test_any_setting_is_taken_or_refused(texts):
     code, said = called(words)
     assert code in (0, 2), said
     assert code == 0 or "rror" in said
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["run"],
-        ["run", "rate_step_boundary", "--all"],
-        ["run", "rate_step_boundary", "--rtol", "0"],
-        ["run", "rate_step_boundary", "--rtol", "nan"],
-        ["run", "rate_step_boundary", "--workers", "0"],
-        ["run", "rate_step_boundary", "--serial", "--scheduler", "tcp://127.0.0.1:1"],
-        ["run", "rate_step_boundary", "--format", "csv"],
-        ["run", "rate_step_boundary", "--time-limit", "0"],
-        ["run", "rate_step_boundary", "--set", "b_over_a=1"],
-        ["run", "rate_step_boundary", "--set", "phi=10"],
-        ["run", "nothing.py"],
-        ["run", "rate_step_boundary", "--set", "self=3"],
-        ["run", "rate_step_boundary", "--set", "b_over_a=2", "--set", "b_over_a=3"],
-        ["run", "rate_step_boundary", "--set", "b_over_a=2,,3"],
-        ["show", "what.nc", "--set", "b_over_a=2"],
-        ["rerun"],
-        ["nothing"],
-    ],
-)
-def test_wrong_usage(words, tmp_path, monkeypatch):
-    """Exit status 2, a message, and nothing written."""
-    monkeypatch.chdir(tmp_path)
-    code, said = called(words)
-    assert code == 2
-    assert "rror" in said
-    assert os.listdir(tmp_path) == []
 
 
 # ---- files --------------------------------------------------------------------------------------
@@ -332,12 +283,6 @@ def test_what_would_steer_the_terminal_is_spelt_out(capsys):
     assert capsys.readouterr().out == "a\\x1b[2J\\x07b\n[red]\n"
 
 
-def test_a_time_limit_beyond_all_clocks():
-    for limit in (1e10, float("inf")):
-        with pytest.raises(InvalidValue, match="must be a number greater than 0, up to 1e"):
-            run(time_limit=limit)
-
-
 @pytest.mark.parametrize("command", ["check", "plot"])
 def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     command, tmp_path, monkeypatch
@@ -352,31 +297,6 @@ def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     assert (code, "partial.nc does: run the study again" in said) == (1, True)
 
 
-@pytest.mark.parametrize("workers", [-1, 1.5, "two", None, True])
-def test_a_number_of_workers_that_is_none(workers):
-    with pytest.raises(InvalidValue, match="workers"):
-        run(workers=workers)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"rtol": "a"},
-        {"rtol": True},
-        {"time_limit": "a"},
-        {"output": 3},
-        {"client": "tcp://x"},
-        {"format": 3},
-        {"b_over_a": [10**400]},
-        {"b_over_a": 10**400},
-        {"self": 3},
-    ],
-)
-def test_options_that_are_none(options):
-    with pytest.raises(InvalidValue, match=next(iter(options))):
-        run(**options)
-
-
 @pytest.mark.parametrize("name", [3, None, "a" * 5000 + ".nc", "a" * 5000])
 def test_names_that_are_none(name):
     with pytest.raises(RsfStudyError):
@@ -388,15 +308,6 @@ def test_names_that_are_none(name):
 def test_a_study_file_with_an_endless_name():
     with pytest.raises(InvalidValue, match="is no file"):
         catalogue.load("a" * 5000 + ".py")
-
-
-@pytest.mark.parametrize(
-    "dimension", ["status", "wall_time", "critical_velocity_ratio", "a_over_b_minus_a"]
-)
-def test_an_axis_named_as_something_measured(dimension):
-    axis = Axis(dimension, {"one": {"phi": 55.0}, "two": {"phi": 65.0}})
-    with pytest.raises(InvalidValue, match="is the name of something measured"):
-        Study(name="n", title="t", base=Scene(), axes=[axis], measure=CriticalStep())
 
 
 def test_threads_that_run_studies_do_not_mix():

@@ -141,42 +141,6 @@ def test_list_and_show():
     assert "right-hand sides" in shown.stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["run"], "name one study, or say --all"),
-        (["run", NAME, "--all"], "name one study, or say --all"),
-        (["run", "rate_step"], "Did you mean 'rate_step_lattice' or 'rate_step_boundary'"),
-        (["run", NAME, "--serial", "--scheduler", "x"], "exclude each other"),
-        (["run", NAME, "--workers", "0"], "0 is not in the range"),
-        (["run", NAME, "--rtol", "1"], "rtol = 1.0: must lie between"),
-        (["run", NAME, "--set", "b_over_a"], "must read AXIS=VALUES"),
-        (["run", NAME, "--set", "b_over_a="], "must read AXIS=VALUES"),
-        (["run", NAME, "--set", "b_over_a=2:3:x"], "must read start:stop:count"),
-        (["run", NAME, "--set", "b_over_a=2:3"], "must read start:stop:count"),
-        (["run", NAME, "--set", "b_over_a=2:3:4:geom"], "write start:stop:count:log, as in"),
-        (["run", NAME, "--set", "b_over_a=0:3:4:log"], "has no logarithm of 0 or less"),
-        (["run", NAME, "--set", "b_over_a=2,2"], "b_over_a = 2.0: stands twice"),
-        (
-            ["run", NAME, "--set", "load_velocity_ratio=3"],
-            "solves for load_velocity_ratio; it cannot be an axis",
-        ),
-        (["run", NAME, "--set", "b_over_a=two"], "b_over_a = 'two': must be a number"),
-        (["run", NAME, "--set", "b_over_a=0.5"], "must exceed 1"),
-        (["run", NAME, "--set", "b_ovr_a=2"], "Did you mean 'b_over_a'"),
-        (["run", NAME, "--set", "law=slipp"], "Did you mean 'slip'"),
-        (["show", "nothing"], "study = 'nothing': is unknown"),
-        (["frobnicate"], "No such command"),
-    ],
-)
-def test_wrong_usage_is_status_2_with_a_remedy(words, message, tmp_path):
-    ran = call(*words, *(["--output", tmp_path / "o"] if words[0] == "run" else []))
-    assert ran.returncode == 2
-    assert message in " ".join(ran.stderr.split())
-    assert "Traceback" not in ran.stderr
-    assert not (tmp_path / "o").exists()
-
-
 def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
     few = ["--serial", "--set", "b_over_a=2", "--output", tmp_path]
     ran = call("run", NAME, *few, "--budget", "300")
@@ -186,14 +150,6 @@ def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
     ran = call(*motion, "--set", "load_velocity_ratio=1.2", "--duration", "1e3")
     assert ran.returncode == 1
     assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
-
-
-@pytest.mark.parametrize("name", ["figure.jpg", "figure.eps"])
-def test_a_figure_in_a_format_that_is_none_is_refused(name, tmp_path):
-    drawn = call("plot", NAME, "--output", tmp_path / name)
-    assert drawn.returncode == 2
-    assert "Choices: png, pdf, svg." in " ".join(drawn.stderr.split())
-    assert not (tmp_path / name).exists()
 
 
 def test_results_that_are_not_there_are_status_1(tmp_path):

@@ -103,9 +103,3 @@ def test_a_scene_without_a_number_counts_its_status():
     assert found.values["status_kept"] == 1.0
     assert found.values["ended_as"] == float(Status.SLIP_RATE_UNBOUNDED)
     assert "error_over_estimate" not in found.values
-
-
-@pytest.mark.parametrize("wrong", [{"question": "cycle"}, {"sample": -1}, {"requested_digits": 10}])
-def test_questions_without_an_answer_are_refused(wrong):
-    with pytest.raises(InvalidValue, match=next(iter(wrong))):
-        Coverage(**wrong)

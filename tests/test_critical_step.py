@@ -17,7 +17,7 @@ from rsfstudy import Scene
 from rsfstudy.analysis import swing
 from rsfstudy.analysis.rate_steps import RateSteps
 from rsfstudy.analysis.touching import touching_point
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -493,12 +493,6 @@ def test_downward_steps_can_trigger_too():
     assert outcome.values["critical_velocity_ratio_unstable"] < value
     tight = found(scene, direction="down", rtol=1e-6, engine=COMPILED)[0]
     assert abs(value - tight) <= error + 1e-6
-
-
-@pytest.mark.parametrize("fields", [{"of": "stifness"}, {"direction": "sideways"}])
-def test_wrong_questions_are_refused(fields):
-    with pytest.raises(InvalidValue, match="Choices"):
-        rsfstudy.critical_step(Scene(), **fields)
 
 
 def test_public_call_returns_a_small_dataset():

@@ -158,18 +158,3 @@ def test_coarse_digits_are_no_events():
     stress = np.round(0.45 + 0.1 * noise(3))
     found = rsfstudy.events(time=np.arange(SAMPLES), shear_stress=stress)
     assert not found.sizes["event"]
-
-
-@pytest.mark.parametrize(
-    ("changed", "why"),
-    [
-        ({"time": np.zeros(500)}, "increase, and does not at sample 1"),
-        ({"shear_stress": np.full(500, math.nan)}, "finite, and is not at sample 0"),
-        ({"shear_stress": np.zeros(499)}, "as many samples as time, which holds 500"),
-        ({"time": np.arange(9)}, "400 samples at least"),
-    ],
-)
-def test_records_that_are_none_are_refused(changed, why):
-    given = {"time": np.arange(500), "shear_stress": np.zeros(500)} | changed
-    with pytest.raises(InvalidValue, match=why):
-        rsfstudy.events(**given)

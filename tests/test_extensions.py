@@ -588,10 +588,6 @@ def squares(dataset, axes):
     axes.set_title("squares")
 
 
-def named_figure(name):
-    return SimpleNamespace(__name__=name, draw=squares)
-
-
 @pytest.mark.parametrize(
     ("plot", "complaint"),
     [

@@ -163,53 +163,6 @@ def test_units_of_a_rig(tmp_path):
         history(dataset)
 
 
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("time, displacement\n0,0\n1,1\n", "line 1, column 1: header = 'time': names no column"),
-        ("0,0\n1,1\n0,2\n", "line 4, column 1: time = 0.0: must be later"),
-        ("0,0\n1,1\n1,2\n", "line 4, column 1: time = 1.0: must be later"),
-        ("0,0\n1,\n2,2\n", "line 3, column 2: displacement = nan: must be a finite number"),
-        ("0,0\n1,nan\n2,2\n", "line 3, column 2: displacement = 'nan': must be finite"),
-        ("0,0\n1,x\n2,2\n", "line 3, column 2: displacement = 'x': is no number"),
-        ("0,0\n1\n2,2\n", "line 3: line = '1': has 1 fields, and the header 2"),
-        ("0,3\n\n1,2\n", "line 4, column 2: displacement = 2.0: moves the load point back"),
-        ("0,3\n", "must have as many, 2 at least"),
-    ],
-)
-def test_bad_records_say_where(tmp_path, text, complaint):
-    file = tmp_path / "record.csv"
-    header = "" if text.startswith("time") else "time (D_c/V_*), displacement (D_c)\n"
-    file.write_text(header + text)
-    with pytest.raises(InvalidValue, match=complaint):
-        history(file)
-
-
-@pytest.mark.parametrize(
-    ("record", "complaint"),
-    [
-        ({"time": [0.0, 1.0], "velocity": [1.0, -1.0]}, "sample 2: velocity = -1.0: moves"),
-        ({"time": [0.0, 1.0], "normal_stress": [1.0, 0.0]}, "sample 2: normal_stress = 0.0"),
-        ({"time": [0.0, 1.0], "pore_pressure": [0.0, 1.0]}, "sample 2: pore_pressure = 1.0"),
-        ({"time": [0.0, 1.0, 2.0], "velocity": [1.0, 1.0]}, r"columns of \[2, 3\] samples"),
-        ({"time": [0.0, 1.0]}, "tells no history"),
-        ({"time": [0.0, 1.0], "speed": [1.0, 1.0]}, "column = 'speed': is unknown"),
-        ({"time": [0.0, 1.0], "velocity": [1.0] * 2, "displacement": [1.0] * 2}, "give one"),
-    ],
-)
-def test_bad_arrays_say_which_sample(record, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        history(record)
-
-
-def test_what_a_scene_cannot_follow_is_refused():
-    pressed = history({"time": [0.0, 1.0], "normal_stress": [1.0, 1.1]})
-    with pytest.raises(InvalidValue, match="is changed by the loading"):
-        Scene(**PLAIN, loading=pressed)
-    with pytest.raises(InvalidValue, match="no meaning for fluid='dilatant'"):
-        Scene(**PLAIN | {"normal_stress": "imposed", "fluid": "dilatant"}, loading=pressed)
-
-
 def test_a_history_is_data():
     """Equal where its samples are; copied and pickled; an axis; told by its digest."""
     one, same, other = history(wave(20)), history(wave(20)), history(wave(30), name="finer")

@@ -198,12 +198,6 @@ def test_an_orbit_of_two_points_is_the_ends_of_any(case):
         assert ends.values[name] == pytest.approx(same, rel=off, abs=off, nan_ok=True), name
 
 
-@pytest.mark.parametrize("phases", [0, 1])
-def test_an_orbit_needs_points(phases):
-    with pytest.raises(InvalidValue, match="at least 2"):
-        LimitCycle(phases=phases)
-
-
 def test_stiffer_cycles_are_smaller():
     drops = [
         measured(scene(law="slowness", normal_stress="constant", stiffness_ratio=ratio))[

@@ -16,7 +16,6 @@ from rsfstudy.named_studies.triggering import Triggers
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis.swing import friction_acts_alone, neutral, orbits_may_close, swing
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -312,16 +311,6 @@ def test_coulomb_stresses_add_up():
 
 
 # ---- bad input, and what users call -------------------------------------------------------------
-
-
-def test_constant_normal_stress_has_no_steps():
-    """Refused before any work, with the value, the rule and the remedy."""
-    meter = Meter(1)
-    with pytest.raises(InvalidValue, match="'constant'.*changed by the loading.*'imposed'"):
-        FALL.find(Scene(normal_stress="constant"), Accuracy(), meter)
-    assert meter.spent == 0
-    with pytest.raises(InvalidValue, match="not for normal stress that the loading changes"):
-        FALL(Scene(**IMPOSED, stress_dependence=0.5), Accuracy())
 
 
 def test_public_call():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, protocol, simulate
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
@@ -226,26 +225,6 @@ def test_a_protocol_that_steps_too_soon_is_not_read():
     outcome = NormalStressTransient()(scene, Accuracy(1e-4))
     assert outcome.status is Status.NOT_APPLICABLE
     assert read(NormalStressTransient(record=4.0), scene, 1e-4)["apparent_alpha"] > 0.0
-
-
-def test_a_transient_is_not_asked_of_an_oscillation():
-    with pytest.raises(InvalidValue, match="changes normal stress all along"):
-        NormalStressTransient()(Scene(**IMPOSED, **OSCILLATES), Accuracy())
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: NormalStressResponse(samples=9), "must be an even number, at least 8"),
-        (lambda: NormalStressTransient(fit_from=0.0), "fit_from.*greater than 0 and less"),
-        (lambda: NormalStressTransient(fit_from=2.0), "fit_from.*less than fit_to"),
-        (lambda: NormalStressTransient(record=2.0), "record.*exceed fit_to by 1 D_c"),
-        (lambda: NormalStressTransient(phases=1), "phases.*at least 2"),
-    ],
-)
-def test_measures_that_read_nothing(wrong, message):
-    with pytest.raises(InvalidValue, match=message):
-        wrong()
 
 
 def test_where_slip_does_not_come_as_far_nothing_is_read():

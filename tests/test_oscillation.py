@@ -7,18 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies.two_states import Bifurcation
 
 from rsfstudy import Axis, Scene, Study, simulate
-from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggered import Triggered
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
@@ -144,16 +137,6 @@ def test_faster_than_free_oscillation_with_mass():
     assert motion.attrs["status"] == "ok"
     expected = 1.0 + 0.1 * np.sin(2.0 * np.pi * motion.time / 5e-8)
     assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    "measure",
-    [CriticalStep(), Triggered(), LimitCycle(), StepResponse(), Bifurcation(), VelocityStep()],
-    ids=lambda measure: measure.name,
-)
-def test_what_settles_or_repeats_is_not_asked_of_it(measure):
-    with pytest.raises(InvalidValue, match="oscillation': changes normal stress all along.*_resp"):
-        measure(Scene(oscillation_amplitude=0.1, load_velocity_ratio=2.0), Accuracy())
 
 
 def test_it_holds_nothing():

@@ -143,12 +143,6 @@ def test_outputs_that_make_no_lattice(outputs, complaint):
         study(odd())
 
 
-@pytest.mark.parametrize("said", [{"symbol": "$Q$"}, {"units": "s"}, {"scale": "sigma_*"}])
-def test_what_has_a_symbol_or_units_is_something(said):
-    with pytest.raises(InvalidValue, match="must say what total is"):
-        Output("total", **said)
-
-
 def test_what_is_not_measured_is_not_described():
     with pytest.raises(InvalidValue, match="quantities = 'heat': describes nothing"):
         run(study(own(quantities=(Quantity("heat", "", "J", "heat"),))))
@@ -239,38 +233,12 @@ def test_declarations_that_make_no_lattice(declared, complaint):
         study(own(**declared))
 
 
-@pytest.mark.parametrize(
-    ("part", "value"),
-    [
-        ("id", 3),
-        ("because", None),
-        ("published", np.nan),
-        ("published", 10**400),
-        ("where", {"b_over_a": [2.0]}),
-        ("where", {"b_over_a": None}),
-        ("relation", "roughly"),
-    ],
-)
-def test_claims_that_are_none(part, value):
-    good = {"id": "T1", "statement": "", "source": "", "variable": "total", "published": 2.0,
-            "tolerance": 0.0, "reason": "", "where": {"b_over_a": 2.0}}  # fmt: skip
-    Claim(**good)
-    with pytest.raises(InvalidValue, match=f"{part} = |claim T1"):
-        Claim(**{**good, part: value})
-
-
 def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
     claim = Claim(id="T1", statement="", source="", variable="message", published=2.0,
                   tolerance=0.0, reason="", where={"b_over_a": 2.0})  # fmt: skip
     with pytest.raises(InvalidValue, match="is no place of the lattice, in claim T1"):
         run(study(Own(), claims=[claim]))
-
-
-def test_parts_that_no_file_can_hold():
-    fit = LinearFit(name="slope", of="total", on="b_over_a", within=(np.float32(1.0), 2.0))
-    with pytest.raises(InvalidValue, match="reductions = .*must be plain data"):
-        study(Own(), reductions=[fit])
 
 
 def test_numbers_named_as_those_of_a_fit_are_only_numbers(tmp_path, capsys):

@@ -12,7 +12,6 @@ from rsfstudy.analysis.approach import Approach
 from rsfstudy.analysis.cycles import Cycle
 from rsfstudy.analysis.periods import course, recurrence
 from rsfstudy.analysis.return_map import ReturnMap, product, section
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
@@ -227,12 +226,6 @@ def test_recurrence_counts_events():
     period, off = recurrence(scene, followed(scene, 32))
     assert period == 2
     assert off < 1e-3
-
-
-@pytest.mark.parametrize("given", [{"transient": -1}, {"events": 3}])
-def test_events_that_mean_nothing_are_refused(given):
-    with pytest.raises(InvalidValue, match="must be"):
-        Bifurcation(**given)
 
 
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):

@@ -13,8 +13,6 @@ from rsfstudy.named_studies.two_states import Bifurcation
 from running import run
 
 from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
-from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
@@ -209,9 +207,3 @@ def test_a_history_without_a_step_is_that_of_the_plain_scene(idle):
         assert found.values[measure.headline] == expected.values[measure.headline]
     if len(idle.parts.loading.segments) == 1:
         assert Triggered()(idle, accuracy).values["unstable"] == 0.0
-
-
-def test_what_is_asked_of_one_step_is_not_asked_of_a_hold():
-    for measure in (CriticalStep(), Triggered()):
-        with pytest.raises(InvalidValue, match="slide_hold_slide': is no single step"):
-            measure(Scene(**STIFF, hold_time=10.0), Accuracy())

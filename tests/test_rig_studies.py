@@ -224,35 +224,6 @@ def test_overrides_in_units():
     assert (base.normal_stress_ramp, base.ramp_duration) == pytest.approx((0.2, 2.0), rel=EXACT)
 
 
-def test_units_without_a_rig_are_answered_by_the_rig():
-    with pytest.raises(InvalidValue, match=r"must be a number. .*rsfstudy.Laboratory"):
-        Scene(hold_time="10 s")
-    status, said = called(["show", "slide_hold_slide", "--set", "hold_time=10 s,100 s"])
-    assert status == 2
-    assert "Units are those of a rig" in said
-
-
-def test_a_velocity_is_stated_once():
-    with pytest.raises(InvalidValue, match="load_velocity or load_velocity_ratio, not both"):
-        RIG.scene(load_velocity="2 um/s", load_velocity_ratio=3.0)
-
-
-@pytest.mark.parametrize(
-    ("axis", "field", "rule"),
-    [
-        (("hold_time", ["10 um"]), "hold_time", "another kind"),
-        (("normal_stress", ["-5 MPa"]), "sigma_star", "must be positive"),
-        (("stiffness", ["0.1 MPa/um", "1e-3 1/um"]), "stiffness", "another kind"),
-        (("load_velocity", "1:0:3:log um/s"), "load_velocity", "no logarithm"),
-        (("load_velocity", ["10 um/s", "fast"]), "load_velocity", "no quantity"),
-    ],
-)
-def test_wrong_axes_are_refused(axis, field, rule):
-    with pytest.raises(InvalidValue, match=rule) as refused:
-        study(RIG.axis(*axis))
-    assert refused.value.name == field
-
-
 def test_what_does_not_go_with_the_rig_is_refused_before_any_work():
     hold = RIG.axis("hold_time", ["10 s"])
     parts = {"name": "x", "title": "t", "measure": LinearStability()}

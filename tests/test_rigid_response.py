@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.rigid_response import RigidResponse, friction_after_step
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import log_rate_at
@@ -94,12 +93,6 @@ def test_steps_without_a_response_are_named():
     beyond = Scene(load_velocity_ratio=1e-35)
     assert RigidResponse()(beyond, Accuracy()).status is Status.NO_STEADY_STATE
     assert friction_after_step(Scene(), 0.0) == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("fields", [{"slip": 0.5}, {"slip": math.inf}, {"points": 1}])
-def test_responses_need_slip_and_points(fields):
-    with pytest.raises(InvalidValue, match="must be at least"):
-        RigidResponse(**fields)
 
 
 def test_numbers_do_not_depend_on_the_points_that_are_kept():

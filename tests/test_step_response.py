@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -125,12 +124,6 @@ def test_slip_that_runs_away_without_mass_is_an_answer():
 
 def test_a_held_load_point_is_refused_by_status():
     assert response(displacement_step=1.0).status is Status.NO_STEADY_STATE
-
-
-@pytest.mark.parametrize("wrong", [{"peaks": 1}, {"phases": 1}])
-def test_meaningless_lengths_are_refused(wrong):
-    with pytest.raises(InvalidValue, match=next(iter(wrong))):
-        StepResponse(**wrong)
 
 
 def test_the_rise_after_a_jump_ends_in_a_peak_whether_or_not_it_is_followed():

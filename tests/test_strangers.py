@@ -462,27 +462,6 @@ def test_what_may_not_be_read_is_told(tiny, tmp_path, monkeypatch):
 # ---- options ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["run", "rate_step_boundary", "--serial"],
-        ["check", "rate_step_boundary"],
-        ["plot", "rate_step_boundary"],
-        ["rerun", "tiny.nc"],
-    ],
-)
-def test_an_output_that_is_empty(words, tmp_path, monkeypatch):
-    """It is not the directory one happens to be in."""
-    monkeypatch.chdir(tmp_path)
-    code, said = called([*words, "--output", ""])
-    assert code == 2
-    assert "output = '': is empty. Name a directory; . is the one you are in." in said
-    assert os.listdir(tmp_path) == []
-    for use in (lambda: run(output=""), lambda: rsfstudy.open("rate_step_boundary", "")):
-        with pytest.raises(InvalidValue, match="output = '': is empty"):
-            use()
-
-
 @pytest.mark.parametrize("output", ["a\0b", "\udcff", "a" * 10_000, "a/" * 5000])
 def test_an_output_that_can_be_no_directory(output):
     with pytest.raises(InvalidValue, match="output = ") as refused:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rsfstudy.named_studies.rigid_response import Spread
 from running import cell_key
 
 from rsfstudy import Axis, Scene, Study
@@ -38,11 +37,6 @@ def study(*axes: Axis, **fields) -> Study:
     )
 
 
-def test_axes_must_not_vary_the_same_field():
-    with pytest.raises(InvalidValue, match="varies 'alpha', as 'case' does already"):
-        study(Axis("case", CASES), Axis("alpha", [0.1, 0.2]))
-
-
 def test_cells_run_over_the_last_axis_first():
     declared = study(Axis("case", CASES), Axis("b_over_a", [2.0, 3.0]))
     assert (declared.dimensions, declared.shape, declared.size) == (("case", "b_over_a"), (3, 2), 6)
@@ -57,18 +51,6 @@ def test_cells_run_over_the_last_axis_first():
 def test_values_that_do_not_apply_are_left_out_of_constant_normal_stress():
     declared = study(Axis("normal_stress", ["constant", "variable"]), Axis("phi", [50.0, 60.0]))
     assert [s.phi for s in declared.scenes()] == [None, None, 50.0, 60.0]
-
-
-def test_a_cell_that_makes_no_scene_names_its_place():
-    declared = study(Axis("b_over_a", [2.0, 3.0]), Axis("phi", [30.0, 60.0]))
-    with pytest.raises(InvalidValue, match="b_over_a=2.0, phi=30.0.*must exceed atan"):
-        list(declared.scenes())
-
-
-def test_contradictory_points_are_refused():
-    declared = study(Axis("case", {"x": {"normal_stress": "constant", "alpha": 0.5}}))
-    with pytest.raises(InvalidValue, match="alpha = 0.5: has no meaning"):
-        list(declared.scenes())
 
 
 def test_override_of_an_axis_replaces_its_values():
@@ -110,36 +92,12 @@ def test_points_keep_their_labels_where_they_keep_their_values():
     assert [s.alpha for s in both.scenes()] == [None, 0.25, 0.4, 0.56]
 
 
-def test_an_axis_no_cell_uses_is_refused():
-    unused = Study(
-        name="trial",
-        title="Trial",
-        base=Scene(normal_stress="constant"),
-        axes=[Axis("phi", [50.0, 60.0])],
-        measure=CriticalStep(),
-    )
-    with pytest.raises(InvalidValue, match="phi.*has no effect in any cell"):
-        list(unused.scenes())
-
-
 @given(st.lists(st.floats(1.01, 50.0), min_size=1, max_size=5, unique=True), st.booleans())
 def test_declarations_are_plain_data(values, zipped):
     axes = [Axis("b_over_a", values), *([Axis("case", CASES)] if zipped else [])]
     declared = study(*axes).with_(stiffness_ratio=1.2)
     text = json.dumps(declared.describe(), allow_nan=False)
     assert json.loads(text)["axes"][0]["values"] == values
-
-
-@pytest.mark.parametrize("name", ["", "two words", "a/b", "../x"])
-def test_names_that_are_no_file_names_are_refused(name):
-    with pytest.raises(InvalidValue, match="identifier"):
-        Study(
-            name=name,
-            title="",
-            base=Scene(),
-            axes=[Axis("b_over_a", [2.0])],
-            measure=CriticalStep(),
-        )
 
 
 # ---- what a measure of one's own may declare ------------------------------------------------
@@ -184,17 +142,6 @@ def test_a_measure_declares_what_a_lattice_can_hold(fields, complaint):
 def test_a_measure_is_plain_data(value):
     with pytest.raises(InvalidValue, match="'own': is no plain data .*Python's own numbers"):
         declared(measure=Own(value))
-
-
-@pytest.mark.parametrize("name", ["a/b", "status", "phi", "", 3])
-def test_a_reduction_names_something_new(name):
-    with pytest.raises(InvalidValue, match="names something else, or nothing"):
-        declared(reductions=[Spread(name, "critical_velocity_ratio", "b_over_a")])
-
-
-def test_an_axis_is_named_as_a_file_gives_it_back():
-    with pytest.raises(InvalidValue, match=re.escape("composed (NFC)")):
-        Axis("e\u0301tude", {"one": {"phi": 55.0}})
 
 
 @pytest.mark.parametrize("order", [["constant", "variable"], ["variable", "constant"]])

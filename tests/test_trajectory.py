@@ -9,7 +9,7 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer
+from rsfstudy.errors import Incomplete, NoAnswer
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.recording import REGIME, STATES, strictly_later
 
@@ -167,30 +167,6 @@ def test_a_motion_that_begins_beyond_the_norm_says_so():
     at = motion.sel(time=float(motion.instability_time), method="nearest")
     # samples are a few tenths of a power of ten apart
     assert float(at.log10_slip_rate) == pytest.approx(6.0, abs=0.5)
-
-
-@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf])
-def test_meaningless_durations_are_refused(duration):
-    with pytest.raises(InvalidValue, match="duration"):
-        rsfstudy.simulate(Scene(), duration=duration)
-
-
-def test_a_duration_without_its_name_is_refused():
-    with pytest.raises(InvalidValue, match=r"simulate = 10: .*Write duration=10, in D_c/V_\*"):
-        rsfstudy.simulate(Scene(), 10)
-
-
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (lambda: rsfstudy.simulate("limit_cycles"), "is no scene.*rsfstudy.run computes studies"),
-        (lambda: rsfstudy.critical_step({"law": "slip"}), "is no scene"),
-        (lambda: rsfstudy.simulate(Scene(), duration="10 s"), "D_c/V_.*rig.dimensionless"),
-    ],
-)
-def test_what_it_cannot_follow(ask, message):
-    with pytest.raises(InvalidValue, match=message):
-        ask()
 
 
 @pytest.mark.parametrize("engine", ENGINES)

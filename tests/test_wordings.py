@@ -1,27 +1,38 @@
 """What is refused, and in which words. Each field is held to its rule by what declares it; the
-messages that a person should read once stand in `wordings.txt`, each below the call that it answers
-(`python tests/test_wordings.py` writes it anew: read the difference).
+messages that a person should read once stand in `wordings.txt`, each below the call or the command
+that it answers (`python tests/test_wordings.py` writes it anew: read the difference).
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
+import os
+import re
+import shlex
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import numpy as np
 import pytest
+from running import call
 
 import rsfstudy
-from rsfstudy import Scene
+from rsfstudy import Axis, Laboratory, Scene
+from rsfstudy.declare import catalogue
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.names import names
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.reduce import ProportionalFit
+from rsfstudy.quantity import Output
+from rsfstudy.reduce import Reduction
+from rsfstudy.rig.units import in_si
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import RULES, is_flag, names_of
 from rsfstudy.slider.registry import OWNERS, SLOTS
@@ -103,20 +114,53 @@ def study(*axes, **fields) -> rsfstudy.Study:
     return rsfstudy.Study(**{"name": "trial", "title": "Trial", **parts, **fields})
 
 
-#: What calls are made of, beside what is public.
-MORE = {"study": study, "inf": math.inf, "nan": math.nan, "CriticalStep": CriticalStep,
-        "LimitCycle": LimitCycle, "Triggered": Triggered, "ProportionalFit": ProportionalFit,
-        "Accuracy": Accuracy}  # fmt: skip
+def csv(text: str) -> str:
+    """A record in the directory of the test."""
+    Path("record.csv").write_text(text, encoding="utf-8")
+    return "record.csv"
 
 
-def answered(call: str) -> str:
-    """The message with which a call is refused."""
-    names = {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
+def claim(**fields) -> Claim:
+    parts = {"id": "C1", "statement": "", "source": "", "variable": "v", "where": {}}
+    return Claim(**{**parts, "published": 1.0, "tolerance": 0.1, "reason": "", **fields})
+
+
+def members(base: type) -> Iterator[type]:
+    yield base
+    for kind in base.__subclasses__():
+        yield from members(kind)
+
+
+#: A rig.
+RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+
+
+@functools.cache
+def known() -> dict[str, Any]:
+    """What calls are made of: what is public, every measure and reduction, and a few words."""
+    for name in names():
+        catalogue.load(name)
+    kinds = [*members(Measure), *members(Reduction)]
+    return (
+        {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
+        | {kind.__name__: kind for kind in kinds if kind.__module__.startswith("rsfstudy.")}
+        | {"inf": math.inf, "nan": math.nan, "np": np, "Accuracy": Accuracy, "Output": Output}
+        | {"study": study, "claim": claim, "csv": csv, "RIG": RIG, "in_si": in_si}
+        | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
+    )
+
+
+def answered(asked: str) -> str:
+    """The message with which a call, or a command, is refused: before anything is written."""
     with contextlib.ExitStack() as stack:
         for slot in SLOTS:  # other tests have named parts of their own
             stack.enter_context(mock.patch.dict(slot.own, clear=True))
+        if asked.startswith("rsfstudy "):
+            ended = call(*shlex.split(asked)[1:])
+            assert ended.returncode == 2
+            return re.sub("^.*?rror: ", "", " ".join(ended.stderr.split()))
         refused = stack.enter_context(pytest.raises(InvalidValue))
-        eval(call, names | MORE)
+        eval(asked, known())
     return str(refused.value)
 
 
@@ -124,16 +168,21 @@ def kept() -> dict[str, str]:
     """Messages by call."""
     blocks = WORDINGS.read_text(encoding="utf-8").strip().split("\n\n")
     parts = (block.partition("\n    ") for block in blocks if not block.startswith("#"))
-    return {call: message for call, _between, message in parts}
+    return {asked: message for asked, _between, message in parts}
 
 
-@pytest.mark.parametrize(("call", "message"), kept().items())
-def test_a_message_is_worded_as_it_was_read(call, message):
-    assert answered(call) == message
+@pytest.mark.parametrize(("asked", "message"), kept().items())
+def test_a_message_is_worded_as_it_was_read(asked, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert answered(asked) == message
+    assert set(os.listdir(tmp_path)) <= {"record.csv"}
 
 
 if __name__ == "__main__":
     head, *blocks = WORDINGS.read_text(encoding="utf-8").strip().split("\n\n")
-    calls = [block.split("\n")[0] for block in blocks]
-    texts = [call if call.startswith("#") else f"{call}\n    {answered(call)}" for call in calls]
+    asked = [block.split("\n")[0] for block in blocks]
+    with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
+        texts = [
+            line if line.startswith("#") else f"{line}\n    {answered(line)}" for line in asked
+        ]
     WORDINGS.write_text("\n\n".join([head, *texts]) + "\n", encoding="utf-8")
