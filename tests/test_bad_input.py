@@ -2,7 +2,6 @@
 never a half-written output.
 """
 
-import json
 import os
 import string
 import threading
@@ -19,10 +18,10 @@ from hypothesis import strategies as st
 from running import FAULTY, SMALL, call, called, run, same_numbers
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy import Scene, plots
 from rsfstudy.cli.console import console
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.registry import FIELDS
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
@@ -42,53 +41,21 @@ ODD = st.one_of(
 NUMBERS = st.floats(1.1, 4.0)
 
 
-def made(make, names):
-    """What is made, or None where it is refused with one of these names."""
-    try:
-        return make()
-    except InvalidValue as error:
-        said = str(error)
-    assert any(repr(name).strip("'\"") in said for name in names), said
-    return None
-
-
 # ---- declarations -------------------------------------------------------------------------------
 
 
 @settings(max_examples=50)
 @given(st.dictionaries(st.sampled_from(FIELDS) | st.text(max_size=6), ODD, max_size=4))
 def test_a_scene_is_made_or_refused(fields):
-    scene = made(lambda: Scene(**fields), fields)
-    assert scene is None or np.isfinite(scene.stiffness)
-
-
-@given(
-    st.sampled_from(FIELDS) | st.text(max_size=6) | ODD,
-    st.lists(ODD, max_size=4) | st.dictionaries(st.text(max_size=3), ODD, max_size=2) | ODD,
-)
-@example("b_over_a", {"x": {"b_over_a": [1]}})
-def test_an_axis_is_made_or_refused(dimension, values):
     try:
-        axis = Axis(dimension, values)
-    except InvalidValue:
-        return
-    assert len(axis) > 0
-
-
-@given(
-    st.dictionaries(
-        st.sampled_from(
-            ["name", "title", "summary", "base", "axes", "measure", "reductions", "claims",
-             "plot", "references", "accuracy", "version", "overrides"]
-        ),
-        ODD | st.just(SMALL.base) | st.just(SMALL.axes) | st.just(SMALL.measure) | st.just([3]),
-        max_size=3,
-    )
-)  # fmt: skip
-def test_a_study_is_made_or_refused(parts):
-    good = {"name": "n", "title": "t", "base": Scene(), "axes": SMALL.axes}
-    study = made(lambda: Study(**{**good, "measure": SMALL.measure, **parts}), parts)
-    assert study is None or json.dumps(study.describe())
+        stiffness = Scene(**fields).stiffness
+    except InvalidValue as error:
+        said, stiffness = str(error), 1.0
+        named = [repr(name).strip("'\"") for name in fields]
+    else:
+        said, named = "made", ["made"]
+    assert np.isfinite(stiffness)
+    assert any(name in said for name in named), said
 
 
 NAMES = st.sampled_from(FIELDS) | st.text(max_size=6)
@@ -188,23 +155,6 @@ def test_a_damaged_file_is_refused_or_unharmed(small, tmp_path_factory, data):
     assert "damaged.nc" in said
 
 
-@pytest.mark.parametrize("how", ["empty", "directory", "text", "foreign", "missing"])
-@pytest.mark.parametrize("command", ["check", "show", "plot", "rerun"])
-def test_what_is_no_results_file(command, how, tmp_path):
-    path = tmp_path / "what.nc"
-    if how == "empty":
-        path.touch()
-    elif how == "directory":
-        path.mkdir()
-    elif how == "text":
-        path.write_text("no NetCDF")
-    elif how == "foreign":
-        xr.Dataset({"v": 1.0}).to_netcdf(path)
-    code, said = called([command, str(path)])
-    assert code == 1
-    assert "what.nc" in said
-
-
 @settings(max_examples=60)
 @given(st.text(max_size=40) | st.sampled_from([
     "raise KeyError(3)", "import nothing_at_all", "study = None", "\0", "(" * 300, "def f(:",
@@ -240,12 +190,6 @@ def test_a_journal_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "small.cells.sqlite").mkdir()
     with pytest.raises(DataError, match="cannot use .*--output"):
         run(output=tmp_path)
-
-
-def test_an_error_on_the_command_line_is_one_message():
-    ran = call("run", FAULTY, "--output", "/dev/null/results")
-    assert ran.returncode == 1
-    assert ran.stderr.startswith("error: cannot use")
 
 
 def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
@@ -295,19 +239,6 @@ def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     (tmp_path / "stress_drop.partial.nc").touch()
     code, said = called([command, "stress_drop", "--output", str(tmp_path)])
     assert (code, "partial.nc does: run the study again" in said) == (1, True)
-
-
-@pytest.mark.parametrize("name", [3, None, "a" * 5000 + ".nc", "a" * 5000])
-def test_names_that_are_none(name):
-    with pytest.raises(RsfStudyError):
-        rsfstudy.open(name)
-    with pytest.raises(RsfStudyError):
-        rsfstudy.check(name)
-
-
-def test_a_study_file_with_an_endless_name():
-    with pytest.raises(InvalidValue, match="is no file"):
-        catalogue.load("a" * 5000 + ".py")
 
 
 def test_threads_that_run_studies_do_not_mix():

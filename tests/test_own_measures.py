@@ -209,6 +209,11 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
     [
         ({"variables": ["total"]}, "declares what no lattice can hold"),
         ({"variables": {}}, "must name a number"),
+        *(
+            ({"variables": {"total": (), name: ()}}, f"'{name}': names something else, or nothing")
+            for name in ("a/b", "phi", "status", "e\u0301tude")
+        ),
+        ({"inner_coordinates": {"total": [0.0, 1.0]}}, "'total': names something else"),
         ({"variables": {"total": None}}, "dimensions = None: of 'total' must be names"),
         ({"variables": {"total": "x"}}, "dimensions = 'x': of 'total' must be names"),
         ({"variables": {"total": ("x",)}}, "dimension = 'x': of 'total' has no coordinate values"),
@@ -219,10 +224,16 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
         ({"sought": ("b_ovr_a",)}, "sought = 'b_ovr_a': is not a field .* mean 'b_over_a'"),
         ({"sought": 3}, "declares what no lattice can hold"),
         ({"typical_work": "many"}, "typical_work = 'many': must be a number greater than 0"),
+        ({"typical_work": 0}, "typical_work = 0: must be a number greater than 0"),
+        ({"typical_work": np.nan}, "typical_work = nan: must be a number greater than 0"),
         ({"typical_work": 10**400}, "declares what no lattice can hold .OverflowError"),
         ({"work_by_digits": {}}, "declares what no lattice can hold .IndexError"),
         ({"expected_work": lambda _self, _accuracy: np.nan}, "expected_work = nan: must exceed 0"),
         ({"describe": lambda _self: None}, "is no plain data"),
+        (
+            {"describe": lambda _self: {"name": "own", "n": np.int64(2)}},
+            "is no plain data .*Python",
+        ),
         ({"describe": lambda _self: {}}, "declares what no lattice can hold .KeyError: 'name'"),
         ({"__call__": lambda _self, _scene, _accuracy: 3}, "has a __call__ of its own. Write find"),
     ],
@@ -262,64 +273,42 @@ class Raising:
         raise ZeroDivisionError("no array")
 
 
+def gives(values, count: object = 7, charged: object = 0) -> Measure:
+    """A measure with these values, that says to have spent so much."""
+
+    def find(self, scene, accuracy, meter):
+        meter.charge("any", charged)
+        meter.spent = count + charged if charged else count
+        return Outcome(Status.OK, values)
+
+    return own(find=find)
+
+
+TOTAL = {"total": 1.0}
+COUNTS = "must be a whole number from 0 to 2**63 - 1"
+
+
 @pytest.mark.parametrize(
-    ("value", "message"),
+    ("measure", "message"),
     [
-        ({"a": 1.0}, "total = {'a': 1.0}: must be a real number"),
-        ([[1.0], [1.0, 2.0]], "ValueError: setting an array element with a sequence"),
-        (10**400, "must be a real number"),
-        (np.datetime64("2020-01-01"), "must be a real number"),
-        (np.timedelta64(1, "s"), "must be a real number"),
-        (np.array(None), "must be a real number"),
-        (np.ma.masked, "is masked, and must be a real number"),
-        (np.ma.masked_array([1.0], [True]), "is masked, and must be a real number"),
-        (Raising(), "ZeroDivisionError: no array"),
+        (gives({"total": {"a": 1.0}}), "total = {'a': 1.0}: must be a real number"),
+        (gives({"total": [[1.0], [1.0, 2.0]]}), "ValueError: setting an array element with a seq"),
+        (gives({"total": 10**400}), "must be a real number"),
+        (gives({"total": np.datetime64("2020-01-01")}), "must be a real number"),
+        (gives({"total": np.array(None)}), "must be a real number"),
+        (gives({"total": np.ma.masked}), "is masked, and must be a real number"),
+        (gives({"total": Raising()}), "ZeroDivisionError: no array"),
+        *((gives(values), "must map names to numbers") for values in (None, [1.0], "total")),
+        *((gives(TOTAL, n), COUNTS) for n in (2**63, -1, -(2**70), 1.5, np.nan, "many")),
+        *((gives(TOTAL, 0, n), COUNTS) for n in (2**70, -1)),
     ],
-    ids=named,
 )
-def test_numbers_that_are_none(value, message, tmp_path):
-    class Odd(Own):
-        def find(self, scene, accuracy, meter):
-            return Outcome(Status.OK, {"total": value})
-
-    failed(Odd(), message, tmp_path)
-
-
-def failed(measure, message, output):
+def test_outcomes_that_are_none(measure, message, tmp_path):
     """Each cell ends as one that raised; the journal and the file hold it."""
-    run_with_failures(study(measure), output=output)
-    found = rsfstudy.open("own", output)
+    run_with_failures(study(measure), output=tmp_path)
+    found = rsfstudy.open("own", tmp_path)
     assert found["status"].values.tolist() == [Status.CELL_RAISED] * 2
     assert message in found["message"].values[0]
-
-
-@pytest.mark.parametrize("values", [None, [1.0], "total"])
-def test_numbers_that_are_no_mapping(values, tmp_path):
-    class Odd(Own):
-        def find(self, scene, accuracy, meter):
-            return Outcome(Status.OK, values)
-
-    failed(Odd(), "must map names to numbers", tmp_path)
-
-
-@pytest.mark.parametrize("count", [2**63, 2**70, -1, -(2**70), 1.5, np.nan, "many"])
-def test_counts_of_work_that_are_none(count, tmp_path):
-    class Odd(Own):
-        def find(self, scene, accuracy, meter):
-            meter.spent = count
-            return Outcome(Status.OK, {"total": 1.0})
-
-    failed(Odd(), "must be a whole number from 0 to 2**63 - 1", tmp_path)
-
-
-@pytest.mark.parametrize(("charged", "message"), [(2**70, "2**63 - 1"), (-1, "2**63 - 1")])
-def test_charges_that_are_none(charged, message, tmp_path):
-    class Odd(Own):
-        def find(self, scene, accuracy, meter):
-            meter.charge("any", charged)
-            return Outcome(Status.OK, {"total": 1.0})
-
-    failed(Odd(), message, tmp_path)
 
 
 def test_counts_of_numpy_are_counts(tmp_path):

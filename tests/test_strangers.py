@@ -231,16 +231,8 @@ def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, da
     [
         ("id", removed, "id is missing"),
         ("id", replaced("../other"), "id is '../other', and the declared study 'tiny'"),
-        ("title", replaced(3), "title is refused .*Expected `str`"),
-        ("completeness", renamed, "completeness is missing"),
         ("declaration", replaced(None), "declaration is refused .Expected `object`, got `null`"),
-        ("declaration.claims", replaced({}), r"declaration.claims is refused .Expected `array`"),
         ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
-        (
-            "declaration.claims.0.id",
-            replaced(None),
-            r"claims\[0\].id is refused .Expected `str`, got `null`",
-        ),
         (
             "declaration.claims.0.tolerance",
             replaced(10**400),
@@ -252,24 +244,13 @@ def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, da
             r"claims\[0\] is refused .where = .*must be a text",
         ),
         ("declaration.claims.0.novel", replaced(1), r"declaration.claims\[0\].novel is unknown"),
-        ("declaration.base.phi", removed, "declaration.base.phi is missing"),
         ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
-        (
-            "declaration.accuracy.rtol",
-            replaced("1e-7"),
-            "rtol is refused .Expected `float`, got `str`",
-        ),
         ("declaration.novel", replaced(1), "declaration.novel is unknown"),
         ("provenance.fingerprint.own_code", removed, "provenance.fingerprint.own_code is missing"),
         (
             "provenance.versions.numpy",
             replaced(2),
             r"provenance.versions\[...\] is refused .Expected `str`",
-        ),
-        (
-            "provenance.declared_in",
-            replaced(None),
-            "provenance.declared_in is refused .*got `null`",
         ),
     ],
 )
@@ -284,14 +265,10 @@ def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_p
     ("name", "how", "complaint"),
     [
         ("status", "removed", "status is missing"),
-        ("status", "numbers", "status holds float64, and must hold whole numbers"),
         ("status", "whole numbers", "status is -77 in a cell"),
         ("status", "dates", r"status holds datetime64\[ns\], and must hold whole numbers"),
-        ("rhs_evaluations", "texts", "rhs_evaluations holds .*, and must hold whole numbers"),
-        ("rhs_evaluations", "spans of time", "rhs_evaluations holds timedelta64"),
         ("wall_time", "along nothing", r"wall_time lies along \(\), and status along"),
         ("message", "whole numbers", "message holds int64, and must hold texts"),
-        ("critical_stiffness", "dates", "critical_stiffness holds datetime64.*numbers or texts"),
         ("case", "removed", "case is no coordinate along the dimension of its name"),
     ],
 )
@@ -374,7 +351,10 @@ def nowhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("dir", "dir.nc", "dir.zarr", "odd.zarr"):
         (tmp_path / name).mkdir()
-    (tmp_path / "file.txt").write_text("text")
+    for name in ("file.txt", "text.nc"):
+        (tmp_path / name).write_text("text")
+    (tmp_path / "empty.nc").touch()
+    xr.Dataset({"v": 1.0}).to_netcdf(tmp_path / "foreign.nc")
     (tmp_path / "odd.zarr" / "zarr.json").write_text("[]")
     (tmp_path / "dangling.nc").symlink_to("/nowhere")
     (tmp_path / "circle.nc").symlink_to("circle.nc")
@@ -389,7 +369,7 @@ def nowhere(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "path",
     ["/", "//", ".", "..", "", "/dev/null", "/etc/passwd", "dir", "dir.nc", "dir.zarr", "odd.zarr",
-     "file.txt", "file.txt/x.nc", "dangling.nc", "circle.nc", "circle.py", "root.zarr", "zero.nc",
+     "file.txt", "file.txt/x.nc", "text.nc", "empty.nc", "foreign.nc", "missing.nc", "dangling.nc", "circle.nc", "circle.py", "root.zarr", "zero.nc",
      "zero.py", "*", "**/x", "small[1].nc", "a" * 9999, f"{'a' * 9999}.nc", f"{'a' * 9999}.py",
      "a/" * 5000 + "x.nc", "a b " * 2500],
     ids=lambda path: path[:20],
@@ -481,27 +461,6 @@ def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypat
     code, said = called(["run", "rate_step_boundary", "--workers", "999999"])
     assert code == 2
     assert "--scheduler ADDRESS (client=)" in said
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["{}"],
-        ["run", "{}"],
-        ["run", "rate_step_boundary", "--set", "{}=2"],
-        ["run", "rate_step_boundary", "--set", "law={}"],
-        ["run", "rate_step_boundary", "--workers", "{}"],
-        ["run", "rate_step_boundary", "--scheduler", "{}"],
-        ["run", "rate_step_boundary", "--output", "{}"],
-        ["rerun", "tiny.nc", "--study", "{}"],
-        ["rerun", "{}.nc", "--cell", "a=2"],
-        ["check", "{}", "--output", "{}"],
-    ],
-)
-def test_a_name_without_end_is_answered_briefly(words):
-    code, said = called([word.format("a" * 10_000) for word in words])
-    assert code in (1, 2)
-    assert len(said) < 1200
 
 
 def test_an_error_keeps_both_ends_of_what_is_long():

@@ -3,9 +3,7 @@ starts.
 """
 
 import json
-import re
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ from rsfstudy.compute.plan import Batch, Plan
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
-from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.slider.laws.slip import SlipLaw
@@ -100,48 +97,9 @@ def test_declarations_are_plain_data(values, zipped):
     assert json.loads(text)["axes"][0]["values"] == values
 
 
-# ---- what a measure of one's own may declare ------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Own(Measure):
-    phases: object = 2
-    name: ClassVar[str] = "own"
-    headline: ClassVar[str] = "total"
-    variables: ClassVar = {"total": ()}
-    typical_work: ClassVar[object] = 1
-
-
 def declared(**fields) -> Study:
     common = {"axes": [Axis("b_over_a", [2.0])], "measure": CriticalStep()}
     return Study(**{"name": "trial", "title": "Trial", "base": Scene(), **common, **fields})
-
-
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
-        ({"typical_work": 0}, "typical_work = 0: must be a number greater than 0"),
-        ({"typical_work": float("nan")}, "typical_work = nan"),
-        ({"variables": {}}, "must name a number, in measure own"),
-        ({"variables": {"other": ()}}, "headline = 'total': is not measured"),
-        ({"variables": {"total": ("phase",)}}, "'phase': of 'total' has no coordinate values"),
-        ({"variables": {"total": (), "a/b": ()}}, "'a/b': names something else, or nothing"),
-        ({"variables": {"total": (), "phi": ()}}, "'phi': names something else"),
-        ({"variables": {"total": (), "status": ()}}, "'status': names something else"),
-        ({"variables": {"total": (), "e\u0301tude": ()}}, "names something else, or nothing"),
-        ({"inner_coordinates": {"total": np.arange(2.0)}}, "'total': names something else"),
-    ],
-)
-def test_a_measure_declares_what_a_lattice_can_hold(fields, complaint):
-    kind = type("Odd", (Own,), fields)
-    with pytest.raises(InvalidValue, match=re.escape(complaint)):
-        declared(measure=kind())
-
-
-@pytest.mark.parametrize("value", [np.int64(2), np.ones(2), print])
-def test_a_measure_is_plain_data(value):
-    with pytest.raises(InvalidValue, match="'own': is no plain data .*Python's own numbers"):
-        declared(measure=Own(value))
 
 
 @pytest.mark.parametrize("order", [["constant", "variable"], ["variable", "constant"]])
