@@ -30,16 +30,22 @@ SLIDERS = [
     {"normal_stress": "variable", "stress_dependence": 1.0, "radiation_damping": 1e-9},
     {"normal_stress": "variable", "inertia": True},
 ]
+#: Each law; and those of two states where one strengthens.
+LAWS = [{"law": law} for law in sorted(laws.PARTS)]
+LAWS += [
+    {"law": law, "a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
+    for law in ("two_slip_states", "two_slowness_states")
+]
 #: Without mass or damping, cycles of most laws run away in a rupture.
 ENDS = (Status.OK, Status.SLIP_RATE_UNBOUNDED)
 
 
 @pytest.mark.parametrize("slider", SLIDERS, ids=str)
-@pytest.mark.parametrize("law", sorted(laws.PARTS))
+@pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_every_measure_answers_for_every_law(question, law, slider):
     measure, fields = QUESTIONS[question]
-    scene = Scene(law=law, **slider, **fields)
+    scene = Scene(**law, **slider, **fields)
     # events of several states take their time
     engine = COMPILED if question == "cycle" and scene.states > 1 else SCIPY
     found = measure(scene, Accuracy(1e-4, engine=engine))

@@ -14,7 +14,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from running import SMALL, run
 from scipy.interpolate import PchipInterpolator
-from test_states import TwoSlipStates
 from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
@@ -23,7 +22,6 @@ from rsfstudy.files.restore import study_of
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
@@ -318,19 +316,6 @@ def test_a_hold_drains(law):
     assert left == pytest.approx(-porosity[-1] - pressure[-1], rel=1e-3)
 
 
-def test_a_rigid_slider_has_its_response():
-    scene = dilatant(0.005, 1.0, load_velocity_ratio=10.0)
-    outcome = RigidResponse(points=5)(scene, Accuracy())
-    assert outcome.status is Status.OK
-    assert math.isnan(outcome.values["closed_form_misfit"])
-    assert outcome.values["direct_stress_change"] == pytest.approx(
-        RigidResponse(points=5)(Scene(load_velocity_ratio=10.0), Accuracy()).values[
-            "direct_stress_change"
-        ],
-        rel=1e-12,
-    )
-
-
 def test_a_trajectory_tells_pore_pressure_and_porosity():
     fields = {"stiffness_ratio": 3.0, "load_velocity_ratio": 3.0, **CONSTANT}
     motion = simulate(dilatant(**fields), duration=20.0)
@@ -357,7 +342,8 @@ def test_effective_normal_stress_decides_whether_it_is_lost():
 def test_several_states_and_a_fluid():
     """Two equal states are one, beside the states of a fluid too."""
     fields = {"stiffness": 0.03, "load_velocity_ratio": 2.0}
-    one, two = dilatant(**fields), dilatant(law=TwoSlipStates, **fields)
+    parts = {"b1_over_a": 0.6, "b2_over_a": 1.4, "length_ratio": 1.0}
+    one, two = dilatant(**fields), dilatant(law="two_slip_states", **parts, **fields)
     assert (one.states, two.states) == (3, 4)
     assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-9)
     rates = stability.growth_rates(two, 0.7)

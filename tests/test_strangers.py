@@ -369,9 +369,9 @@ def nowhere(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "path",
     ["/", "//", ".", "..", "", "/dev/null", "/etc/passwd", "dir", "dir.nc", "dir.zarr", "odd.zarr",
-     "file.txt", "file.txt/x.nc", "text.nc", "empty.nc", "foreign.nc", "missing.nc", "dangling.nc", "circle.nc", "circle.py", "root.zarr", "zero.nc",
-     "zero.py", "*", "**/x", "small[1].nc", "a" * 9999, f"{'a' * 9999}.nc", f"{'a' * 9999}.py",
-     "a/" * 5000 + "x.nc", "a b " * 2500],
+     "file.txt", "file.txt/x.nc", "text.nc", "empty.nc", "foreign.nc", "missing.nc", "dangling.nc",
+     "circle.nc", "circle.py", "root.zarr", "zero.nc", "zero.py", "*", "**/x", "small[1].nc",
+     "a" * 9999, f"{'a' * 9999}.nc", f"{'a' * 9999}.py", "a/" * 5000 + "x.nc", "a b " * 2500],
     ids=lambda path: path[:20],
 )  # fmt: skip
 def test_a_path_that_is_no_results_file(command_, path, nowhere):
