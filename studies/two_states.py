@@ -151,22 +151,22 @@ class Bifurcation(Measure):
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_disturbed:
             scene = scene.under(Segment(1.0, NUDGE))
-        came = course(scene, accuracy, meter, self.transient + self.events, to_its_end=True)
-        if came is None:
+        motion = course(scene, accuracy, meter, self.transient + self.events, to_its_end=True)
+        if motion is None:
             return SETTLES
-        values = self._of_events(scene, came.seen[-self.events :])
-        status, why, of_one = _of_one_event(scene, accuracy, came, meter)
+        values = self._of_events(scene, motion.seen[-self.events :])
+        status, why, of_one = _of_one_event(scene, accuracy, motion, meter)
         values |= of_one
-        if came.orbit is None:
-            growth = ReturnMap(scene, accuracy, meter).growth(came.seen, self.events)
+        if motion.orbit is None:
+            growth = ReturnMap(scene, accuracy, meter).growth(motion.seen, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = more_events(max(self.transient, self.events), "transient")
-            ended = without_period(scene, came, remedy)
+            ended = without_period(scene, motion, remedy)
             if status is Status.OK:
                 status, why = ended.status, ended.message
             return Outcome(status, values, why)
-        values["lyapunov_exponent"] = _growth_of_cycle(came.orbit)
-        values |= {"period_events": float(came.orbit.period), "period_events_error": 0.0}
+        values["lyapunov_exponent"] = _growth_of_cycle(motion.orbit)
+        values |= {"period_events": float(motion.orbit.period), "period_events_error": 0.0}
         if status is Status.OK and "one_event_log10_peak" not in values:
             why = "the motion comes close to no cycle of one event"
         return Outcome(status, values, why)
@@ -183,10 +183,10 @@ class Bifurcation(Measure):
 
 
 def _of_one_event(
-    scene: Scene, accuracy: Accuracy, came: Course, meter: Meter
+    scene: Scene, accuracy: Accuracy, motion: Course, meter: Meter
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
     """The cycle of one event, if the motion comes close to one; and whether it is known."""
-    one = ReturnMap(scene, accuracy, meter).of_one_event(came.seen)
+    one = ReturnMap(scene, accuracy, meter).of_one_event(motion.seen)
     if one is None:
         return Status.OK, "", {}
     again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.events[0].swing)

@@ -101,17 +101,17 @@ class Approach:
         """Take the derivatives from the last two cycles, as long as numerical errors allow, and
         what is ahead from the last.
         """
-        now = self.seen[-1]
-        begin, end = section(now.begin), section(now.end)
+        last = self.seen[-1]
+        begin, end = section(last.begin), section(last.end)
         if len(self.seen) > 1:
             before = self.seen[-2]
             apart = begin - section(before.begin)
             if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
                 self._known = True
-                changes = np.append(end, now.numbers())
+                changes = np.append(end, last.numbers())
                 changes -= np.append(section(before.end), before.numbers())
                 # the motion passes a section without a change of spring stress
-                (_none, way), passed = self._by.along(now.begin)
+                (_none, way), passed = self._by.along(last.begin)
                 self._slopes[:, 1] = passed / way
                 self._slopes[:, 0] = (changes - apart[1] * self._slopes[:, 1]) / apart[0]
         off = end - begin

@@ -159,8 +159,8 @@ def _dies_down(swings: list[float]) -> bool:
     """
     if len(swings) <= _SHRINKING or not all(y < x for x, y in pairwise(swings[-_SHRINKING:])):
         return False
-    before, now = swings[-3] - swings[-2], swings[-2] - swings[-1]
-    still_to_come = now * now / (before - now) if before > now else math.inf
+    previous, latest = swings[-3] - swings[-2], swings[-2] - swings[-1]
+    still_to_come = latest * latest / (previous - latest) if previous > latest else math.inf
     return swings[-1] - still_to_come < 0.1 * swings[-1]
 
 

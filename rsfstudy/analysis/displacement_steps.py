@@ -49,8 +49,8 @@ class DisplacementSteps(Steps):
             return False
         behind, rate = falls_behind(scene)
         missed = 0.5 * scene.a * scene.parts.law.size_over_a / scene.stiffness
-        moved = scene.load_velocity / rate if rate else 0.0
-        return behind * (moved + missed) > UNSEEN * rtol * size
+        loaded = scene.load_velocity / rate if rate else 0.0
+        return behind * (loaded + missed) > UNSEEN * rtol * size
 
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13), which

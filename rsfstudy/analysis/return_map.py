@@ -171,9 +171,9 @@ class ReturnMap:
         """True if mass acts beyond what the slow manifold holds of it."""
         if not self.scene.has_mass:
             return False
-        missing = point.spring - point.friction
+        inertial_stress = point.spring - point.friction
         given = limits(self.scene, self.accuracy)
-        return weight_of_mass(point.log_rate, missing, given) >= 1.0
+        return weight_of_mass(point.log_rate, inertial_stress, given) >= 1.0
 
     def events(
         self, start: np.ndarray, count: int, recording: Recording | None = None
@@ -205,14 +205,14 @@ class ReturnMap:
         fewer where the motion does not come that far. States are of the size of the scale.
         """
         found, step = list[np.ndarray](), _STEP * math.sqrt(self.accuracy.refinement) * scale
-        now: np.ndarray | None = start
+        current: np.ndarray | None = start
         for number in range(count):
-            slopes = None if now is None else self._slopes(now, step)
-            if now is None or slopes is None:
+            slopes = None if current is None else self._slopes(current, step)
+            if current is None or slopes is None:
                 break
             found.append(slopes)
-            after = self.image(now) if number < count - 1 else None
-            now = None if after is None else after[: len(now)]
+            after = self.image(current) if number < count - 1 else None
+            current = None if after is None else after[: len(current)]
         return tuple(found)
 
     def growth(self, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
@@ -275,8 +275,8 @@ class ReturnMap:
         """The cycle of one event that a motion comes close to, whether it attracts or not."""
         for near in closest_returns(seen):
             # where periods have doubled, events go back and forth around it
-            between = 0.5 * (section(near.begin) + section(near.end))
-            orbit = self.orbit(between, 1, near.swing, reach=_AWAY)
+            midpoint = 0.5 * (section(near.begin) + section(near.end))
+            orbit = self.orbit(midpoint, 1, near.swing, reach=_AWAY)
             if orbit is not None:
                 return orbit
         return None

@@ -70,10 +70,10 @@ class ShotSteps(Steps):
 
         stride = math.log(1.5)
         smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
-        before = misfit(smaller)
+        previous = misfit(smaller)
         while larger <= math.log(self.largest):
-            now = misfit(larger)
-            if before < 0.0 <= now:
+            current = misfit(larger)
+            if previous < 0.0 <= current:
                 root = _root(misfit, found, smaller, larger)
                 if root is not None:
                     yield from _refined(
@@ -82,7 +82,7 @@ class ShotSteps(Steps):
                         lambda size, tolerance: misfit(math.log(size), tolerance),
                     )
                 return
-            smaller, larger, before = larger, larger + stride, now
+            smaller, larger, previous = larger, larger + stride, current
 
     def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
         """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
@@ -114,23 +114,23 @@ class ShotSteps(Steps):
             return math.log(self.largest) - math.log1p(math.exp(-position))
 
         def position(size: float) -> float:
-            share = min(max(size, self.smallest) / self.largest, 0.5)
-            return math.log(share / (1.0 - share))
+            fraction = min(max(size, self.smallest) / self.largest, 0.5)
+            return math.log(fraction / (1.0 - fraction))
 
         lowest, guess = position(self.smallest), position(self._guess())
 
         def outwards(*ways: int) -> tuple[float, float] | None:
             ends = dict.fromkeys(ways, (guess, misfit(log_size(guess))))
             last = {1: _HIGHEST, -1: lowest}
-            stride, missing = 0.2, 0
-            while missing < _GIVE_UP and any(ends[way][0] != last[way] for way in ways):
+            stride, failures = 0.2, 0
+            while failures < _GIVE_UP and any(ends[way][0] != last[way] for way in ways):
                 for way, (at, value) in ends.items():
                     further = min(max(at + way * stride, lowest), _HIGHEST)
                     beyond = misfit(log_size(further))
                     if further != at and value * beyond <= 0.0:
                         return log_size(min(at, further)), log_size(max(at, further))
                     ends[way] = further, beyond
-                missing = missing + 1 if all(math.isnan(x) for _at, x in ends.values()) else 0
+                failures = failures + 1 if all(math.isnan(x) for _at, x in ends.values()) else 0
                 stride = min(1.5 * stride, _LONGEST_STRIDE)
             return None
 
@@ -192,15 +192,15 @@ def _refined(
     if not math.isfinite(slope) or slope == 0.0:
         return
     for tolerance in tolerances:
-        before: tuple[float, float] | None = None
+        previous: tuple[float, float] | None = None
         for _ in range(_MOST_CORRECTIONS):
             # the error of V_0 itself is that of its logarithm times V_0
             value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
             if value is None or not math.isfinite(value):
                 return
-            if before is not None and value != before[1]:
-                slope = (value - before[1]) / (log_size - before[0])
-            before = log_size, value
+            if previous is not None and value != previous[1]:
+                slope = (value - previous[1]) / (log_size - previous[0])
+            previous = log_size, value
             log_size -= value / slope
             if abs(value) > _FAR * abs(slope):
                 return

@@ -210,8 +210,10 @@ def _grows_to_the_norm(
     leap = _LEAP
     while True:
         spring, *psis = (
-            rest + leap * (now - rest)
-            for rest, now in zip((steady.spring, *steady.psis), (at.spring, *at.psis), strict=True)
+            rest + leap * (current - rest)
+            for rest, current in zip(
+                (steady.spring, *steady.psis), (at.spring, *at.psis), strict=True
+            )
         )
         beyond = on_slow_manifold(scene, spring, tuple(psis))
         orbit = _orbit(scene, steady, beyond, accuracy, meter)
@@ -281,11 +283,11 @@ class _Repeating:
 
     def has(self, peak: Point) -> bool:
         """True if it has at this peak."""
-        now = (peak.spring, *peak.psis)
-        change = max(abs(x - y) for x, y in zip(now, self._before, strict=True))
+        current = (peak.spring, *peak.psis)
+        change = max(abs(x - y) for x, y in zip(current, self._before, strict=True))
         linear = peak.log_rate - self._steady.log_rate < _LINEAR and not self._steady.stable
         self._same = self._same + 1 if change < self._slack and not linear else 0
-        self._before = now
+        self._before = current
         return self._same == _IN_A_ROW
 
 

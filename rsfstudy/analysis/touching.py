@@ -49,13 +49,13 @@ def touching_point(scene: Scene, engine: str = SCIPY) -> tuple[float, float] | N
 
 
 @cache
-def _tangency(made: Friction) -> Function:
+def _tangency(friction: Friction) -> Function:
     """``(x, weakest, p) -> (g, Psi)``: frictional stress above the weakest, and the state, where
     ln(V/V_*) = x is stationary; NaN where it never is.
 
     There, strength'(g) K (V_0/V - 1) equals the evolution of the state per unit slip.
     """
-    strength, evolutions = made.strength, made.evolutions
+    strength, evolutions = friction.strength, friction.evolutions
 
     def acceleration(g: float, at: tuple[float, Numbers]) -> float:
         x, p = at

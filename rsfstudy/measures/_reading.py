@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-import numpy as np
-
-from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.slider.scene import Scene
 
@@ -27,22 +23,6 @@ KEPT = (
     "normal_stress_ratio",
     "log10_slip_rate",
 )
-
-
-@dataclass(frozen=True)
-class Reading(Measure):
-    """Base of them: the record is kept along `phase`, at so many points as the field `phases`
-    says.
-    """
-
-    @property
-    def points(self) -> int:
-        """Number of points of the record that are kept."""
-        return int(self.plain_fields["phases"])
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.points)}
 
 
 def errors_of(

@@ -11,8 +11,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading, errors_of
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures._reading import errors_of
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
@@ -69,7 +69,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Healing(Reading):
+class Healing(Recorded):
     """Relaxation and healing by the first hold of a loading, by the definitions of the laboratory.
 
     With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
@@ -97,10 +97,9 @@ class Healing(Reading):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 < self.record < math.inf:
             raise InvalidValue("record", self.record, "must be positive and finite")
-        if self.phases < 2:
-            raise InvalidValue("phases", self.phases, "must be at least 2")
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Differences of friction, and a, which is what ln V is in it; the displacement, and D_c,
@@ -126,11 +125,11 @@ class Healing(Reading):
         again = _follow(scene, hold, accuracy.refined(), meter, self._end(scene, hold, first.peak))
         if again.peak is None:
             return peakless
-        values, finer = _read(scene, first, first.peak), _read(scene, again, again.peak)
+        values, refined = _read(scene, first, first.peak), _read(scene, again, again.peak)
         # friction peaks where slip rate passes that of the load point, ln V being friction over a
         turning = 1.0 / (scene.a * first.peak.point.growth) if first.peak.point.growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
-        errors = errors_of(values, finer, by_friction, scene, accuracy)
+        errors = errors_of(values, refined, by_friction, scene, accuracy)
         above = again.peak.point.reading - float(friction_of(again.rows)[-1])
         # beside steady sliding friction turns within the tolerance, where two runs may agree
         if above <= max(errors["healing_error"], _TURNS * accuracy.refined().solver):
@@ -147,10 +146,10 @@ class Healing(Reading):
         """The record itself, from the beginning of the hold on."""
         path = along_path(record.rows, self.phases, READ)
         rows = np.column_stack([path[name] for name in READ])
-        moved = load_point_of(scene, rows)
+        displacement = load_point_of(scene, rows)
         return {
             "time": path["time"] - record.begin.time,
-            "load_point_displacement": moved - moved[0],
+            "load_point_displacement": displacement - displacement[0],
             "slip": path["slip"] - path["slip"][0],
             "friction_coefficient": path["friction_coefficient"],
             "log10_slip_rate": path["log10_slip_rate"],

@@ -16,7 +16,6 @@ of one event, the one with the fastest peak, and no mean; the orbit is that of t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -26,9 +25,8 @@ from rsfstudy.analysis.approach import Approach
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events
 from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
-from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, error_between
 from rsfstudy.motion.meter import Halt, Meter
@@ -95,7 +93,7 @@ _OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class LimitCycle(Measure):
+class LimitCycle(Recorded):
     """Limit cycle of stick-slip under a steady load point velocity.
 
     Where a motion of several states repeats itself after `period_events` events only, the numbers
@@ -122,14 +120,6 @@ class LimitCycle(Measure):
     headline = "recurrence_interval"
     typical_work = 9_000
     outputs = _OUTPUTS
-
-    def __post_init__(self) -> None:
-        if self.phases < 2:
-            raise InvalidValue("phases", self.phases, "must be at least 2")
-
-    @property
-    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"phase": np.linspace(0.0, 1.0, self.phases)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events until one repeats, then go round once more with smaller tolerances: for the
@@ -163,12 +153,12 @@ class LimitCycle(Measure):
         """Follow events loosely up to a cycle of any period that attracts, and close it from its
         largest event on.
         """
-        came = course(scene, replace(accuracy, rtol=max(accuracy.rtol, _LOW)), meter, self.events)
-        if came is None:
+        motion = course(scene, replace(accuracy, rtol=max(accuracy.rtol, _LOW)), meter, self.events)
+        if motion is None:
             return settled(scene)
-        if came.orbit is None:
-            return without_period(scene, came, more_events(self.events))
-        return self._closed(scene, accuracy, meter, came.orbit.from_largest, len(came.seen))
+        if motion.orbit is None:
+            return without_period(scene, motion, more_events(self.events))
+        return self._closed(scene, accuracy, meter, motion.orbit.from_largest, len(motion.seen))
 
     def _closed(
         self, scene: Scene, accuracy: Accuracy, meter: Meter, known: Orbit, events: int
@@ -217,19 +207,19 @@ def _mode(scene: Scene, log_peak: float) -> float:
     return _STICK_SLIP if log_peak >= limit else _SLOW
 
 
-def without_period(scene: Scene, came: Course, remedy: str) -> Outcome:
+def without_period(scene: Scene, motion: Course, remedy: str) -> Outcome:
     """The outcome of a motion that has not come to a cycle: because it never will, or because it
     takes its time, and what to do then.
     """
-    latest = came.seen[len(came.seen) // 2 :]
+    latest = motion.seen[len(motion.seen) // 2 :]
     peaks = [cycle.fastest / LN10 for cycle in latest]
     intervals = [cycle.interval for cycle in latest]
     text = (
-        f"the last {len(latest)} of {len(came.seen)} events peak at 10^{min(peaks):.4g} to "
+        f"the last {len(latest)} of {len(motion.seen)} events peak at 10^{min(peaks):.4g} to "
         f"10^{max(peaks):.4g} V_* and come after {min(intervals):.5g} to {max(intervals):.5g} "
         "D_c/V_*"
     )
-    if came.open:
+    if motion.open:
         why = f"no cycle repeats yet: {text}; {remedy}"
         return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
@@ -264,8 +254,8 @@ def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
     derivatives that both share, because the events do not quite close.
     """
     chance, scales = _BY_CHANCE * accuracy.rtol, _scales(one)
-    between = map(error_between, one.numbers, again.numbers, [chance] * len(scales), scales)
-    return np.asarray(np.abs(one.implied) + np.array(list(between)))
+    errors = map(error_between, one.numbers, again.numbers, [chance] * len(scales), scales)
+    return np.asarray(np.abs(one.implied) + np.array(list(errors)))
 
 
 def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import KEPT, Reading, errors_of
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures._reading import KEPT, errors_of
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
@@ -170,7 +170,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NormalStressResponse(Reading):
+class NormalStressResponse(Recorded):
     """Response of spring stress to an oscillation of imposed normal stress, once transients have
     decayed: Fourier's projection over one period.
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import KEPT, Reading, errors_of
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures._reading import KEPT, errors_of
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import ROUNDING, Accuracy
 from rsfstudy.motion.course import follow
@@ -96,7 +96,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NormalStressTransient(Reading):
+class NormalStressTransient(Recorded):
     """Response of friction to a step of imposed normal stress by a ratio r, while the load point
     moves on at V_*.
 
@@ -130,14 +130,13 @@ class NormalStressTransient(Reading):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 < self.fit_from < self.fit_to:
             rule = "must be greater than 0 and less than fit_to"
             raise InvalidValue("fit_from", self.fit_from, rule)
         if not self.fit_to + 1.0 <= self.record < math.inf:
             rule = "must exceed fit_to by 1 D_c at least, and be finite"
             raise InvalidValue("record", self.record, rule)
-        if self.phases < 2:
-            raise InvalidValue("phases", self.phases, "must be at least 2")
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The numbers themselves, of a transient that errs by what a is beside its size where it is
@@ -165,12 +164,14 @@ class NormalStressTransient(Reading):
             why = f"slip does not come to {max(self.fit_to, 1.0):g} D_c, where friction is read"
             return Outcome(Status.NOT_APPLICABLE, message=f"{why}, within record = {self.record:g}")
         shown = self._shown(scene, record)
-        values, finer = self._read(scene, record), self._read(scene, again)
-        if not values or not finer:
+        values, refined = self._read(scene, record), self._read(scene, again)
+        if not values or not refined:
             span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
             why = f"from {span} friction does not decay, or is still that of loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
-        errors = errors_of(values, finer, self._by_friction(scene, record, values), scene, accuracy)
+        errors = errors_of(
+            values, refined, self._by_friction(scene, record, values), scene, accuracy
+        )
         direct = _direct(scene, record)
         if abs(direct) <= _NONE * scene.mu_star:
             why = "friction does not change at once, so that no part of that can be left"
@@ -213,20 +214,20 @@ class NormalStressTransient(Reading):
         """Friction at the slips where it is read: followed until then, and not between the steps of
         an integrator; rows tell nearly when that is, and slip rate the rest.
         """
-        found, passed, moved = dict[float, float](), 0.0, 0.0
+        found, elapsed, slipped = dict[float, float](), 0.0, 0.0
         stepped, start = scene.acting(0), None
         stress = 1.0 + scene.parts.loading.segments[0].normal_stress
         for slip in sorted({self.fit_from, 1.0, self.fit_to}):
-            wait = float(np.interp(slip, rows[:, OBSERVED.index("slip")], rows[:, 0])) - passed
+            wait = float(np.interp(slip, rows[:, OBSERVED.index("slip")], rows[:, 0])) - elapsed
             for _ in range(_HOPS):
-                if 0.0 < wait <= self.record - passed:
+                if 0.0 < wait <= self.record - elapsed:
                     *_earlier, end = follow(stepped, accuracy, meter, start=start, until=wait)
-                    passed, moved, start = passed + end.time, moved + end.slip, end.point
+                    elapsed, slipped, start = elapsed + end.time, slipped + end.slip, end.point
                 log_rate = max(end.point.log_rate, _SLOWEST)
-                wait = (slip - moved) / math.exp(log_rate)
+                wait = (slip - slipped) / math.exp(log_rate)
             # spring stress rises by K (V_0/V - 1) per unit slip
             pulled = scene.stiffness * math.expm1(-log_rate) / stress
-            found[slip] = end.point.reading + pulled * (slip - moved)
+            found[slip] = end.point.reading + pulled * (slip - slipped)
         return found
 
     def _read(self, scene: Scene, record: _Record) -> dict[str, float]:

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures import Outcome
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
@@ -43,7 +43,7 @@ _OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class StepResponse(Measure):
+class StepResponse(Recorded):
     """Oscillations of slip rate that the step of a scene sets off: peaks of log10(V/V_*), and the
     path between them.
 
@@ -68,17 +68,13 @@ class StepResponse(Measure):
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.peaks < 2:
             raise InvalidValue("peaks", self.peaks, "must be at least 2")
-        if self.phases < 2:
-            raise InvalidValue("phases", self.phases, "must be at least 2")
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {
-            "peak": np.arange(1, self.peaks + 1),
-            "phase": np.linspace(0.0, 1.0, self.phases),
-        }
+        return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The logarithm, and an e-fold of slip rate: that of V_* is zero."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import Reading, errors_of
-from rsfstudy.measures._recorded import recorded
+from rsfstudy.measures._reading import errors_of
+from rsfstudy.measures._recorded import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -82,8 +82,8 @@ class _Step(NamedTuple):
 
     before: float
     after: float
-    begins: float
-    lasts: float
+    start_time: float
+    duration: float
 
     @property
     def ratio(self) -> float:
@@ -103,7 +103,7 @@ class _Record(NamedTuple):
 
 
 @dataclass(frozen=True)
-class VelocityStep(Reading):
+class VelocityStep(Recorded):
     """Response to one step of load point velocity, by the definitions of the laboratory.
 
     With mu_0 before the step by a factor r, mu_p at the first extremum after it (a peak of a step
@@ -142,12 +142,11 @@ class VelocityStep(Reading):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.step_number < 1:
             raise InvalidValue("step_number", self.step_number, "must be at least 1")
         if not 1.0 <= self.record < math.inf:
             raise InvalidValue("record", self.record, "must be at least 1 D_c, and finite")
-        if self.phases < 2:
-            raise InvalidValue("phases", self.phases, "must be at least 2")
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Frictions themselves, and a for their differences, here over ln r; slip distances end
@@ -173,8 +172,8 @@ class VelocityStep(Reading):
             return step
         record = self._follow(scene, step, accuracy, meter)
         values = self._read(scene, step, record, accuracy, meter)
-        finer = accuracy.refined()
-        again = self._read(scene, step, self._follow(scene, step, finer, meter), finer, meter)
+        tighter = accuracy.refined()
+        again = self._read(scene, step, self._follow(scene, step, tighter, meter), tighter, meter)
         errors = errors_of(values, again, _by_friction(step, values), scene, accuracy)
         found = {**values, **errors, **self._shown(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
@@ -197,16 +196,21 @@ class VelocityStep(Reading):
         if not own.load_velocity or not before or changed:
             text = "a hold, a displacement or a change of normal stress is no step of velocity"
             return Outcome(Status.NOT_APPLICABLE, message=text)
-        begins = math.fsum(segment.duration for segment in earlier)
-        lasts = min(own.duration, self.record / own.load_velocity)
-        return _Step(before, own.load_velocity, begins, lasts)
+        start_time = math.fsum(segment.duration for segment in earlier)
+        duration = min(own.duration, self.record / own.load_velocity)
+        return _Step(before, own.load_velocity, start_time, duration)
 
     def _follow(self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter) -> _Record:
         turn, recording = _turn(scene, step), Recording()
         begun: list[Event] = []
         peak = None
         moving = follow(
-            scene, accuracy, meter, [turn], recording=recording, until=step.begins + step.lasts
+            scene,
+            accuracy,
+            meter,
+            [turn],
+            recording=recording,
+            until=step.start_time + step.duration,
         )
         for event in moving:
             if event.kind in (Kind.START, Kind.SEGMENT):
@@ -260,7 +264,7 @@ class VelocityStep(Reading):
         record itself.
         """
         rows, friction = record.rows, friction_of(record.rows)
-        late = record.end.time - _LAST * step.lasts
+        late = record.end.time - _LAST * step.duration
         # there may be few samples, in long steps
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.end
