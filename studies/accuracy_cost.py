@@ -5,7 +5,7 @@ import statistics
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
@@ -15,8 +15,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level, reference_line
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._problem import ERRORS, Problem, posed_by
+from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
@@ -32,6 +31,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 from . import _references as known
+from ._problem import ERRORS, Posing, Problem
 
 Fields = dict[str, str | float | bool]
 
@@ -142,7 +142,7 @@ _OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class WorkPrecision(Measure):
+class WorkPrecision(Posing):
     """Solves a problem with known answer by one integrator at one accuracy.
 
     Its processor time is also given relative to that of the default integrator for 3 digits, which
@@ -150,8 +150,6 @@ class WorkPrecision(Measure):
 
     Parameters
     ----------
-    problems : tuple of Problem
-        One for each scene of the lattice.
     integrator : str
         One of SciPy's names; two of them, between ruptures and where mass acts (for scenes with
         mass); or "DOP853 (compiled)", the compiled engine.
@@ -163,7 +161,6 @@ class WorkPrecision(Measure):
         Right-hand sides a run may evaluate.
     """
 
-    problems: tuple[Problem, ...] = ()
     integrator: str = "DOP853"
     requested_digits: float = 6.0
     repeats: int = 5
@@ -203,14 +200,9 @@ class WorkPrecision(Measure):
         """One for all that the study asks for: a run has an accuracy of its own."""
         return {3.0: 1.0, 10.0: 1.0}
 
-    def describe(self) -> dict[str, Any]:
-        """The measure as plain data."""
-        problems = [problem.describe() for problem in self.problems]
-        return {"name": self.name, "problems": problems, **self.plain_fields}
-
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Run once for the numbers, and as often as it takes for the times."""
-        problem = posed_by(scene, self.problems)
+        problem = self.posed_by(scene)
         if self.integrator in _WITH_MASS and not scene.inertia:
             return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} needs mass")
         if self._asked.engine == COMPILED:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,6 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._problem import ERRORS, Problem, posed_by
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
@@ -26,6 +25,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 from . import _references as known
+from ._problem import ERRORS, Posing, Problem
 
 #: What its numbers are.
 _OUTPUTS = (
@@ -36,32 +36,22 @@ _OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class HardCase(Measure):
+class HardCase(Posing):
     """Solves the problem a scene poses and holds the outcome against the known answer.
 
     ``ok`` where it ends as it must and, if the answer is a number, the error is within the
     outcome's own estimate; ``unverified`` otherwise.
-
-    Parameters
-    ----------
-    problems : tuple of Problem
-        One for each scene of the lattice.
     """
 
-    problems: tuple[Problem, ...] = ()
     name: ClassVar[str] = "hard_case"
     headline = "measured_error"
     typical_work = 15_000
     outputs = _OUTPUTS
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def describe(self) -> dict[str, Any]:
-        """The measure as plain data."""
-        return {"name": self.name, "problems": [problem.describe() for problem in self.problems]}
-
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Measure, and compare."""
-        problem = posed_by(scene, self.problems)
+        problem = self.posed_by(scene)
         outcome, spent = problem.measure.metered(scene, accuracy)
         meter.by_regime, meter.spent = spent.by_regime, spent.spent
         numbers = {"ended_as": float(outcome.status)}

@@ -11,6 +11,7 @@ import xarray as xr
 from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
 from rsfstudy.named_studies import accuracy_cost
+from rsfstudy.named_studies._problem import Problem
 from rsfstudy.named_studies.accuracy_cost import Cheapest, WorkPrecision
 
 import rsfstudy
@@ -18,7 +19,6 @@ from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._problem import Problem
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypedDict
+from typing import Any
 
 import msgspec
 import xarray as xr
@@ -28,19 +28,14 @@ from rsfstudy.files.contents import (
     PlainAxis,
     PlainMeasure,
     PlainReduction,
-    PlainScene,
-    fit,
     refused,
     restored,
-    scene,
 )
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
-from rsfstudy.measures._problem import Problem
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.registry import SLOTS, Own, by_class
-from rsfstudy.status import Status
 
 
 def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
@@ -175,37 +170,8 @@ def measure(described: PlainMeasure, path: str) -> Measure:
     kinds = _kinds(Measure, measures, name)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
-    given = {}
-    if "problems" in values:
-        plain = fit(values.pop("problems"), Sequence[dict[str, Any]], f"{path}.problems")
-        given["problems"] = [_problem(p, f"{path}.problems[{n}]") for n, p in enumerate(plain)]
+    given = kinds[name].restored_fields(values, path)
     made: Measure = restored(values, kinds[name], path, **given)
-    return made
-
-
-class _PlainProblem(TypedDict):
-    """A problem; what else it holds is numbers and texts."""
-
-    scene: PlainScene
-    measure: PlainMeasure
-    status: str
-    scale: float | None
-
-
-def _problem(described: dict[str, Any], path: str) -> Problem:
-    plain: _PlainProblem = fit(described, _PlainProblem, path)
-    statuses = {status.label: status for status in Status}
-    if plain["status"] not in statuses:
-        raise refused(f"{path}.status", "is unknown")
-    made: Problem = restored(
-        {name: value for name, value in described.items() if name not in plain},
-        Problem,
-        path,
-        scene=scene(plain["scene"], path=f"{path}.scene"),
-        measure=measure(described["measure"], f"{path}.measure"),
-        status=statuses[plain["status"]],
-        scale=plain["scale"] or 0.0,
-    )
     return made
 
 

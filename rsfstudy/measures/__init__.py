@@ -320,6 +320,11 @@ class Measure:
         """The measure as plain data."""
         return {"name": self.name, **asdict(self)}
 
+    @classmethod
+    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """Fields that are no plain data, taken out of a description that stands at `path`."""
+        return {}
+
 
 def _number(
     declared: Mapping[str, tuple[str, ...]], inner: Mapping[str, np.ndarray], name: str, value: Any

@@ -1,0 +1,159 @@
+"""A problem whose answer is known: a scene, a measure, a number and where that comes from; and
+measures that solve such problems.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.quantity import Output
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: What is told of a problem that has been solved.
+ERRORS = (
+    Output("measured_error", "", "1", "error against an independent reference", error=True),
+    Output("error_estimate", "", "1", "the run's own estimate of its error"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A scene with a known answer.
+
+    Parameters
+    ----------
+    scene : Scene
+    measure : Measure
+        What is asked of it.
+    quantity : str
+        The number of the measure that is known.
+    answer : float, optional
+        Its value; None where the answer is a status.
+    status : Status
+        How the measure must end.
+    scale : float
+        What errors are relative to; by default the answer.
+    uncertainty : float
+        Error of the answer itself, over `scale`.
+    source : str
+        Where the answer comes from.
+    """
+
+    scene: Scene
+    measure: Measure
+    quantity: str
+    answer: float | None = None
+    status: Status = Status.OK
+    scale: float = 0.0
+    uncertainty: float = 0.0
+    source: str
+
+    def error_of(self, outcome: Outcome) -> float:
+        """Error of an outcome, over the scale."""
+        assert self.answer is not None
+        return abs(self._number(outcome) - self.answer) / self._scale
+
+    def estimate_of(self, outcome: Outcome) -> float:
+        """The outcome's own estimate of its error, over the scale."""
+        return float(outcome.values[f"{self.quantity}_error"]) / self._scale
+
+    def _number(self, outcome: Outcome) -> float:
+        return float(outcome.values[self.quantity])
+
+    @property
+    def _scale(self) -> float:
+        assert self.answer is not None
+        return self.scale or abs(self.answer)
+
+    def describe(self) -> dict[str, Any]:
+        """The problem as plain data."""
+        return {
+            "scene": self.scene.describe(),
+            "measure": self.measure.describe(),
+            "quantity": self.quantity,
+            "answer": self.answer,
+            "status": self.status.label,
+            "scale": self._scale if self.answer is not None else None,
+            "uncertainty": self.uncertainty,
+            "source": self.source,
+        }
+
+
+@dataclass(frozen=True)
+class Posing(Measure):
+    """Base of measures that solve the problem which a scene poses.
+
+    Parameters
+    ----------
+    problems : tuple of Problem
+        One for each scene of the lattice.
+    """
+
+    problems: tuple[Problem, ...] = ()
+
+    def describe(self) -> dict[str, Any]:
+        """The measure as plain data."""
+        problems = [problem.describe() for problem in self.problems]
+        return {"name": self.name, "problems": problems, **self.plain_fields}
+
+    @classmethod
+    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """The problems, taken out of a description."""
+        from rsfstudy.files import contents  # which workers do not load
+
+        if "problems" not in described:
+            return {}
+        listed = described.pop("problems")
+        plain = contents.fit(listed, Sequence[dict[str, Any]], f"{path}.problems")
+        made = [_restored(each, f"{path}.problems[{n}]") for n, each in enumerate(plain)]
+        return {"problems": tuple(made)}
+
+    def posed_by(self, scene: Scene) -> Problem:
+        """The problem of this scene.
+
+        Raises
+        ------
+        InvalidValue
+            Where none has it: an axis or a fixed value was changed.
+        """
+        for problem in self.problems:
+            if problem.scene == scene:
+                return problem
+        raise InvalidValue(
+            "scene",
+            scene.as_dict(),
+            "has no known answer",
+            remedy="Choose among the points of the axis; other values have no reference.",
+        )
+
+
+def _restored(described: dict[str, Any], path: str) -> Problem:
+    """The problem with this description, which stands at `path` in a file."""
+    from rsfstudy.files import contents, restore
+
+    statuses = {status.label: status for status in Status}
+    kinds = {
+        "scene": contents.PlainScene,
+        "measure": contents.PlainMeasure,
+        "status": str,
+        "scale": float | None,
+    }
+    for name, kind in kinds.items():
+        if name not in described:
+            raise contents.refused(f"{path}.{name}", "is missing")
+        contents.fit(described[name], kind, f"{path}.{name}")
+    if described["status"] not in statuses:
+        raise contents.refused(f"{path}.status", "is unknown")
+    made: Problem = contents.restored(
+        {name: value for name, value in described.items() if name not in kinds},
+        Problem,
+        path,
+        scene=contents.scene(described["scene"], path=f"{path}.scene"),
+        measure=restore.measure(described["measure"], f"{path}.measure"),
+        status=statuses[described["status"]],
+        scale=described["scale"] or 0.0,
+    )
+    return made
