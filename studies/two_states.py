@@ -12,7 +12,7 @@ import xarray as xr
 
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events
 from rsfstudy.analysis.periods import Course, course
-from rsfstudy.analysis.return_map import Orbit, ReturnMap
+from rsfstudy.analysis.return_map import STEP, Orbit, ReturnMap, section
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level
@@ -39,6 +39,11 @@ from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _BY_CHANCE = 0.02
+#: Events along which a departure turns to where it grows, before growth counts: other directions
+#: lag behind by a factor of ten an event and more.
+_TURNING = 16
+#: How many guesses there are at a cycle of one event, and how far off the first may be.
+_GUESSES, _AWAY = 3, 0.3
 
 _OUTPUTS = (
     replace(PERIOD, error=True),
@@ -158,7 +163,7 @@ class Bifurcation(Measure):
         status, why, of_one = _of_one_event(scene, accuracy, motion, meter)
         values |= of_one
         if motion.orbit is None:
-            growth = ReturnMap(scene, accuracy, meter).growth(motion.seen, self.events)
+            growth = _growth(ReturnMap(scene, accuracy, meter), motion.seen, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = more_events(max(self.transient, self.events), "transient")
             ended = without_period(scene, motion, remedy)
@@ -186,7 +191,7 @@ def _of_one_event(
     scene: Scene, accuracy: Accuracy, motion: Course, meter: Meter
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
     """The cycle of one event, if the motion comes close to one; and whether it is known."""
-    one = ReturnMap(scene, accuracy, meter).of_one_event(motion.seen)
+    one = _cycle_of_one_event(ReturnMap(scene, accuracy, meter), motion.seen)
     if one is None:
         return Status.OK, "", {}
     again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.events[0].swing)
@@ -204,6 +209,53 @@ def _of_one_event(
         "one_event_log10_peak_error": float(errors[PEAK]),
     }
     return *judged(accuracy, one, errors, slice(PEAK, PEAK + 1)), values
+
+
+def _growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
+    """By how much small departures grow along the last so many events, as a logarithm: mean and
+    its standard error, over as many blocks of events as each has; NaN where they lead away from
+    the motion.
+
+    Which way a departure grows it learns along the events before, or the first half where there
+    are few.
+    """
+    seen = seen[-(kept + _TURNING) :]
+    step = STEP * by.scene.a * max(cycle.swing for cycle in seen)
+    departure, grown = np.ones(len(section(seen[0].begin))), []
+    for cycle in seen:
+        start, offset = section(cycle.begin), step * departure / np.linalg.norm(departure)
+        ahead, behind = by.image(start + offset), by.image(start - offset)
+        if ahead is None or behind is None:
+            return math.nan, math.nan
+        departure = (ahead - behind)[: len(start)] / (2.0 * step)
+        grown.append(math.log(np.linalg.norm(departure)))
+    grown = grown[min(_TURNING, len(grown) // 2) :]
+    blocks = np.array_split(grown, max(2, math.isqrt(len(grown))))
+    means = [block.mean() for block in blocks]
+    return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
+
+
+def _cycle_of_one_event(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
+    """The cycle of one event that a motion comes close to, whether it attracts or not."""
+    for near in _closest_returns(seen):
+        # where periods have doubled, events go back and forth around it
+        midpoint = 0.5 * (section(near.begin) + section(near.end))
+        orbit = by.orbit(midpoint, 1, near.swing, reach=_AWAY)
+        if orbit is not None:
+            return orbit
+    return None
+
+
+def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
+    """The events of the later half that came closest to the one before, over how far ln V swings;
+    the closest first.
+    """
+
+    def off(cycle: Cycle) -> float:
+        apart = np.subtract(cycle.end.psis, cycle.begin.psis)
+        return float(np.abs(apart).max()) / cycle.swing
+
+    return sorted(seen[len(seen) // 2 :], key=off)[:_GUESSES]
 
 
 def _growth_of_cycle(orbit: Orbit) -> float:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies.two_states import Bifurcation
+from rsfstudy.named_studies.two_states import Bifurcation, _growth
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
@@ -238,7 +238,7 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, to_its_end=True).seen
     by = ReturnMap(scene, quick(1e-7), Meter(2_000_000, engine=COMPILED))
-    monkeypatch.setattr(return_map, "_STEP", 3e-5)
+    monkeypatch.setattr(return_map, "STEP", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
         begin = section(cycle.begin)
@@ -254,11 +254,11 @@ def test_the_growth_of_departures_has_a_standard_error():
     scene, kept, windows = slow(0.853), 32, 12
     seen = came_to(scene, 32 + windows * kept, 1e-5, to_its_end=True).seen
     by = ReturnMap(scene, quick(1e-5), Meter(10_000_000, engine=COMPILED))
-    told = [by.growth(seen[: 32 + (1 + n) * kept], kept) for n in range(windows)]
+    told = [_growth(by, seen[: 32 + (1 + n) * kept], kept) for n in range(windows)]
     means, errors = np.array(told).T
     scatter = np.std(means, ddof=1)
     # a mean of variances of five blocks, of twelve windows: known to a factor of two
     assert 0.5 * scatter < math.sqrt(np.mean(errors**2)) < 5.0 * scatter
-    away = np.abs(means - by.growth(seen, windows * kept)[0])
+    away = np.abs(means - _growth(by, seen, windows * kept)[0])
     assert np.median(away / errors) < 1.5
     assert "lyapunov_exponent_stderr" not in Bifurcation(8, 8)(slow(0.95), quick(1e-5)).values

@@ -33,18 +33,13 @@ from rsfstudy.status import Status
 
 #: Step of the differences that give the derivative of the map, over how far ln V swings: its slopes
 #: bend over a hundredth of a swing.
-_STEP = 1e-4
+STEP = 1e-4
 _WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
-#: Events along which a departure turns to where it grows, before growth counts: other directions
-#: lag behind by a factor of ten an event and more.
-_TURNING = 16
 #: How far off a cycle is looked for, over how far ln V swings, and most steps to it.
 _NEAR, _TRIES = 0.1, 12
 #: How nearly its events must close a cycle, in the accuracy asked for: what they do not is
 #: corrected to first order.
 _CLOSED = 0.3
-#: How many guesses there are at a cycle of one event, and how far off the first may be.
-_GUESSES, _AWAY = 3, 0.3
 
 
 @dataclass(frozen=True)
@@ -204,7 +199,7 @@ class ReturnMap:
         """Derivatives of so many events, one after the other, none of which takes a small step far;
         fewer where the motion does not come that far. States are of the size of the scale.
         """
-        found, step = list[np.ndarray](), _STEP * math.sqrt(self.accuracy.refinement) * scale
+        found, step = list[np.ndarray](), STEP * math.sqrt(self.accuracy.refinement) * scale
         current: np.ndarray | None = start
         for number in range(count):
             slopes = None if current is None else self._slopes(current, step)
@@ -214,29 +209,6 @@ class ReturnMap:
             after = self.image(current) if number < count - 1 else None
             current = None if after is None else after[: len(current)]
         return tuple(found)
-
-    def growth(self, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
-        """By how much small departures grow along the last so many events, as a logarithm: mean and
-        its standard error, over as many blocks of events as each has; NaN where they lead away from
-        the motion.
-
-        Which way a departure grows it learns along the events before, or the first half where there
-        are few.
-        """
-        seen = seen[-(kept + _TURNING) :]
-        step = _STEP * self.scene.a * max(cycle.swing for cycle in seen)
-        departure, grown = np.ones(len(section(seen[0].begin))), []
-        for cycle in seen:
-            start, by = section(cycle.begin), step * departure / np.linalg.norm(departure)
-            ahead, behind = self.image(start + by), self.image(start - by)
-            if ahead is None or behind is None:
-                return math.nan, math.nan
-            departure = (ahead - behind)[: len(start)] / (2.0 * step)
-            grown.append(math.log(np.linalg.norm(departure)))
-        grown = grown[min(_TURNING, len(grown) // 2) :]
-        blocks = np.array_split(grown, max(2, math.isqrt(len(grown))))
-        means = [block.mean() for block in blocks]
-        return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
 
     def along(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
         """The direction in which the motion passes a section, and what going that way changes of
@@ -270,16 +242,6 @@ class ReturnMap:
                 slope += weight * (ahead - behind) / step
             columns.append(slope)
         return np.asarray(np.column_stack(columns) @ directions.T)
-
-    def of_one_event(self, seen: Sequence[Cycle]) -> Orbit | None:
-        """The cycle of one event that a motion comes close to, whether it attracts or not."""
-        for near in closest_returns(seen):
-            # where periods have doubled, events go back and forth around it
-            midpoint = 0.5 * (section(near.begin) + section(near.end))
-            orbit = self.orbit(midpoint, 1, near.swing, reach=_AWAY)
-            if orbit is not None:
-                return orbit
-        return None
 
     def orbit(
         self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
@@ -343,15 +305,3 @@ def _events_until_repeat(events: Sequence[Cycle], scale: float) -> int:
         if len(events) % count == 0 and apart < 1e-4 * scale:
             return count
     return len(events)
-
-
-def closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
-    """The events of the later half that came closest to the one before, over how far ln V swings;
-    the closest first.
-    """
-
-    def off(cycle: Cycle) -> float:
-        apart = np.subtract(cycle.end.psis, cycle.begin.psis)
-        return float(np.abs(apart).max()) / cycle.swing
-
-    return sorted(seen[len(seen) // 2 :], key=off)[:_GUESSES]
