@@ -1,12 +1,13 @@
-"""One labelled dimension of a lattice: a plain list of values, or labelled points of several
-fields.
+"""One dimension of a lattice: a plain list of values, or points of several fields, that are
+labelled or numbered.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,42 +22,50 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True, init=False)
 class Axis:
-    """One labelled dimension of a lattice.
+    """One dimension of a lattice.
 
     Parameters
     ----------
     dimension : str
         Name of the dimension; for a plain axis the field it varies, of the scene or of the measure
         (of the scene where both have one of that name).
-    values : sequence, or mapping of str to mapping
+    values : sequence, mapping of str to mapping, or mapping of str to sequence
         The values of that field, where a class stands for a part of the user's own; or, for a
         zipped axis, a label for each point and the fields set there, as in
-        ``{"constant": {"normal_stress": "constant"}, ...}``, or the rig there.
+        ``{"constant": {"normal_stress": "constant"}, ...}``, or the rig there; or, for points that
+        are numbered from 0, the values of each field: see `samples` and `cases`.
     units : mapping of str to str, optional
         Units of the fields that are in units, in a study of a rig: see `Laboratory.axis`.
+    drawn : mapping, optional
+        How the points were drawn, as plain data.
 
     Raises
     ------
     InvalidValue
-        For an axis that is empty, repeats a value or holds a non-finite one.
+        For an axis that is empty, repeats a value or holds a non-finite one. Numbered points may be
+        alike: draws are.
     """
 
     dimension: str
     rows: tuple[Row, ...]
     labels: tuple[str, ...] | None
     units: Mapping[str, str]
+    drawn: Mapping[str, Any]
 
     def __init__(
         self,
         dimension: str,
         values: Sequence[Any] | np.ndarray | Mapping[str, Any],
         units: Mapping[str, str] | None = None,
+        drawn: Mapping[str, Any] | None = None,
     ) -> None:
         if not is_name(dimension):
             rule = "must be named by a Python identifier, its accents composed (NFC)"
             raise InvalidValue("axis", dimension, rule)
         labels: tuple[str, ...] | None = None
-        if isinstance(values, Mapping):
+        if isinstance(values, Mapping) and values and all(map(is_list, values.values())):
+            rows = _numbered(dimension, values)
+        elif isinstance(values, Mapping):
             labels, rows = tuple(values), _rows(dimension, values)
         else:
             listed = [values] if isinstance(values, str) else values
@@ -69,7 +78,85 @@ class Axis:
         object.__setattr__(self, "rows", rows)
         object.__setattr__(self, "labels", labels)
         object.__setattr__(self, "units", {} if units is None else units)
+        object.__setattr__(self, "drawn", {} if drawn is None else drawn)
         self._check()
+
+    @classmethod
+    def samples(
+        cls,
+        distribution: Mapping[str, Any],
+        n: int,
+        seed: int = 0,
+        *,
+        method: str = "sobol",
+        covariance: Any = None,
+        fields: Mapping[str, str | Callable[[Mapping[str, np.ndarray]], Any]] | None = None,
+        units: Mapping[str, str] | None = None,
+        dimension: str = "sample",
+    ) -> Axis:
+        """Samples of several fields at once, as one dimension.
+
+        Parameters
+        ----------
+        distribution : mapping of str to distribution
+            What is drawn, of `scipy.stats`, as in ``{"ln_a": norm(math.log(0.01), 0.1)}``; or an
+            estimate, of which `covariance` has the variance.
+        n : int
+            How many; a power of two where the method needs one. With one seed, the first n of 2 n
+            samples are those of before (not of a Latin hypercube): a run that goes on computes the
+            others alone.
+        seed : int
+        method : {"sobol", "latin_hypercube", "random", "saltelli"}
+            Scrambled Sobol points, a Latin hypercube, or independent samples. By "saltelli" n Sobol
+            points of twice the dimensions make ``n (d + 2)`` samples of d quantities, from which
+            the reduction `SobolIndices` tells what matters.
+        covariance : array_like, optional
+            Of what is drawn, in its order. Estimates are normal with these variances; of
+            distributions, which have variances of their own, it correlates the normal scores.
+        fields : mapping of str to str or function, optional
+            The fields that are set, each by the name of what is drawn, or a function of all that is
+            drawn: ``{"a": lambda d: np.exp(d["ln_a"])}``. By default all that is drawn.
+        units : mapping of str to str, optional
+            Units of fields, in a study of a rig; SI units by default.
+        dimension : str
+
+        Raises
+        ------
+        InvalidValue
+            For an impossible number, correlation or distribution; and where Sobol indices are asked
+            for of quantities that depend on each other.
+        """
+        from rsfstudy.declare import samples  # loads scipy.stats
+
+        drawn, how = samples.draw(distribution, n, seed, method, covariance)
+        return cls(dimension, samples.set_by(drawn, fields), units, how)
+
+    @classmethod
+    def cases(
+        cls,
+        table: Any,
+        *,
+        fields: Mapping[str, str | Callable[[Mapping[str, np.ndarray]], Any]] | None = None,
+        units: Mapping[str, str] | None = None,
+        dimension: str = "case",
+    ) -> Axis:
+        """The rows of a table, as one dimension.
+
+        Parameters
+        ----------
+        table : mapping of str to sequence, DataFrame or Dataset
+            Columns by their names, or what `rsfstudy.read_table` read. Units that it states count:
+            those of a CSV file, of the attribute ``units`` of a variable, or of that of a
+            DataFrame, which maps columns to them.
+        fields, units, dimension
+            As in `samples`.
+        """
+        from rsfstudy.declare import samples
+
+        columns, stated = samples.columns_of(table)
+        made = samples.set_by(columns, fields)
+        kept = {n: text for n, text in stated.items() if made.get(n) is columns[n]}
+        return cls(dimension, made, kept | dict(units or {}))
 
     def _check(self) -> None:
         if not self.rows:
@@ -86,7 +173,10 @@ class Axis:
                 if isinstance(value, str):
                     check_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
-                    raise InvalidValue(self.dimension, value, "must be finite")
+                    name = name if self.is_numbered else self.dimension
+                    raise InvalidValue(name, value, "must be finite")
+        if self.is_numbered:
+            return  # of equal ones one is computed
         seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
             point = frozenset(row.items())
@@ -95,10 +185,34 @@ class Axis:
                 raise InvalidValue(self.dimension, value, "stands twice on its axis")
             seen.add(point)
 
-    @property
+    @cached_property
     def fields(self) -> tuple[str, ...]:
         """Fields of the scene or of the measure that vary along the axis."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row))
+
+    @property
+    def is_numbered(self) -> bool:
+        """True if its points are numbered: samples, or cases."""
+        return self.labels is None and self.dimension not in self.rows[0]
+
+    @property
+    def is_plain(self) -> bool:
+        """True if its points are values of the field that it is named by."""
+        return self.labels is None and not self.is_numbered
+
+    def with_rows(
+        self,
+        rows: Sequence[Row],
+        units: Mapping[str, str],
+        drawn: Mapping[str, Any] | None = None,
+    ) -> Axis:
+        """An axis of this kind with other fields set at its points."""
+        values: Any = [row.get(self.dimension) for row in rows]
+        if self.labels is not None:
+            values = dict(zip(self.labels, rows, strict=True))
+        elif self.is_numbered:
+            values = columns(rows)
+        return Axis(self.dimension, values, units, drawn)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -108,12 +222,17 @@ class Axis:
         values: Any = [row.get(self.dimension) for row in self.rows]
         if self.labels is not None:
             values = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
-        units = {"units": dict(self.units)} if self.units else {}
-        return {"dimension": self.dimension, "values": values, **units}
+        elif self.is_numbered:
+            values = columns(self.rows)
+        beside = {"units": dict(self.units), "drawn": dict(self.drawn)}
+        stated = {name: about for name, about in beside.items() if about}
+        return {"dimension": self.dimension, "values": values, **stated}
 
     @property
     def points(self) -> list[str]:
-        """What its points are called: labels, or values with their units."""
+        """What its points are called: labels, numbers, or values with their units."""
+        if self.is_numbered:
+            return list(map(str, range(len(self))))
         units = self.units.get(self.dimension, "")
         values = (f"{short(row.get(self.dimension))} {units}".strip() for row in self.rows)
         return list(self.labels or values)
@@ -154,8 +273,44 @@ def _rows(dimension: str, points: Mapping[str, Any]) -> tuple[Row, ...]:
     return tuple({n: plain(n, v) for n, v in row.items()} for row in rows.values())
 
 
-def select(axis: Axis, labels: Sequence[str]) -> Axis:
-    """The points of a zipped axis that bear these labels."""
+def _numbered(dimension: str, values: Mapping[str, Sequence[Any]]) -> tuple[Row, ...]:
+    """The rows of an axis whose points are numbered: at each, a value of each field."""
+    lengths = {name: len(column) for name, column in values.items()}
+    for name, length in lengths.items():
+        if not is_name(name) or name == dimension:
+            rule = f"must be named as a field is, and not as the axis, {dimension!r}"
+            raise InvalidValue("column", name, rule)
+        if length != max(lengths.values()):
+            raise InvalidValue("columns", lengths, "must be of one length")
+    made = [[plain(name, value) for value in column] for name, column in values.items()]
+    return tuple(dict(zip(values, row, strict=True)) for row in zip(*made, strict=True))
+
+
+def columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
+    """Values of each field at points that all set the same fields."""
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def select(axis: Axis, points: Sequence[Any]) -> Axis:
+    """The points of an axis that bear these labels, or numbers; of samples, the first ones are a
+    sample still.
+    """
+    if axis.is_numbered:
+        return _select_numbers(axis, points)
+    return _select_labels(axis, points)
+
+
+def _select_numbers(axis: Axis, numbers: Sequence[Any]) -> Axis:
+    for number in numbers:
+        if number not in range(len(axis)):
+            rule = f"is no point of the axis: they are numbered from 0 to {len(axis) - 1}"
+            raise InvalidValue(axis.dimension, number, rule)
+    first = list(numbers) == list(range(len(numbers)))
+    drawn = {**axis.drawn, "n": len(numbers)} if axis.drawn and first else {}
+    return axis.with_rows([axis.rows[int(n)] for n in numbers], axis.units, drawn)
+
+
+def _select_labels(axis: Axis, labels: Sequence[str]) -> Axis:
     assert axis.labels is not None
     rows = dict(zip(axis.labels, axis.rows, strict=True))
     for label in labels:
@@ -165,7 +320,14 @@ def select(axis: Axis, labels: Sequence[str]) -> Axis:
 
 
 def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
-    """A zipped axis whose points that use a field take new values of it; the others stay."""
+    """An axis of several fields whose points that use one of them take new values of it; the
+    others stay. Numbered points take one value, and are drawn no more.
+    """
+    if axis.is_numbered:
+        if len(values) != 1:
+            rule = f"varies along the axis {axis.dimension}: all of its points take one value"
+            raise InvalidValue(name, values, rule, remedy="Give one value.")
+        return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
     spread: dict[str, Row] = {}
     for label, row in zip(axis.labels, axis.rows, strict=True):

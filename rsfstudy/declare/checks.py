@@ -35,7 +35,7 @@ def fields(study: Study) -> None:
     in_units = study.rig.units if study.rig else {}
     known = dict.fromkeys((*study.scene_fields, *study.measure.plain_fields, *in_units))
     for axis in study.axes:
-        if axis.labels is not None and axis.dimension in (*study.scene_fields, *axis.fields):
+        if not axis.is_plain and axis.dimension in (*study.scene_fields, *axis.fields):
             rule = "is a field: a zipped axis needs a name of its own"
             raise InvalidValue("axis", axis.dimension, rule)
         if axis.units and study.rig is None:

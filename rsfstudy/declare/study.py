@@ -332,7 +332,7 @@ class Study:
             return replace(self, **changed_by_rig)
         for index, axis in enumerate(self.axes):
             if name == axis.dimension:
-                changed = select(axis, values) if axis.labels is not None else Axis(name, values)
+                changed = Axis(name, values) if axis.is_plain else select(axis, values)
             elif name in axis.fields:
                 changed = spread(axis, name, values)
             else:

@@ -82,8 +82,24 @@ class Table:
         for rows in alike(study.axes):
             wrong += self._add(rows)
         if wrong:
-            study.cell(min(wrong))  # which raises
+            raise self._refused(min(wrong))
         study.refuse(self._unused())
+
+    def _refused(self, number: int) -> InvalidValue:
+        """Why a cell is no meaningful scene, and of how many samples or cases the same holds."""
+        place = list(map(int, np.unravel_index(number, self.study.shape)))
+        first = _error(self.study, number)
+        assert first is not None
+        for varied, axis in enumerate(self.study.axes):
+            if not axis.is_numbered:
+                continue
+            count = len(axis)
+            along = [self._number([*place[:varied], n, *place[varied + 1 :]]) for n in range(count)]
+            names = [error.name for n in along if (error := _error(self.study, n))]
+            by = ", ".join(f"{n} in {names.count(n)}" for n in sorted(set(names)))
+            told = f"{len(names)} of {count} points of the axis {axis.dimension}"
+            return first.at(f"{told} ({len(names) / count:.2g}) make no meaningful scene, by {by}")
+        return first
 
     def _column(self, name: str) -> np.ndarray:
         """A field along its axis; NaN where it is no number."""
@@ -181,3 +197,12 @@ class Table:
     def ordered(self, numbers: np.ndarray) -> np.ndarray:
         """Cells ordered block after block."""
         return np.concatenate([numbers[at] for at, _block, _rows in self.split(numbers)])
+
+
+def _error(study: Study, number: int) -> InvalidValue | None:
+    """Why a cell is no meaningful scene."""
+    try:
+        study.cell(number)
+    except InvalidValue as error:
+        return error
+    return None

@@ -53,11 +53,28 @@ PlainScene = Mapping[str, float | str | bool | None]
 
 
 class PlainAxis(TypedDict):
-    """A dimension of the lattice: a list of values, or labels and the fields set at each."""
+    """A dimension of the lattice: a list of values; or labels and the fields set at each; or the
+    values of each field, at points that are numbered.
+    """
 
     dimension: str
-    values: Sequence[float | str | bool] | Mapping[str, Mapping[str, float | str | bool | None]]
+    values: (
+        Sequence[float | str | bool]
+        | Mapping[str, Mapping[str, float | str | bool | None] | Sequence[float | str | bool]]
+    )
     units: NotRequired[Mapping[str, str]]
+    drawn: NotRequired[Mapping[str, Any]]
+
+
+def rows_of(axis: PlainAxis) -> Sequence[Mapping[str, Any]]:
+    """The fields that are set at each point of an axis."""
+    values = axis["values"]
+    if not isinstance(values, Mapping):
+        return [{axis["dimension"]: value} for value in values]
+    points = list(values.values())
+    if not all(isinstance(column, Sequence) for column in points):
+        return [point for point in points if isinstance(point, Mapping)]
+    return [dict(zip(values, point, strict=True)) for point in zip(*points, strict=True)]
 
 
 class PlainMeasure(TypedDict):
@@ -235,11 +252,7 @@ def own_part(declared: Declaration) -> tuple[str, str] | None:
     """Slot and name of a part that the user wrote, if any cell has one."""
     rows: list[Mapping[str, Any]] = [declared.base]
     for axis in declared.axes:
-        dimension, values = axis["dimension"], axis["values"]
-        if isinstance(values, Mapping):
-            rows += values.values()
-        else:
-            rows += [{dimension: value} for value in values]
+        rows += rows_of(axis)
     for slot in SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
             if isinstance(name, str) and name not in slot.choices:

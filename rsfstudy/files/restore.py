@@ -17,7 +17,7 @@ import xarray as xr
 
 from rsfstudy import measures, reduce
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.axis import Axis, columns
 from rsfstudy.declare.figure import figure_name
 from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.declare.study import Study
@@ -45,8 +45,9 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     declared = contents.declaration(results)
     for axis in declared.axes:
         points = results.sizes.get(axis["dimension"])
-        if len(axis["values"]) != points:
-            rule = f"has {len(axis['values'])} points in the declaration, and {points} in the file"
+        declared_points = len(contents.rows_of(axis))
+        if declared_points != points:
+            rule = f"has {declared_points} points in the declaration, and {points} in the file"
             raise refused(axis["dimension"], rule)
     if file is None:
         about = contents.provenance(results)
@@ -149,11 +150,15 @@ def _own_parts(study: Study | None) -> Mapping[str, Own]:
 
 def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
     dimension, values = described["dimension"], described["values"]
-    units = described.get("units")
-    if isinstance(values, Mapping):
-        return Axis(dimension, {label: by_class(row, own) for label, row in values.items()}, units)
-    named = [by_class({dimension: value}, own)[dimension] for value in values]
-    return Axis(dimension, named, units)
+    units, rows = (
+        described.get("units"),
+        [by_class(row, own) for row in contents.rows_of(described)],
+    )
+    if not isinstance(values, Mapping):
+        return Axis(dimension, [row[dimension] for row in rows], units)
+    if all(isinstance(column, Sequence) for column in values.values()):
+        return Axis(dimension, columns(rows) if rows else {}, units, described.get("drawn"))
+    return Axis(dimension, dict(zip(values, rows, strict=True)), units)
 
 
 def _laboratory(stated: Mapping[str, float]) -> Laboratory:

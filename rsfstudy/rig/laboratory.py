@@ -120,7 +120,7 @@ class Laboratory:
                 return Scene(normal_stress=simplest, **fields)
         return Scene(**fields)
 
-    def axis(self, dimension: str, values: Any) -> Axis:
+    def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
         """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.lattice.axis`.
 
         Parameters
@@ -130,9 +130,12 @@ class Laboratory:
             `sigma_star` there), or a field of a scene: ``"hold_time"``, ``"load_velocity"``.
         values : sequence of quantity, str, or mapping
             ``["10 s", "100 s"]``; ``"1:100:20:log um/s"``, which is first, last, how many, and how
-            spaced; or, for a zipped axis, the fields at each label, or the rig.
+            spaced; or, for a zipped axis, the fields at each label, or the rig; or a table, as
+            `rsfstudy.Axis.cases` takes one.
+        units : mapping of str to str, optional
+            Of columns of a table that do not state them; SI units by default.
         """
-        return lattice.axis(dimension, values)
+        return lattice.axis(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"

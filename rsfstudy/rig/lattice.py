@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import Axis, Row, alike, is_list, plain, spread
+from rsfstudy.declare.axis import Axis, Row, alike, columns, is_list, plain, spread
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 # ---- axes ----------------------------------------------------------------------------------------
 
 
-def axis(dimension: str, values: Any, units: str = "") -> Axis:
+def axis(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Axis:
     """An axis in the units that its first value states; a field that has none as it is.
 
     Parameters
@@ -47,9 +47,10 @@ def axis(dimension: str, values: Any, units: str = "") -> Axis:
         A quantity of a rig, or a field of a scene.
     values : sequence of quantity, str, or mapping
         A text is ``first:last:count``, or ``first:last:count:log``, and units. A mapping has the
-        fields of each label, or a rig, and each field is in SI units then.
-    units : str
-        Of plain numbers; SI units by default.
+        fields of each label, or a rig, and each field is in SI units then; or it is a table, as
+        `Axis.cases` takes one.
+    units : str, or mapping of str to str
+        Of plain numbers; of the columns of a table. SI units by default.
 
     Raises
     ------
@@ -58,8 +59,10 @@ def axis(dimension: str, values: Any, units: str = "") -> Axis:
     """
     if not is_name(dimension):
         return Axis(dimension, values)  # which refuses it
-    if isinstance(values, Mapping):
-        return _zipped(Axis(dimension, values))
+    if hasattr(values, "keys"):
+        zipped = isinstance(values, Mapping) and any(map(_is_point, values.values()))
+        return in_units(Axis(dimension, values) if zipped else _table(dimension, values, units))
+    assert isinstance(units, str)
     if isinstance(values, str) and ":" in values:
         values = spaced(dimension, values, values)
     listed = [values] if isinstance(values, str) else values
@@ -74,6 +77,8 @@ def axis(dimension: str, values: Any, units: str = "") -> Axis:
 
 def in_units(along: Axis) -> Axis:
     """An axis of a study of a rig, whose plain numbers are in SI units, as everywhere in a rig."""
+    if along.is_numbered:
+        return _numbered(along)
     if along.units:
         _check(along)
         return along
@@ -92,7 +97,12 @@ def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
             found.append(number)
         else:
             found.append(in_si(name, value, str(kind)) / size)
-        _check_positive(name, found[-1], value)
+    wrong = [
+        value for number, value in zip(found, values, strict=True) if not _is_meant(name, number)
+    ]
+    if wrong:
+        of = f", and {len(wrong)} of {len(found)} are not" if len(found) > 1 else ""
+        raise InvalidValue(name, wrong[0], f"must be positive{of}")
     return found
 
 
@@ -113,17 +123,42 @@ def _zipped(along: Axis) -> Axis:
     return Axis(along.dimension, rows, units)
 
 
+def _numbered(along: Axis) -> Axis:
+    """An axis of samples or cases, whose fields are in the units stated, or in SI units."""
+    found: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for given, column in columns(along.rows).items():
+        name = _name(given, column[0])
+        si = _si_units(name, column[0])
+        if si is None:
+            found[given] = column
+            continue
+        units[name] = along.units.get(given) or _stated_units(column[0]) or si
+        found[name] = numbers_in(name, column, units[name])
+    return Axis(along.dimension, found, units, along.drawn)
+
+
+def _table(dimension: str, table: Any, units: Any) -> Axis:
+    return Axis.cases(table, units=units or None, dimension=dimension)
+
+
+def _is_point(value: Any) -> bool:
+    """True of the fields at a label, or of a rig."""
+    return isinstance(value, Mapping) or hasattr(value, "on_axis")
+
+
 def _check(along: Axis) -> None:
     """Refuse units of another kind, and quantities of a rig that are not positive."""
     for name, units in along.units.items():
         _size(name, units)
         for row in along.rows:
-            _check_positive(name, row.get(name, 1.0), row.get(name))
+            if not _is_meant(name, row.get(name, 1.0)):
+                raise InvalidValue(name, row[name], "must be positive")
 
 
-def _check_positive(name: str, number: Any, value: Any) -> None:
-    if name in OF_AXIS and not (isinstance(number, float) and number > 0.0):
-        raise InvalidValue(name, value, "must be positive")
+def _is_meant(name: str, number: Any) -> bool:
+    """False of a quantity of a rig that is not positive."""
+    return name not in OF_AXIS or (isinstance(number, float) and number > 0.0)
 
 
 def _name(name: str, value: Any) -> str:
@@ -333,10 +368,8 @@ def on(study: Study, laboratory: Laboratory) -> Study:
             {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
             for row in along.rows
         ]
-        values = [row.get(along.dimension) for row in rows]
-        points = dict(zip(along.labels, rows, strict=True)) if along.labels else values
         units = {n: UNITS[FIELDS[n].scale] for n in sizes}
-        axes.append(Axis(along.dimension, points, units))
+        axes.append(along.with_rows(rows, units, along.drawn))
     base = study.base.with_(**of_scene(laboratory.as_dict()))
     return replace(study, laboratory=laboratory, base=base, axes=axes)
 
@@ -359,7 +392,7 @@ def override(study: Study, name: str, value: Any) -> dict[str, Any]:
     for index, along in enumerate(study.axes):
         if name in along.units:
             units = along.units[name]
-            if along.labels is None:
+            if along.is_plain:
                 changed = axis(name, values, "" if isinstance(values[0], str) else units)
             else:
                 changed = spread(along, name, numbers_in(name, values, units))

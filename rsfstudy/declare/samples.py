@@ -1,0 +1,190 @@
+"""Samples of several quantities at once: from distributions, by sequences that fill space evenly;
+and tables of cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from rsfstudy.errors import InvalidValue
+
+#: What a field is set by: a quantity that is drawn, or a function of all of them.
+SetBy = str | Callable[[Mapping[str, np.ndarray]], Any]
+
+METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
+#: Those that are made of Sobol points, whose number must be a power of two to be balanced.
+_OF_SOBOL = ("sobol", "saltelli")
+#: Probabilities nearer to 0 and 1 are none: a distribution without bounds would be infinite there.
+_LEAST = 2.0**-40
+#: Rounding error that an eigenvalue of a correlation, over the largest, may have.
+_ROUNDING = 1e-10
+
+
+def draw(
+    distribution: Mapping[str, Any], n: int, seed: int, method: str, covariance: Any
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Samples of each quantity, and how they were drawn as plain data; see `Axis.samples`."""
+    if not isinstance(distribution, Mapping) or not distribution:
+        raise InvalidValue("distribution", distribution, "must map names to distributions")
+    _check(distribution, n, seed, method)
+    deviations, correlation = _spread(distribution, covariance, method)
+    scores = ndtri(_probabilities(len(distribution), n, seed, method)) @ _root(correlation)
+    found = {}
+    for (name, drawn), score, deviation in zip(
+        distribution.items(), scores.T, deviations, strict=True
+    ):
+        if _is_estimate(drawn):
+            found[name] = drawn + deviation * score
+        else:
+            found[name] = np.asarray(_quantiles(drawn)(ndtr(score)), dtype=float)
+    how = {
+        "method": method,
+        "n": n * (len(distribution) + 2) if method == "saltelli" else n,
+        "seed": seed,
+        "of": {name: _said(drawn) for name, drawn in distribution.items()},
+    }
+    if covariance is not None:
+        how["covariance"] = np.asarray(covariance, dtype=float).tolist()
+    return found, how
+
+
+def _check(distribution: Mapping[str, Any], n: int, seed: int, method: str) -> None:
+    if method not in METHODS:
+        raise InvalidValue("method", method, "is unknown", choices=METHODS)
+    for name, value, least in (("n", n, 1), ("seed", seed, 0)):
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+            raise InvalidValue(name, value, f"must be a whole number, {least} or more")
+    if method in _OF_SOBOL and n & (n - 1):
+        below = 1 << (int(n).bit_length() - 1)
+        rule = "is no power of two, without which Sobol points are not balanced"
+        remedy = f"Draw {below} or {2 * below}, or by method='latin_hypercube'."
+        raise InvalidValue("n", n, rule, remedy=remedy)
+    for name, drawn in distribution.items():
+        if not _is_estimate(drawn) and _quantiles(drawn) is None:
+            rule = "is neither a distribution of scipy.stats with its parameters, nor an estimate"
+            raise InvalidValue(name, drawn, rule, remedy="As in scipy.stats.norm(0.01, 0.001).")
+
+
+def _spread(
+    distribution: Mapping[str, Any], covariance: Any, method: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of what is drawn, and the correlation of their normal scores."""
+    count = len(distribution)
+    estimates = [name for name, drawn in distribution.items() if _is_estimate(drawn)]
+    if covariance is None:
+        if estimates:
+            rule = "is an estimate without a variance"
+            remedy = "Give covariance=, or a distribution in its place."
+            raise InvalidValue(estimates[0], distribution[estimates[0]], rule, remedy=remedy)
+        return np.ones(count), np.eye(count)
+    given = np.asarray(covariance, dtype=float)
+    if given.shape != (count, count) or not np.isfinite(given).all():
+        rule = f"must be {count} by {count} finite numbers, in the order {', '.join(distribution)}"
+        raise InvalidValue("covariance", covariance, rule)
+    variances = np.diag(given)
+    if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():
+        rule = "must be symmetric, with variances above zero along its diagonal"
+        raise InvalidValue("covariance", given.tolist(), rule)
+    deviations = np.sqrt(variances)
+    correlation = given / np.outer(deviations, deviations)
+    if method == "saltelli" and not np.array_equal(correlation, np.eye(count)):
+        rule = "correlates what is drawn, and Sobol indices are of independent quantities"
+        remedy = "Draw by method='sobol', or draw independent quantities of which fields are made."
+        raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
+    lowest = float(np.linalg.eigvalsh(correlation)[0])
+    if lowest < -_ROUNDING * count:
+        rule = f"is impossible: its correlations have the eigenvalue {lowest:.2g}, below zero"
+        raise InvalidValue("covariance", given.tolist(), rule)
+    return deviations, correlation
+
+
+def _root(correlation: np.ndarray) -> np.ndarray:
+    """The symmetric square root, which unlike other factors is one on every machine."""
+    values, vectors = np.linalg.eigh(correlation)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+def _probabilities(count: int, n: int, seed: int, method: str) -> np.ndarray:
+    """Points of the unit cube, of shape (samples, count)."""
+    random = np.random.default_rng(seed)
+    if method == "random":
+        found = random.random((n, count))
+    elif method == "latin_hypercube":
+        found = qmc.LatinHypercube(count, seed=random).random(n)
+    else:
+        found = qmc.Sobol(count * (1 + (method == "saltelli")), seed=random).random(n)
+    if method == "saltelli":
+        # of each point: A, B, and A with one coordinate from B after the other
+        ours, theirs = found[:, :count], found[:, count:]
+        mixed = np.where(np.eye(count, dtype=bool), theirs[:, None, :], ours[:, None, :])
+        found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
+    return np.clip(found.reshape(-1, count), _LEAST, 1.0 - _LEAST)
+
+
+def _is_estimate(drawn: Any) -> bool:
+    return isinstance(drawn, int | float | np.number) and not isinstance(drawn, bool)
+
+
+def _quantiles(drawn: Any) -> Any:
+    """The function that gives quantiles of a distribution; None of what is none."""
+    return getattr(drawn, "ppf", None) if hasattr(drawn, "dist") else getattr(drawn, "icdf", None)
+
+
+def _said(drawn: Any) -> Any:
+    """A distribution in words; an estimate as it is."""
+    if _is_estimate(drawn):
+        return float(drawn)
+    if not hasattr(drawn, "dist"):
+        return str(drawn)
+    given = [*map(str, drawn.args), *(f"{name}={value}" for name, value in drawn.kwds.items())]
+    return f"{drawn.dist.name}({', '.join(given)})"
+
+
+def set_by(
+    drawn: Mapping[str, Any], fields: Mapping[str, SetBy] | None
+) -> dict[str, Sequence[Any] | np.ndarray]:
+    """Values of each field that is set: by a quantity that is drawn, or a function of them all."""
+    if fields is None:
+        return dict(drawn)
+    found = {}
+    for name, by in fields.items():
+        if isinstance(by, str):
+            if by not in drawn:
+                raise InvalidValue(name, by, "is not drawn", choices=drawn)
+            found[name] = drawn[by]
+        else:
+            found[name] = _made(name, by, {n: np.asarray(values) for n, values in drawn.items()})
+    return found
+
+
+def _made(name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]) -> np.ndarray:
+    count = len(next(iter(drawn.values())))
+    try:
+        return np.broadcast_to(np.asarray(by(drawn), dtype=float), count)
+    except Exception as error:
+        rule = f"gives no number for each sample ({type(error).__name__}: {error})"
+        raise InvalidValue(name, getattr(by, "__name__", by), rule, choices=drawn) from error
+
+
+def columns_of(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
+    """Columns of a table by their names, and the units that it states of them."""
+    if not hasattr(table, "keys") or not len(table):
+        rule = "is no table of columns"
+        remedy = "Give a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
+        raise InvalidValue("table", table, rule, remedy=remedy)
+    found, units = {}, {}
+    # the keys of an xarray.Dataset are its data variables
+    for name in map(str, getattr(table, "data_vars", table)):
+        column = table[name]
+        stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
+        stated = stated.get(name, "") if isinstance(stated, Mapping) else stated
+        values = getattr(column, "values", column)
+        found[name] = list(values) if np.ndim(values) == 1 else values
+        if stated not in ("", "1"):
+            units[name] = stated
+    return found, units
