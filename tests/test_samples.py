@@ -1,0 +1,247 @@
+"""Samples and tables of cases as one dimension over several fields, and what is made of them."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from running import run
+from scipy.stats import lognorm, norm, truncnorm
+
+import rsfstudy
+from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy.compute import cells
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import restore
+from rsfstudy.measures.linear_stability import LinearStability
+
+BASE = Scene(normal_stress="constant")
+LOGS = {"ln_a": norm(np.log(0.01), 0.1), "ln_net": norm(np.log(0.02), 0.1)}
+FIELDS = {
+    "a": lambda d: np.exp(d["ln_a"]),
+    "b_over_a": lambda d: 1.0 + np.exp(d["ln_net"] - d["ln_a"]),
+}
+RIG = Laboratory(
+    normal_stress="5 MPa",
+    slip_distance="10 um",
+    reference_velocity="1 um/s",
+    stiffness="0.001 MPa/um",
+)
+
+
+def study(*axes, base=BASE, **more):
+    parts = {"measure": LinearStability(), "axes": axes, **more}
+    return Study(name="sampled", title="Sampled", base=base, **parts)
+
+
+# ---- what is drawn ------------------------------------------------------------------------------
+
+
+def test_fields_are_functions_of_what_is_drawn():
+    """A lattice with an ordinary axis beside: each cell has the fields of its sample, which are
+    coordinates of the file; the declaration brings them back.
+    """
+    samples = Axis.samples(LOGS, 8, 3, fields=FIELDS)
+    found = run(study(Axis("law", ["slip", "slowness"]), samples))
+    assert found.sizes == {"law": 2, "sample": 8}
+    assert found["sample"].values.tolist() == list(range(8))
+    assert found["a"].dims == found["b_over_a"].dims == ("sample",)
+    critical = (found["a"] * (found["b_over_a"] - 1.0)).values
+    # the closed form, (b - a) sigma/D_c, to rounding and the width of a root
+    for law in found["critical_stiffness"].values:
+        np.testing.assert_allclose(law, critical, rtol=1e-7)
+    how = json.loads(found["sample"].attrs["drawn"])
+    assert (how["method"], how["n"], how["seed"]) == ("sobol", 8, 3)
+    assert how["of"]["ln_a"].startswith("norm(")
+    again = restore.study_of(found)
+    assert again.axes[1].describe() == samples.describe()
+    assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
+
+
+def test_twice_the_samples_compute_those_that_are_new(tmp_path, monkeypatch):
+    original, counted = cells.computed, []
+    monkeypatch.setattr(
+        cells, "computed", lambda *given, **more: counted.append(1) or original(*given, **more)
+    )
+    for n in (8, 16):
+        run(study(Axis.samples(LOGS, n, 3, fields=FIELDS)), output=tmp_path)
+    assert len(counted) == 16
+
+
+def test_the_first_samples_are_a_sample_still():
+    whole = study(Axis.samples(LOGS, 16, 3, fields=FIELDS))
+    half = whole.with_(sample=list(range(8)))
+    assert half.axes[0].describe() == Axis.samples(LOGS, 8, 3, fields=FIELDS).describe()
+    assert whole.with_(sample=[2, 5]).axes[0].describe()["values"]["a"] == [
+        whole.axes[0].rows[n]["a"] for n in (2, 5)
+    ]
+    assert {row["a"] for row in whole.with_(a=0.012).axes[0].rows} == {0.012}
+    assert not whole.with_(a=0.012).axes[0].drawn
+    with pytest.raises(InvalidValue, match="sample = 16.0: .* from 0 to 15"):
+        whole.with_(sample=16)
+    with pytest.raises(InvalidValue, match="a = .*all of its points take one value"):
+        whole.with_(a=[0.01, 0.02])
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])
+def test_estimates_with_their_covariance(method):
+    """Moments of normal samples are those asked for: within five standard errors of independent
+    samples, than which the others err less. The sign of the correlation shows at 45 of them.
+    """
+    covariance = np.array([[4e-6, -3.6e-6], [-3.6e-6, 9e-6]])
+    axis = Axis.samples({"a": 0.1, "mu_star": 0.6}, 4096, 1, method=method, covariance=covariance)
+    drawn = np.array([[row["a"], row["mu_star"]] for row in axis.rows]).T
+    error = np.sqrt(np.diag(covariance) / 4096)
+    assert (abs(drawn.mean(axis=1) - (0.1, 0.6)) < 5.0 * error).all()
+    assert np.corrcoef(drawn)[0, 1] == pytest.approx(-0.6, abs=5.0 * (1.0 - 0.36) / 64.0)
+    assert np.var(drawn, axis=1) == pytest.approx(np.diag(covariance), rel=5.0 * np.sqrt(2 / 4096))
+
+
+def test_distributions_keep_their_own_quantiles_where_they_are_correlated():
+    drawn = {"a": lognorm(0.3, scale=0.01), "alpha": truncnorm(-2.0, 2.0, 0.5, 0.1)}
+    axis = Axis.samples(drawn, 1024, 2, covariance=[[1.0, 0.9], [0.9, 1.0]])
+    for name, of in drawn.items():
+        values = np.sort([row[name] for row in axis.rows])
+        # the distance of Kolmogorov that one in 1e5 independent samples is beyond
+        assert abs(of.cdf(values) - (np.arange(1024) + 0.5) / 1024).max() < 2.5 / 32.0
+    ranks = pd.DataFrame(axis.rows).corr("spearman").iloc[0, 1]
+    # of normal scores that are correlated by .9: 6/pi asin(.45)
+    assert ranks == pytest.approx(6.0 / np.pi * np.arcsin(0.45), abs=0.03)
+
+
+def test_samples_for_sobol_indices_share_coordinates():
+    """Of each point A, B, and A with one coordinate of B after the other."""
+    axis = Axis.samples({"a": norm(0.01, 1e-3), "mu_star": norm(0.6, 0.1)}, 4, 1, method="saltelli")
+    blocks = np.array([list(row.values()) for row in axis.rows]).reshape(4, 4, 2)
+    a, b, first, second = blocks.transpose(1, 0, 2)
+    assert (first == np.stack([b[:, 0], a[:, 1]], axis=1)).all()
+    assert (second == np.stack([a[:, 0], b[:, 1]], axis=1)).all()
+    assert (a != b).all()
+    assert axis.drawn["n"] == 16
+
+
+# ---- tables -------------------------------------------------------------------------------------
+
+TABLE = {"a": [0.010, 0.012, 0.010], "b_over_a": [1.5, 1.4, 1.5]}
+
+
+@pytest.mark.parametrize(
+    "table", [TABLE, pd.DataFrame(TABLE), xr.Dataset({n: ("draw", v) for n, v in TABLE.items()})]
+)
+def test_the_rows_of_a_table_are_cases(table):
+    found = run(study(Axis.cases(table)))
+    assert found["case"].values.tolist() == [0, 1, 2]
+    np.testing.assert_allclose(found["critical_stiffness"], [0.005, 0.0048, 0.005], rtol=1e-7)
+    assert restore.study_of(found).axes[0].rows == Axis("case", TABLE).rows
+
+
+def test_draws_of_other_quantities_set_fields():
+    axis = Axis.cases(
+        {"a": [0.01], "b": [0.03]}, fields={"a": "a", "b_over_a": lambda d: d["b"] / d["a"]}
+    )
+    assert axis.rows == ({"a": 0.01, "b_over_a": 3.0},)
+
+
+def _with_units(tmp_path):
+    """One table, stated in each of the ways there are."""
+    (tmp_path / "cases.csv").write_text("a (1), slip_distance (um)\n.01, 5\n.012, 10\n")
+    columns = {"a": [0.01, 0.012], "slip_distance": [5.0, 10.0]}
+    frame = pd.DataFrame(columns)
+    frame.attrs["units"] = {"slip_distance": "um"}
+    dataset = xr.Dataset({n: ("draw", v) for n, v in columns.items()})
+    dataset["slip_distance"].attrs["units"] = "um"
+    micrometres = {"slip_distance": "um"}
+    return [
+        RIG.axis("case", rsfstudy.read_table(tmp_path / "cases.csv")),
+        RIG.axis("case", frame),
+        RIG.axis("case", dataset),
+        RIG.axis("case", columns, micrometres),
+        Axis.cases(columns, units=micrometres),
+        RIG.axis("case", {"a": columns["a"], "slip_distance": ["5 um", "0.01 mm"]}),
+        Axis.cases({"a": columns["a"], "slip_distance": [5e-6, 10e-6]}),
+    ]
+
+
+def test_a_table_in_units_of_a_rig(tmp_path):
+    """K = k D_c/sigma_*, whatever the units are stated by."""
+    base = RIG.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
+    for axis in _with_units(tmp_path):
+        declared = study(axis, base=base, laboratory=RIG)
+        scenes = list(declared.scenes())
+        assert [scene.stiffness for scene in scenes] == pytest.approx([0.001, 0.002], rel=1e-12)
+        assert [scene.a for scene in scenes] == [0.01, 0.012]
+        found = run(declared)
+        assert found["slip_distance"].attrs["units"] in ("um", "m")
+        assert restore.study_of(found).describe() == declared.describe()
+
+
+def test_samples_in_units_of_a_rig():
+    base = RIG.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
+    lengths = Axis.samples({"slip_distance": norm(10.0, 1.0)}, 4, units={"slip_distance": "um"})
+    declared = study(lengths, base=base, laboratory=RIG)
+    for row, scene in zip(lengths.rows, declared.scenes(), strict=True):
+        assert scene.stiffness == pytest.approx(2e-4 * row["slip_distance"], rel=1e-12)
+
+
+# ---- what is refused ----------------------------------------------------------------------------
+
+REFUSED = {
+    "n = 12: is no power of two.*Draw 8 or 16": ({"a": norm(0.01, 1e-3)}, 12, {}),
+    "n = 0: must be a whole number, 1 or more": ({"a": norm(0.01, 1e-3)}, 0, {}),
+    "method = 'halton': is unknown": ({"a": norm(0.01, 1e-3)}, 8, {"method": "halton"}),
+    "a = 0.01: is an estimate without a variance": ({"a": 0.01}, 8, {}),
+    "a = .*norm_gen.*: is neither a distribution": ({"a": norm}, 8, {}),
+    "distribution = {}: must map": ({}, 8, {}),
+    "covariance = .*: is impossible: .*eigenvalue -0.2": (
+        {"a": 0.01, "mu_star": 0.6}, 8, {"covariance": [[1e-6, 1.2e-4], [1.2e-4, 1e-2]]},
+    ),
+    "covariance = .*: must be symmetric": (
+        {"a": 0.01, "mu_star": 0.6}, 8, {"covariance": [[1e-6, 1e-5], [-1e-5, 1e-2]]},
+    ),
+    "covariance = .*: must be 2 by 2": (
+        {"a": 0.01, "mu_star": 0.6}, 8, {"covariance": [1e-6, 1e-2]},
+    ),
+    "covariance = .*: correlates what is drawn, and Sobol indices": (
+        {"a": 0.01, "mu_star": 0.6}, 8,
+        {"covariance": [[1e-6, 1e-5], [1e-5, 1e-2]], "method": "saltelli"},
+    ),
+    "a = 'b': is not drawn.*Choices: ln_a": ({"ln_a": norm(-4, 0.1)}, 8, {"fields": {"a": "b"}}),
+    "a = '<lambda>': gives no number for each sample .KeyError": (
+        {"ln_a": norm(-4, 0.1)}, 8, {"fields": {"a": lambda d: d["ln_b"]}},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_drawn(message):
+    distribution, n, more = REFUSED[message]
+    with pytest.raises(InvalidValue, match=message):
+        Axis.samples(distribution, n, **more)
+
+
+def test_what_is_no_table():
+    for table, message in (
+        ([0.01], "table = .*: is no table of columns"),
+        ({}, "table = {}: is no table"),
+        ({"a": [0.01, 0.02], "mu_star": [0.6]}, "columns = .*: must be of one length"),
+        ({"a": [0.01, np.nan]}, "a = nan: must be finite"),
+        ({"case": [1.0, 2.0]}, "column = 'case': must be named"),
+    ):
+        with pytest.raises(InvalidValue, match=message):
+            Axis.cases(table)
+
+
+def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypatch):
+    monkeypatch.setattr(cells, "computed", None)
+    drawn = {"a": norm(0.01, 0.01), "mu_star": norm(0.6, 0.3)}
+    sampled = study(Axis("law", ["slip", "slowness"]), Axis.samples(drawn, 64, 1))
+    rows = sampled.axes[1].rows
+    by_a = sum(row["a"] <= 0.0 for row in rows)
+    lost = sum(row["a"] <= 0.0 or row["mu_star"] <= 0.0 for row in rows)
+    told = rf"^{lost} of 64 points of the axis sample \({lost / 64:.2g}\) make no .*a in {by_a}"
+    with pytest.raises(InvalidValue, match=told):
+        run(sampled)
+    lengths = Axis.samples({"slip_distance": norm(1.0, 1.0)}, 8, 1, units={"slip_distance": "um"})
+    with pytest.raises(InvalidValue, match=r"slip_distance = .*positive, and \d of 8 are not"):
+        study(lengths, base=RIG.scene(a=0.01, b_over_a=1.5), laboratory=RIG)
