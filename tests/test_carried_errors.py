@@ -14,9 +14,13 @@ from rsfstudy.reduce import (
     Difference,
     Inverse,
     LinearFit,
+    Logarithm,
+    Mean,
     OverClosedForm,
     ProportionalFit,
+    Quantile,
     RelativeDifference,
+    StandardDeviation,
     reduced,
 )
 from rsfstudy.reduce.carried import COMMENT
@@ -57,6 +61,10 @@ KINDS = [
     OverClosedForm("r", OF, form="velocity_step_at_critical_stiffness"),
     Spread("r", OF, ON),
     Spread("r", OF, ON, within=(0.5, 2.0)),
+    Mean("r", OF, over="b_over_a"),
+    StandardDeviation("r", OF, over="b_over_a"),
+    Quantile("r", OF, over="b_over_a", level=0.4),
+    Logarithm("r", OF),
 ]
 
 

@@ -35,6 +35,7 @@ from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.reductions import InUnits
 from rsfstudy.slider.registry import SLOTS, Own, by_class
 
 
@@ -183,7 +184,9 @@ def measure(described: PlainMeasure, path: str) -> Measure:
 def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
     wanted = values.pop("kind")
-    kinds = _kinds(Reduction, reduce, wanted)
+    kinds: dict[str, Any] = {InUnits.kind: InUnits}
+    if wanted not in kinds:
+        kinds |= _kinds(Reduction, reduce, wanted)
     if wanted not in kinds:
         remedy = "If it is your own, name the file that declares it: --study FILE (study=)."
         raise InvalidValue(

@@ -17,6 +17,8 @@ from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference
 from rsfstudy.reduce.fits import LinearFit, ProportionalFit
+from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
+from rsfstudy.reduce.sobol_indices import SobolIndices
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -25,10 +27,16 @@ __all__ = [
     "Difference",
     "Inverse",
     "LinearFit",
+    "Logarithm",
+    "Mean",
     "OverClosedForm",
     "ProportionalFit",
+    "Quantile",
     "Reduction",
     "RelativeDifference",
+    "SobolIndices",
+    "StandardDeviation",
+    "StatusShares",
     "reduced",
 ]
 
@@ -52,7 +60,8 @@ def reduced(
     despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
     drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
-        support = without_failures(dataset) if despite else dataset
+        leaves_out = despite and not reduction.of_failures
+        support = without_failures(dataset) if leaves_out else dataset
         own = worst(support["status"], support[reduction.of].dims)
         support = known(support, reduction.of, drawn.get(reduction.of, own))
         made = carried(reduction, support, reduction(support))
@@ -63,6 +72,9 @@ def reduced(
             if bool(failed(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
             about = _about(quantity(str(name), stated_by(dataset) | stated), values)
+            if (measured := values.attrs.get("measured_as")) is not None:
+                theirs = dataset[measured].attrs
+                about |= {key: theirs[key] for key in ("units", "scale") if key in theirs}
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
             if beside := [n for end in _BESIDE if (n := f"{name}_{end}") in made]:

@@ -29,6 +29,8 @@ class Reduction:
 
     #: Name of the kind in declarations.
     kind: ClassVar[str]
+    #: Whether it tells of cells that failed, which all others refuse to draw on.
+    of_failures: ClassVar[bool] = False
 
     name: str
     of: str

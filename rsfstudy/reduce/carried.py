@@ -43,7 +43,7 @@ def carried(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> xr.D
     if not parts:
         return made
     error = sum(parts[1:], start=parts[0]).where(result.notnull()).transpose(*result.dims)
-    about = {key: result.attrs[key] for key in ("refused",) if key in result.attrs}
+    about = {key: result.attrs[key] for key in ("refused", "measured_as") if key in result.attrs}
     comment = COMMENT
     if name in made:
         error, comment = error + made[name], f"{made[name].attrs['comment']}; and {COMMENT}"

@@ -1,0 +1,268 @@
+"""Statistics over samples: mean, standard deviation and quantiles with their errors, and the share
+of each status.
+
+Each has two errors, told apart: ``<name>_stderr`` is that of sampling, the standard error if the
+samples were independent, which those of Sobol points and Latin hypercubes rarely exceed;
+``<name>_error`` is what the numerical errors of the cells make of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Derivatives, Reduction, refused
+from rsfstudy.status import Status
+
+#: Coordinates of the scales that quantities are measured in.
+_SCALES = {"sigma_*": "sigma_star", "D_c": "slip_distance", "V_*": "reference_velocity"}
+
+
+@dataclass(frozen=True)
+class _Statistic(Reduction):
+    """A statistic over samples; members say which.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result; ``<name>_stderr``, ``<name>_error`` and ``<name>_points`` (the number of
+        samples that have a number) come with it.
+    of : str
+        Variable to reduce.
+    over : str
+        Dimension of the samples.
+    """
+
+    over: str = "sample"
+    #: What it is, in words.
+    text: ClassVar[str]
+
+    @property
+    def least(self) -> int:
+        """Fewest samples of which it can be told with its error."""
+        return 2
+
+    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+        """The statistic, and its standard error."""
+        raise TypeError(f"{type(self).__name__} is no statistic")
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        name = self.name.replace("_", " ")
+        return (
+            Quantity(f"{self.name}_stderr", "", "1", f"standard error, by sampling, of {name}"),
+            Quantity(f"{self.name}_points", "", "1", f"samples with a number for {name}"),
+        )
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Reduce along the dimension of the samples.
+
+        Raises
+        ------
+        InvalidValue
+            Where `of` does not lie along it.
+        """
+        of, why = _of(self, dataset), ""
+        count = of.notnull().sum(self.over)
+        bad = refused(dataset, self.of, self.over)
+        if varied := _varied_scale(dataset, of, self.over):
+            bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
+        elif bool(bad.any()):
+            why = "samples failed or are missing"
+        elif bool((count < self.least).any()):
+            why = f"needs {self.least} samples with a number"
+        about = {"comment": f"{self.text} of {self.of} over {self.over}"}
+        of_results = about | {"measured_as": self.of} | ({"refused": why} if why else {})
+        known = (count >= self.least) & ~bad
+        value, stderr = (result.where(known).drop_attrs(deep=False) for result in self.values(of))
+        return xr.Dataset(
+            {
+                self.name: value.assign_attrs(of_results),
+                f"{self.name}_stderr": stderr.assign_attrs(of_results),
+                f"{self.name}_points": count.astype("int32").assign_attrs(about),
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Mean(_Statistic):
+    """Mean over samples."""
+
+    kind: ClassVar[str] = "mean"
+    text: ClassVar[str] = "mean"
+
+    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+        """The mean, and sd/sqrt(n)."""
+        count = of.notnull().sum(self.over)
+        return of.mean(self.over), of.std(self.over, ddof=1) / count**0.5
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """1/n."""
+        has = dataset[self.of].notnull()
+        return [(has / has.sum(self.over), {})]
+
+
+@dataclass(frozen=True)
+class StandardDeviation(_Statistic):
+    """Standard deviation over samples."""
+
+    kind: ClassVar[str] = "standard_deviation"
+    text: ClassVar[str] = "standard deviation"
+
+    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+        """That of n - 1 degrees of freedom, and its error by the fourth moment."""
+        count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
+        deviation = of.std(self.over, ddof=1)
+        variance = (apart**4).mean(self.over) - (apart**2).mean(self.over) ** 2
+        return deviation, (variance / count) ** 0.5 / (2.0 * deviation).where(deviation > 0.0)
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """(y - mean)/((n - 1) sd)."""
+        of = dataset[self.of]
+        freedom = of.notnull().sum(self.over) - 1
+        by = (of - of.mean(self.over)) / (freedom * of.std(self.over, ddof=1))
+        return [(by.fillna(0.0), {})]
+
+
+@dataclass(frozen=True)
+class Quantile(_Statistic):
+    """Quantile over samples, between neighbours by their distance; its standard error is half the
+    distance of the quantiles a standard deviation of the binomial above and below.
+
+    Parameters
+    ----------
+    level : float
+        Share of the samples below it.
+    """
+
+    level: float = 0.5
+    kind: ClassVar[str] = "quantile"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.level < 1.0:
+            raise InvalidValue("level", self.level, "must be between 0 and 1")
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """What it is, in words."""
+        return f"quantile at {self.level:g}"
+
+    @property
+    def least(self) -> int:
+        """So many that a standard deviation of the binomial stays between 0 and 1."""
+        rarer = min(self.level, 1.0 - self.level)
+        return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
+
+    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+        """By the order of the samples."""
+        apart = (self.level * (1.0 - self.level) / of.notnull().sum(self.over)) ** 0.5
+        found = [
+            (_weights(of, self.over, self.level + sign * apart) * of.fillna(0.0)).sum(self.over)
+            for sign in (0.0, -1.0, 1.0)
+        ]
+        return found[0], 0.5 * (found[2] - found[1])
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """The weights of the two samples beside it."""
+        of = dataset[self.of]
+        return [(_weights(of, self.over, xr.DataArray(self.level)), {})]
+
+
+def _weights(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
+    """Weights of samples in a quantile: those of the two whose ranks are beside it."""
+    place = of.get_axis_num(over)
+    ranks = of.copy(data=np.argsort(np.argsort(of.values, axis=place), axis=place).astype(float))
+    at = level.clip(0.0, 1.0) * (of.notnull().sum(over) - 1)
+    return (1.0 - abs(ranks - at)).clip(min=0.0).where(of.notnull(), 0.0)
+
+
+@dataclass(frozen=True)
+class StatusShares(Reduction):
+    """Share of the samples that ended by each status, failures among them; its standard error is
+    that of a share of which one more ended so, and one more did not.
+
+    Parameters
+    ----------
+    name : str
+        Name of the shares, along the dimension ``ended``; ``<name>_stderr`` comes with it.
+    of : str
+        A variable that was measured.
+    over : str
+        Dimension of the samples.
+    """
+
+    over: str = "sample"
+    kind: ClassVar[str] = "status_shares"
+    of_failures: ClassVar[bool] = True
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        name = self.name.replace("_", " ")
+        return (
+            Quantity(self.name, "", "1", "share of samples that ended so"),
+            Quantity(f"{self.name}_stderr", "", "1", f"standard error, by sampling, of {name}"),
+            Quantity("ended", "", "1", "status with which a sample ended"),
+        )
+
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """Cells that are there, however they ended."""
+        return status.where(status == int(Status.PENDING), int(Status.OK))
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Count along the dimension of the samples."""
+        _of(self, dataset)
+        status = dataset["status"]
+        statuses = [status for status in Status if status is not Status.PENDING]
+        codes = xr.DataArray(
+            [int(each) for each in statuses], {"ended": [s.label for s in statuses]}, "ended"
+        )
+        count, ended = status.sizes[self.over], (status == codes).sum(self.over)
+        smoothed = (ended + 1) / (count + 2)
+        stderr = (smoothed * (1.0 - smoothed) / (count + 3)) ** 0.5
+        known = ~(status == int(Status.PENDING)).any(self.over)
+        found = {self.name: ended / count, f"{self.name}_stderr": stderr}
+        return xr.Dataset({name: values.where(known) for name, values in found.items()})
+
+
+@dataclass(frozen=True)
+class Logarithm(Reduction):
+    """Natural logarithm of a variable, in each cell where that is positive."""
+
+    kind: ClassVar[str] = "logarithm"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Ln of it, a pure number."""
+        of = dataset[self.of]
+        logarithm: xr.DataArray = xr.apply_ufunc(np.log, of.where(of > 0.0))
+        note = {"comment": f"natural logarithm of {self.of} in its unit"}
+        return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """One over the variable."""
+        of = dataset[self.of]
+        return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
+
+
+def _of(reduction: Mean | _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
+    """What is reduced."""
+    of = dataset[reduction.of]
+    if reduction.over not in of.dims:
+        rule = f"is no dimension of {reduction.of}"
+        raise InvalidValue("over", reduction.over, rule, choices=map(str, of.dims))
+    return of
+
+
+def _varied_scale(dataset: xr.Dataset, of: xr.DataArray, over: str) -> str:
+    """A scale that a variable is measured in and that is not the same for all samples."""
+    scale = of.attrs.get("scale", "")
+    varied = (
+        s for s, name in _SCALES.items() if name in dataset.coords and over in dataset[name].dims
+    )
+    return next((symbol for symbol in varied if symbol in scale), "")

@@ -1,0 +1,52 @@
+"""Results of a study of a rig in its units, cell by cell, for what is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Derivatives, Reduction
+from rsfstudy.rig.scales import scales_of
+from rsfstudy.rig.units import factor
+
+
+@dataclass(frozen=True)
+class InUnits(Reduction):
+    """A variable in units of the rig, in each cell by its own scales: what a mean over samples
+    needs in which a scale varies.
+
+    Parameters
+    ----------
+    name, of : str
+    units : str
+        As in "s".
+    """
+
+    units: str = ""
+    kind: ClassVar[str] = "in_units"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        return (Quantity(self.name, "", self.units, self.name.replace("_", " ")),)
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """The variable times its scale."""
+        about = {"units": self.units, "comment": f"{self.of}, each cell by its own scales"}
+        values = (dataset[self.of] * self._size(dataset)).drop_attrs(deep=False)
+        return xr.Dataset({self.name: values.assign_attrs(about)})
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """The scale."""
+        return [(self._size(dataset) * xr.ones_like(dataset[self.of]), {})]
+
+    def _size(self, dataset: xr.Dataset) -> xr.DataArray:
+        scale, known = dataset[self.of].attrs.get("scale", ""), scales_of(dataset)
+        if scale not in known:
+            raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
+        size = known[scale].factor / factor(self.name, self.units, known[scale].units)
+        return xr.DataArray(size)
