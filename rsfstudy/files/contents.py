@@ -66,15 +66,22 @@ class PlainAxis(TypedDict):
     drawn: NotRequired[Mapping[str, Any]]
 
 
+def is_numbered(axis: PlainAxis) -> bool:
+    """True of an axis of samples or cases: it holds the values of each field."""
+    values = axis["values"]
+    columns = values.values() if isinstance(values, Mapping) else [None]
+    return all(isinstance(column, Sequence) for column in columns)
+
+
 def rows_of(axis: PlainAxis) -> Sequence[Mapping[str, Any]]:
     """The fields that are set at each point of an axis."""
     values = axis["values"]
     if not isinstance(values, Mapping):
         return [{axis["dimension"]: value} for value in values]
-    points = list(values.values())
-    if not all(isinstance(column, Sequence) for column in points):
-        return [point for point in points if isinstance(point, Mapping)]
-    return [dict(zip(values, point, strict=True)) for point in zip(*points, strict=True)]
+    if is_numbered(axis):
+        columns: Any = values.values()
+        return [dict(zip(values, point, strict=True)) for point in zip(*columns, strict=True)]
+    return [point for point in values.values() if isinstance(point, Mapping)]
 
 
 class PlainMeasure(TypedDict):

@@ -157,7 +157,7 @@ def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
     )
     if not isinstance(values, Mapping):
         return Axis(dimension, [row[dimension] for row in rows], units)
-    if all(isinstance(column, Sequence) for column in values.values()):
+    if contents.is_numbered(described):
         return Axis(dimension, columns(rows) if rows else {}, units, described.get("drawn"))
     return Axis(dimension, dict(zip(values, rows, strict=True)), units)
 

@@ -54,6 +54,8 @@ NAMES = (*_ANY, *names.names())
 _ON_SCREEN = 150
 #: What would make two files of one figure differ.
 _DATES: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+#: Height in mm of a panel of a scatter matrix.
+_OF_SQUARE = 44.0
 
 
 class Drawing(Figure):
@@ -165,7 +167,7 @@ def _fitting(
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
     study = catalogue.load(name) if name in names.names() else None
     if name == "fits" and own is variable is None:
-        own = importlib.import_module(f"{__name__}.fits")
+        return Declared(importlib.import_module(f"{__name__}.fits").panels(dataset)), dataset
     if own is None and study is None and name not in _ANY:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}
@@ -199,11 +201,15 @@ def _with_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
 
 def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:
-    """Figure of any lattice: maps where it has two numeric axes, else lines."""
-    from rsfstudy.plots import _axes, lines, maps
+    """Figure of any lattice: histograms and scatters of samples, maps where it has two numeric
+    axes, else lines.
+    """
+    from rsfstudy.plots import _axes, lines, maps, samples
 
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
+    if square := samples.panels(dataset, variable):
+        return Declared(square, samples.square(square), _OF_SQUARE)
     for module in (maps, lines):
         if found := module.panels(dataset, variable):
             return Declared(found)

@@ -1,0 +1,97 @@
+"""Samples or cases: histograms and a scatter matrix of what was measured and of the fields that
+vary, a colour for each point of the other axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from rsfstudy.declare.figure import Draw, Panel
+from rsfstudy.files.contents import declaration, is_numbered
+from rsfstudy.plots._axes import is_number, is_numeric, place, varied
+from rsfstudy.plots._style import look
+from rsfstudy.plots._text import pretty, symbol
+from rsfstudy.reduce.base import stated_by
+from rsfstudy.vocabulary import quantity
+
+#: Most quantities that are shown, the headline among them, and most ticks of each.
+_MOST, _TICKS = 4, 3
+#: Points of a scatter; in a file of lines they are one image, since there may be 10^5 of them.
+_POINTS = {"marker": ".", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
+#: Bins of a histogram, at most.
+_BINS = 30
+
+
+def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
+    """A square of panels; none where no axis is numbered, or what is named lies along another."""
+    fields = _fields(dataset)
+    along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
+    if along is None or (variable is not None and not is_number(dataset[variable])):
+        return []
+    names = [variable] if variable else varied(dataset)[:1]
+    names += [name for name in fields[along] if is_numeric(dataset, name)][: _MOST - len(names)]
+    return [_panel(dataset, along, x, y) for y in names for x in names]
+
+
+def square(panels: Sequence[Panel]) -> int:
+    """Panels beside each other."""
+    return math.isqrt(len(panels))
+
+
+def _fields(dataset: xr.Dataset) -> dict[str, list[str]]:
+    """Fields along each axis whose points are numbered, by its dimension."""
+    found: dict[str, list[str]] = {}
+    for axis in declaration(dataset).axes:
+        if is_numbered(axis) and dataset.sizes.get(axis["dimension"], 1) > 1:
+            found[axis["dimension"]] = [n for n in map(str, axis["values"]) if n in dataset.coords]
+    return found
+
+
+def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
+    by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
+    if x == y:
+        marks: list[Draw] = [partial(_histogram, x, list(by)), _few_ticks]
+        return Panel(marks=marks, x_label=_label(dataset, x), y_label="Number", title="")
+    return Panel(
+        x=x,
+        y=y,
+        by=list(by),
+        points=True,
+        style=_POINTS,
+        marks=[_few_ticks],
+        title="",
+        x_label=_label(dataset, x),
+        y_label=_label(dataset, y),
+    )
+
+
+def _label(dataset: xr.Dataset, name: str) -> str:
+    """Symbol and units: panels are small."""
+    about = quantity(name, stated_by(dataset))
+    units = "" if about.units in ("", "1") or about.scale else f" ({pretty(about.units)})"
+    return f"{symbol(about)}{units}"
+
+
+def _few_ticks(_dataset: xr.Dataset, axes: Axes) -> None:
+    """A mark: ticks that do not touch each other."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(_TICKS))
+
+
+def _histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
+    """A mark: how often a value is met, at each point of other axes."""
+    values = dataset[name]
+    known = values.values[np.isfinite(values.values)]
+    edges = np.histogram_bin_edges(known, min(_BINS, max(5, round(known.size**0.5))))
+    for number, at in enumerate(np.ndindex(*(values.sizes[d] for d in by))):
+        part = values.isel(dict(zip(by, at, strict=True)))
+        text = ", ".join(place(part, d) for d in by) or None
+        style = {"color": look(number)["color"], "alpha": 0.5, "label": text}
+        axes.hist(part.values[np.isfinite(part.values)], list(edges), **style)
