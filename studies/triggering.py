@@ -169,10 +169,7 @@ def _found(trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: Meter
     if trigger is _FASTER and not settles(_undisturbed(scene)):
         text = "steady sliding at V_* is unstable already"
         return Outcome(Status.UNSTABLE_AT_ANY_STEP, message=text)
-    outcome, own = trigger.metered(scene, accuracy)
-    for regime, spent in own.by_regime.items():
-        meter.add(regime, spent)
-    return outcome
+    return trigger.charged(scene, accuracy, meter)
 
 
 def _undisturbed(scene: Scene) -> Scene:

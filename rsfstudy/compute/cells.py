@@ -167,7 +167,7 @@ def _received(sent: bytes) -> Task:
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
                 "mix. Give the workers the same versions"
             )
-    used = type(task.measure), *task.parts, *task.steppers
+    used = *task.measure.classes, *task.parts, *task.steppers
     if code_digest.of_classes(*used) != task.own_code:
         names = " or ".join(one.__name__ if isinstance(one, type) else one.name for one in used)
         raise RunError(

@@ -61,7 +61,9 @@ def fingerprint(study: Study) -> dict[str, Any]:
         "methods": [list(pair) for pair in study.accuracy.methods],
         "engine": study.accuracy.engine,
         **shared,
-        "physics": code_digest.with_measure(shared["physics"], type(study.measure)),
+        "physics": functools.reduce(
+            code_digest.with_measure, study.measure.classes, shared["physics"]
+        ),
     }
 
 

@@ -187,7 +187,7 @@ class Study:
     @cached_property
     def own_classes(self) -> tuple[type | Own, ...]:
         """The measure, and parts and stepper that are the user's own: what own code starts at."""
-        return type(self.measure), *self.own_parts.values(), *own_stepper(self.accuracy.engine)
+        return *self.measure.classes, *self.own_parts.values(), *own_stepper(self.accuracy.engine)
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:

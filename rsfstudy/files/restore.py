@@ -176,7 +176,9 @@ def measure(described: PlainMeasure, path: str) -> Measure:
     kinds = _kinds(Measure, measures, name)
     if name not in kinds:
         raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
-    given = kinds[name].restored_fields(values, path)
+    given = dict(kinds[name].restored_fields(values, path))
+    if isinstance(values.get("measure"), Mapping):
+        given["measure"] = measure(values.pop("measure"), f"{path}.measure")
     made: Measure = restored(values, kinds[name], path, **given)
     return made
 

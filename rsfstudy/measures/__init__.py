@@ -120,6 +120,11 @@ class Measure:
         return ()
 
     @property
+    def classes(self) -> tuple[type[Measure], ...]:
+        """Its class, and those of measures that it asks: their code decides its numbers."""
+        return (type(self),)
+
+    @property
     def typical_work(self) -> int:
         """Right-hand sides one cell usually takes at the default accuracy."""
         raise TypeError(f"{type(self).__name__} states no typical work")
@@ -194,7 +199,7 @@ class Measure:
             raise InvalidValue("measure", type(self).__name__, rule) from error
 
     def _check_names(self) -> None:
-        for name in ("__call__", "metered"):
+        for name in ("__call__", "charged", "metered"):
             if getattr(type(self), name) is not getattr(Measure, name):
                 rule, remedy = f"has a {name} of its own", "Write find: what it gives is checked."
                 raise InvalidValue("measure", self.name, rule, remedy=remedy)
@@ -247,6 +252,15 @@ class Measure:
         outcome, meter = self.metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.spent > meter.budget:
             return replace(outcome, message=outcome.message + more_work(meter.budget))
+        return outcome
+
+    def charged(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """The outcome of `__call__`, for a measure that asks this one: its work is added to that of
+        the other.
+        """
+        outcome, own = self.metered(scene, accuracy)
+        for regime, spent in own.by_regime.items():
+            meter.add(regime, spent)
         return outcome
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:

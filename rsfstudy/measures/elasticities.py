@@ -1,0 +1,195 @@
+"""Elasticities: per cent by which a number changes where a number of its scene changes by one."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.quantity import Output, Quantity
+from rsfstudy.slider.registry import KINDS
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Fields of a scene that hold numbers.
+NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (float, float | None))
+#: Longest step of ln p.
+_LONGEST = 0.1
+#: How many numbers a scene usually has that are not zero.
+_USUAL = 8
+
+
+class _Level(NamedTuple):
+    """ln|y| and its error, which is that of y over |y|."""
+
+    value: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Elasticities(Measure):
+    """The headline y of a measure with its elasticities, d ln|y|/d ln p by each number p of the
+    scene, all others held: 2 where y doubles twice as p doubles once.
+
+    They are central differences over a step of ln p that balances what is left out with the error
+    of y, which the measure tells: h = (3 e)^(1/3). The error estimate adds both: e/h, and h^2/3
+    times the third power of a scale of ln y on which it curves, as a logarithm does that ends at a
+    boundary. Where only one side has a number, as at the critical stiffness, the difference is
+    one-sided, and its error larger by that. There are two measurements of each number and one more.
+
+    Parameters
+    ----------
+    measure : Measure
+    parameters : sequence of str
+        Numbers of the scene, along the dimension ``parameter``; by default all that the measure
+        does not solve for. NaN stands for one that a scene does not have, or that is zero there.
+    """
+
+    measure: Measure
+    parameters: tuple[str, ...] = ()
+    name: ClassVar[str] = "elasticities"
+    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    dimensions: ClassVar[Sequence[Quantity]] = (
+        Quantity("parameter", "", "", "number of the scene that is changed"),
+    )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.measure, Measure) or self.measure.variables[self.measure.headline]:
+            rule = "must be a measure whose headline is one number"
+            raise InvalidValue("measure", self.measure, rule)
+        object.__setattr__(self, "parameters", tuple(self.parameters) or self._all)
+        for name in self.parameters:
+            if name not in self._all:
+                rule = f"is no number of a scene that {self.measure.name} leaves as it is"
+                raise InvalidValue("parameters", name, rule, choices=self._all)
+
+    @cached_property
+    def _all(self) -> tuple[str, ...]:
+        return tuple(name for name in NUMBERS if name not in self.measure.sought)
+
+    @property
+    def headline(self) -> str:
+        return self.measure.headline
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        given = {about.name: about for about in self.measure.outputs}
+        headline = given.get(self.headline, Output(self.headline))
+        text = f"d ln|y|/d ln p of {self.headline.replace('_', ' ')}"
+        return (
+            replace(headline, error=True),
+            Output("elasticity", "", "1", text, dims=("parameter",), error=True),
+        )
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"parameter": np.array(self.parameters, dtype=object)}
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        return self.measure.sought
+
+    @property
+    def classes(self) -> tuple[type[Measure], ...]:
+        return (*super().classes, *self.measure.classes)
+
+    @property
+    def typical_work(self) -> int:
+        return self.measure.typical_work * (2 * min(_USUAL, len(self.parameters)) + 1)
+
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        return self.measure.work_by_digits
+
+    def describe(self) -> dict[str, Any]:
+        """The measure as plain data."""
+        return {
+            "name": self.name,
+            "measure": self.measure.describe(),
+            "parameters": list(self.parameters),
+        }
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Measure once, and on both sides of each number."""
+        outcome = self.measure.charged(scene, accuracy, meter)
+        if outcome.status is not Status.OK:
+            return Outcome(outcome.status, message=outcome.message)
+        y, error = self._numbers(outcome)
+        values: dict[str, Value] = {self.headline: y, f"{self.headline}_error": error}
+        if y == 0.0:
+            why = f"{self.headline} is zero, which has no logarithm"
+            return Outcome(Status.NOT_APPLICABLE, values, why)
+        here = _level(y, error)
+        step = min(_LONGEST, (3.0 * here.error) ** (1.0 / 3.0))
+        found = np.full((len(self.parameters), 2), np.nan)
+        lacking = []
+        for place, name in enumerate(self.parameters):
+            if not scene.as_dict().get(name):
+                continue
+            sides = [self._at(scene, name, by, accuracy, meter) for by in (-step, step)]
+            found[place] = _derivative(here, sides, step)
+            if np.isnan(found[place, 0]):
+                lacking.append(name)
+        values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
+        why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
+        return Outcome(Status.OK, values, why)
+
+    def _at(
+        self, scene: Scene, name: str, by: float, accuracy: Accuracy, meter: Meter
+    ) -> _Level | None:
+        """ln|y| where ln p is larger by a step; None where the answer there is no number.
+
+        Raises
+        ------
+        Halt
+            Where it failed there.
+        """
+        try:
+            beside = scene.with_(**{name: getattr(scene, name) * math.exp(by)})
+        except InvalidValue:
+            return None
+        outcome = self.measure.charged(beside, accuracy, meter)
+        if not outcome.status.is_answer:
+            raise Halt(
+                outcome.status, f"at {name} = {getattr(beside, name):.9g}: {outcome.message}"
+            )
+        y, error = self._numbers(outcome) if outcome.status is Status.OK else (0.0, 0.0)
+        return _level(y, error) if y else None
+
+    def _numbers(self, outcome: Outcome) -> tuple[float, float]:
+        """The headline, and its error; that of rounding where none is told."""
+        y = float(outcome.values[self.headline])
+        return y, float(outcome.values.get(f"{self.headline}_error", 0.0))
+
+
+def _level(y: float, error: float) -> _Level:
+    """ln|y| with the error of y, and what rounding leaves of it, of y and of p."""
+    value = math.log(abs(y))
+    return _Level(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
+
+
+def _derivative(here: _Level, sides: Sequence[_Level | None], step: float) -> tuple[float, float]:
+    """The derivative of ln|y| by ln p, and its error, from levels below and above, as far as there
+    are any.
+    """
+    below, above = sides
+    if below and above:
+        slope = (above.value - below.value) / (2.0 * step)
+        curved = abs(above.value - 2.0 * here.value + below.value) / step**2
+        left_out = step**2 / 3.0 * max(1.0, curved) ** 1.5
+        return slope, left_out + (above.error + below.error) / (2.0 * step)
+    for beside, sign in ((below, -1.0), (above, 1.0)):
+        if beside:
+            slope = sign * (beside.value - here.value) / step
+            # how it curves is not known: twice as much as a logarithm of that slope
+            return slope, step * max(1.0, slope**2) + (beside.error + here.error) / step
+    return math.nan, math.nan

@@ -1,0 +1,165 @@
+"""Elasticities are held to closed forms, and know their errors."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from running import run
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import restore
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.elasticities import Elasticities
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import Output
+from rsfstudy.status import Status
+
+#: Where boundaries have closed forms that the norm does not show in.
+SCENE = Scene(law="slip", normal_stress="constant", b_over_a=3.0)
+COMPILED = Accuracy(engine="compiled")
+
+
+def told(measure, scene=SCENE, accuracy=COMPILED):
+    found = measure(scene, accuracy)
+    assert found.status is Status.OK, found.message
+    pairs = zip(found.values["elasticity"], found.values["elasticity_error"], strict=True)
+    return dict(zip(measure.parameters, pairs, strict=True)), found
+
+
+@pytest.mark.parametrize(
+    ("measure", "exact"),
+    [
+        # D_c a/(b - a), of r = b/a: 1/(r - 1)
+        (CriticalStep("displacement_step"), {"b_over_a": -1.5, "a": 0.0, "mu_star": 0.0}),
+        # 1 + a/(b - a) = r/(r - 1)
+        (CriticalStep(), {"b_over_a": -0.5, "a": 0.0, "instability_norm": 0.0}),
+        # (b - a) sigma/D_c
+        (LinearStability(), {"b_over_a": 1.5, "a": 1.0, "mu_star": 0.0, "period": 0.0}),
+    ],
+)
+def test_closed_forms(measure, exact):
+    """Within their error estimates, and those are small: errors of 1e-9 leave 1e-6."""
+    found, outcome = told(Elasticities(measure))
+    for name, value in exact.items():
+        elasticity, error = found[name]
+        assert abs(elasticity - value) <= error <= 1e-5
+    lacking = {name for name, (elasticity, _error) in found.items() if math.isnan(elasticity)}
+    assert {"alpha", "phi", "displacement_step", "stiffness"} - set(measure.sought) <= lacking
+    assert outcome.values[measure.headline] == measure(SCENE, COMPILED).values[measure.headline]
+
+
+def test_at_the_critical_stiffness_there_is_one_side():
+    """Below it any step triggers: the difference is one-sided, and its error says so. It is held to
+    one of the second order.
+    """
+    found, _outcome = told(Elasticities(CriticalStep(), parameters=("stiffness_ratio",)))
+    elasticity, error = found["stiffness_ratio"]
+    at = [
+        CriticalStep()(SCENE.with_(stiffness_ratio=math.exp(n * 0.004)), COMPILED) for n in range(3)
+    ]
+    y = [math.log(outcome.values["critical_velocity_ratio"]) for outcome in at]
+    assert elasticity == pytest.approx((4.0 * y[1] - 3.0 * y[0] - y[2]) / 0.008, abs=error)
+    assert 1e-4 < error < 0.01
+
+
+@dataclass(frozen=True)
+class Known(Measure):
+    """y = a^2 exp(-mu_star)/(b/a - 1), with an error that is stated, and made."""
+
+    error: float = 0.0
+    name: ClassVar[str] = "known"
+    headline = "y"
+    typical_work = 1
+    outputs = (Output("y", "", "1", "known", error=True),)
+    asked: ClassVar[list[Scene]] = []
+
+    def find(self, scene, accuracy, meter):
+        self.asked.append(scene)
+        if scene.mu_star > 0.9:
+            return Outcome(Status.WORK_BUDGET_SPENT, message="too far")
+        if scene.mu_star < 0.1:
+            return Outcome(Status.NO_LIMIT_CYCLE)
+        y = scene.a**2 * math.exp(-scene.mu_star) / (scene.b_over_a - 1.0)
+        made = y * (1.0 + self.error * math.sin(1e9 * y))
+        return Outcome(Status.OK, {"y": made, "y_error": self.error * y})
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_steps_know_the_error_of_the_number(error):
+    """At most 2 n + 1 measurements; every elasticity is within its error estimate, which goes with
+    the error to the power of two thirds: at most twice the least a central difference allows.
+    """
+    Known.asked.clear()
+    found, _outcome = told(Elasticities(Known(error)), SCENE)
+    numbers = sum(not math.isnan(elasticity) for elasticity, _error in found.values())
+    assert len(Known.asked) == 2 * numbers + 1
+    for name, exact in {"a": 2.0, "mu_star": -0.6, "b_over_a": -1.5, "period": 0.0}.items():
+        elasticity, estimate = found[name]
+        exact = -SCENE.mu_star if name == "mu_star" else exact
+        assert abs(elasticity - exact) <= estimate
+        # rounding: a few parts of 2.2e-16, of y and of its logarithm, which is 10
+        assert estimate <= 4.0 * max(error, 2e-14) ** (2.0 / 3.0)
+
+
+def test_ends_without_elasticities():
+    measure = Elasticities(Known())
+    assert measure(SCENE.with_(mu_star=0.95), COMPILED).status is Status.WORK_BUDGET_SPENT
+    beside = measure(SCENE.with_(mu_star=0.9), COMPILED)
+    assert beside.status is Status.WORK_BUDGET_SPENT
+    assert beside.message.startswith("at mu_star = 0.900")
+    assert measure(SCENE.with_(mu_star=0.05), COMPILED).status is Status.NO_LIMIT_CYCLE
+    # at the edge of answers with a number one side is left
+    found, _outcome = told(measure, SCENE.with_(mu_star=0.1))
+    elasticity, error = found["mu_star"]
+    assert abs(elasticity + 0.1) <= error < 1e-4
+
+
+def test_a_study_of_elasticities():
+    """In the file they lie along the dimension `parameter`; the declaration brings all back."""
+    measure = Elasticities(LinearStability(), parameters=("a", "b_over_a"))
+    study = Study(
+        name="felt", title="Felt", base=SCENE, axes=[Axis("b_over_a", [2.0, 3.0])], measure=measure
+    )
+    found = run(study)
+    assert found["elasticity"].dims == ("b_over_a", "parameter")
+    assert found["elasticity"].sel(parameter="b_over_a").values == pytest.approx([2.0, 1.5])
+    assert np.isfinite(found["elasticity_error"]).all()
+    again = restore.study_of(found)
+    assert again.measure == measure
+    assert again.describe() == study.describe()
+
+
+def test_what_a_measure_asks_decides_its_numbers_too():
+    """Own code within it is named in the fingerprint, and must be the same on workers."""
+    from rsfstudy.compute import provenance
+
+    axes = [Axis("b_over_a", [2.0, 3.0])]
+    measure = Elasticities(Known(), parameters=("a",))
+    study = Study(name="felt", title="Felt", base=SCENE, axes=axes, measure=measure)
+    assert study.own_classes[:2] == (Elasticities, Known)
+    assert provenance.fingerprint(study)["own_code"] != "none"
+
+
+class Curve(Known):
+    """A headline along an inner dimension."""
+
+    variables: ClassVar[dict[str, tuple[str, ...]]] = {"y": ("phase",)}
+
+
+def test_what_has_no_elasticities():
+    for given, message in (
+        ({"measure": CriticalStep(), "parameters": ("law",)}, "parameters = 'law': is no number"),
+        (
+            {"measure": CriticalStep(), "parameters": ("load_velocity_ratio",)},
+            "parameters = 'load_velocity_ratio': is no number of a scene that critical_step leaves",
+        ),
+        ({"measure": Curve()}, "measure = .*headline is one number"),
+        ({"measure": "critical_step"}, "measure = 'critical_step': must be a measure"),
+    ):
+        with pytest.raises(InvalidValue, match=message):
+            Elasticities(**given)
