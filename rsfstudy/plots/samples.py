@@ -57,7 +57,7 @@ def _fields(dataset: xr.Dataset) -> dict[str, list[str]]:
 def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
     by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
     if x == y:
-        marks: list[Draw] = [partial(_histogram, x, list(by)), _few_ticks]
+        marks: list[Draw] = [partial(histogram, x, list(by)), _few_ticks]
         return Panel(marks=marks, x_label=_label(dataset, x), y_label="Number", title="")
     return Panel(
         x=x,
@@ -85,7 +85,7 @@ def _few_ticks(_dataset: xr.Dataset, axes: Axes) -> None:
         axis.set_major_locator(MaxNLocator(_TICKS))
 
 
-def _histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
+def histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
     """A mark: how often a value is met, at each point of other axes."""
     values = dataset[name]
     known = values.values[np.isfinite(values.values)]
