@@ -138,9 +138,9 @@ class LimitCycle(Recorded):
             approach = Approach(scene, replace(accuracy, rtol=rtol), meter)
             try:
                 found = approach.follow(self.events)
-            except Halt as halt:
-                # what cannot go on loosely may be able to as asked
-                if rtol == accuracy.rtol or halt.status is Status.WORK_BUDGET_SPENT:
+            except Halt:
+                # what cannot go on loosely, or does not repeat so within its events, may as asked
+                if rtol == accuracy.rtol or meter.spent > meter.budget:
                     raise
                 continue
             if found:
