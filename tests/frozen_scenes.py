@@ -125,6 +125,12 @@ MASS, MORE_MASS = {"inertia": True}, {"inertia": True, "period": 5e3}
 DAMPING = {"radiation_damping": 1e-3}
 UP = {"load_velocity_ratio": 2.0, "stiffness_ratio": 1.3}
 SLIPS = {"load_velocity_ratio": 2.0, "stiffness_ratio": 0.8}
+WAVES = {
+    "oscillation_period": 3.0,
+    "oscillation_begin": 1.0,
+    "oscillation_phase": 30.0,
+    "oscillation_cycles": 1.25,
+}
 SINE = {"oscillation_amplitude": 0.05, "oscillation_period": 8.0, "load_velocity_ratio": 1.5}
 RAMP = {"normal_stress_ramp": 0.1, "ramp_duration": 4.0, "load_velocity_ratio": 1.5}
 BACK = {
@@ -338,6 +344,22 @@ MOTIONS: dict[str, Motion | Track] = {
     ),
     "slip, oscillation": Motion(
         {"law": "slip", **VARIABLE, "stiffness_ratio": 2.5, **SINE}, (*READ, *EXTREMA[2:]), rows=8
+    ),
+    "slowness, train": Motion(
+        {
+            "law": "slowness",
+            **IMPOSED,
+            "stiffness_ratio": 1.5,
+            "oscillation_amplitude": 0.05,
+            **WAVES,
+        },
+        READ,
+        rows=4,
+    ),
+    "slip, train of the load point": Motion(
+        {"law": "slip", **VARIABLE, "stiffness_ratio": 2.5, "velocity_oscillation": 0.5, **WAVES},
+        READ,
+        rows=4,
     ),
     "slip, ramp": Motion({"law": "slip", **VARIABLE, "stiffness_ratio": 2.0, **RAMP}, READ),
     "slowness, ramp": Motion(

@@ -27,7 +27,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fluid
 from rsfstudy.slider.parts import names_of
 from rsfstudy.slider.protocol import Stated
-from rsfstudy.slider.registry import SLOTS, Own, by_class, kinds_with
+from rsfstudy.slider.registry import IF_STATED, SLOTS, Own, by_class, kinds_with
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES
@@ -246,7 +246,7 @@ def scene(
     """
     parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Stated)]
     kinds = kinds_with(parts)
-    values = {**_OLDER, **plain}
+    values = {**dict.fromkeys(IF_STATED), **_OLDER, **plain}
     _check_names(values, kinds, path)
     values = {name: fit(values[name], kind, f"{path}.{name}") for name, kind in kinds.items()}
     try:

@@ -227,6 +227,12 @@ class NormalStressResponse(Recorded):
         loading = scene.parts.loading
         if not isinstance(loading, Oscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
+        if len(loading.segments) > 1:
+            rule = (
+                "begins later or ends: the response is that to an oscillation that goes on for ever"
+            )
+            remedy = "Leave out oscillation_begin and oscillation_cycles, or read it by simulate."
+            raise InvalidValue("loading", loading.name, rule, remedy=remedy)
         if not scene.load_velocity or steady_sliding(scene, scene.log_load_rate) is None:
             why = "the load point is held, or steady sliding is not possible at its velocity"
             return Outcome(Status.NO_STEADY_STATE, message=why)

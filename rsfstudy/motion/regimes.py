@@ -57,10 +57,17 @@ def starting(scene: Scene) -> Point:
     psis, log_rate = steady_states_of(scene, 0.0, 0.0), 0.0
     if scene.begins_elsewhere:
         psis, log_rate = _stated(scene, psis)
-    begun = scene.parts.loading.beginning
-    psis = (*psis[: len(psis) - len(begun)], *begun)
+    psis = _with_beginning(scene, psis)
     stepped = on_slow_manifold(scene, scene.initial_stress + scene.spring_stress_step, psis)
     return at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
+
+
+def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:
+    """States with those of the loading, behind those of the law, as it begins with them; without
+    those of a loading that has ended.
+    """
+    begun, of_law = scene.parts.loading.beginning, scene.parts.law.states
+    return (*psis[:of_law], *begun, *psis[of_law + len(begun) : scene.states])
 
 
 def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
@@ -81,16 +88,15 @@ def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
 
 
 def jumped(scene: Scene, point: Point) -> Point:
-    """A point of a motion the instant after a step of the load point or of imposed normal stress:
-    states stay, and with mass slip rate does.
+    """A point of a motion the instant after a step of the load point or of imposed normal stress,
+    or where an oscillation begins or ends: states stay, and with mass slip rate does.
 
     Raises
     ------
     Halt
         As `starting` does.
     """
-    # a loading may have had unknowns in the segment before
-    psis = point.psis[: scene.states]
+    psis = _with_beginning(scene, point.psis)
     after = point._replace(spring=point.spring + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
     return at_rate(scene, after, point.log_rate) if scene.has_mass else after

@@ -102,10 +102,15 @@ def number(
     rule: str = "",
     remedy: str = "",
     scale: str = "",
+    if_stated: bool = False,
 ) -> Any:
-    """A field that holds a number: its default, what it means, and its rule, a key of `RULES`."""
+    """A field that holds a number: its default, what it means, and its rule, a key of `RULES`; and
+    whether it is among the values of a scene only if it was stated. What came later than files that
+    are to keep their names is so.
+    """
     about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
-    return field(default=default, metadata={"about": about, "rule": rule, "remedy": remedy})
+    metadata = {"about": about, "rule": rule, "remedy": remedy, "if_stated": if_stated}
+    return field(default=default, metadata=metadata)
 
 
 def flag(default: bool, long_name: str) -> Any:

@@ -95,6 +95,12 @@ FIELDS: tuple[str, ...] = tuple(
         [*(slot.name for slot in NAMED), *(n for part in _EVERY_PART for n in names_of(part))]
     )
 )
+#: Those that are among the values of a scene only if they were stated.
+IF_STATED: frozenset[str] = frozenset(
+    name
+    for name, part in OWNERS.items()
+    if part.__dataclass_fields__[name].metadata.get("if_stated")
+)
 #: Those that name what fills a slot.
 SLOT_FIELDS: frozenset[str] = frozenset(slot.name for slot in NAMED)
 #: What names a part of the user's own in each slot.

@@ -112,6 +112,14 @@ class Scene(ShownAsTable):
         Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
         that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
         stress; that of sigma_3 where a driving stress is inclined). Zero is none.
+    oscillation_begin, oscillation_phase, oscillation_cycles : float, optional
+        Time in D_c/V_* at which an oscillation begins, of normal stress or of the load point, angle
+        in degrees by which it is ahead of a sine then, and number of cycles after which it ends,
+        whole or not. Default: it begins at once, as a sine, and goes on for ever.
+    velocity_oscillation, velocity_oscillation_stairs : float, optional
+        Amplitude of an oscillation of load point velocity, over its mean at `load_velocity_ratio`,
+        of the period, begin, phase and (to be stated) number of cycles above, and number of stairs
+        that stand for each of them (64).
     normal_stress_ramp, ramp_duration : float
         Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
         takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of
@@ -218,7 +226,9 @@ class Scene(ShownAsTable):
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
-        return {name: values[name] for name in self.layout.fields}
+        silent = registry.IF_STATED
+        kept = (n for n in self.layout.fields if n not in silent or values[n] is not None)
+        return {name: values[name] for name in kept}
 
     def describe(self) -> dict[str, Any]:
         """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or

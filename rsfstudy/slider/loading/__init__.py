@@ -136,8 +136,8 @@ class Loading(Part):
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
-        callers = {p.called_by for p in PARTS.values() if name in p.__dataclass_fields__} - {name}
-        wanted = " or ".join(filter(None, callers))
+        owners = (p for p in PARTS.values() if name in p.__dataclass_fields__)
+        wanted = " or ".join(p.called_by for p in owners if p.called_by not in ("", name))
         remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
         return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy=remedy)
 

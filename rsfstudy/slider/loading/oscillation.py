@@ -1,14 +1,16 @@
-"""Oscillating normal stress: what the rig, a tide or a passing wave imposes, for ever."""
+"""Oscillating normal stress: what the rig, a tide or a passing wave imposes, for ever or for some
+cycles.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
+from rsfstudy.slider.loading import Loading, Segment, _train, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
@@ -47,9 +49,9 @@ def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Oscillation(Loading):
-    """Imposed normal stress ``sigma_* [1 + A sin(2 pi t/T_o)]`` from steady sliding on, and load
-    point velocity (V_* unless stated).
+class Oscillation(_train.Train):
+    """Imposed normal stress ``sigma_* [1 + A sin(2 pi (t - t_b)/T_o + phase)]`` from t_b on, for
+    some cycles or for ever, and load point velocity (V_* unless stated).
     """
 
     oscillation_amplitude: float = number(
@@ -61,15 +63,11 @@ class Oscillation(Loading):
         remedy="0 is no oscillation.",
         scale="sigma_*",
     )
-    oscillation_period: float = number(
-        10.0,
-        r"$T_o V_*/D_c$",
-        "1",
-        "period of the oscillation of imposed normal stress",
-        rule="must be greater than 0",
-        scale="D_c/V_*",
-    )
+    oscillation_period: float = _train.period()
     load_velocity_ratio: float | None = last_velocity()
+    oscillation_begin: float | None = _train.begin()
+    oscillation_phase: float | None = _train.phase()
+    oscillation_cycles: float | None = _train.cycles()
 
     name = "oscillation"
     called_by = "oscillation_amplitude"
@@ -84,31 +82,33 @@ class Oscillation(Loading):
         """Normal stress that stays positive, slow enough where there is no mass, and is not that of
         a fluid too.
         """
-        amplitude, period = self.oscillation_amplitude, self.oscillation_period
+        amplitude = self.oscillation_amplitude
         if amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
             raise InvalidValue(
                 "oscillation_amplitude", amplitude, "must be less than 1", remedy=remedy
             )
         refuse_fluid(scene, "oscillation_amplitude", amplitude)
-        free = 2.0 * math.pi * scene.inertial_time
-        if period < free and not scene.has_mass:
-            raise InvalidValue(
-                "oscillation_period",
-                period,
-                f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters",
-                remedy="Set inertia=True, or give a longer one.",
-            )
+        super().check(scene)
 
     @property
-    def segments(self) -> tuple[Segment, ...]:
-        """One, for ever."""
-        return (Segment(1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio),)
+    def jumps(self) -> list[bool]:
+        """Its unknowns are those of itself alone, and its phase is one at once."""
+        return [True] * len(self.segments)
+
+    def alone(self, number: int) -> Loading | Segment:
+        segments = self.segments
+        if number % len(segments) != bool(self.oscillation_begin):
+            return segments[number]
+        if len(segments) == 1:
+            return self
+        return replace(self, oscillation_begin=None, oscillation_cycles=None)
 
     @property
     def beginning(self) -> Numbers:
-        """y = A, and imposed normal stress as in steady sliding."""
-        return self.oscillation_amplitude, 0.0
+        """y and P of its phase."""
+        amplitude, angle = self.oscillation_amplitude, self.angle
+        return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
     def numbers(self, scene: Scene) -> Numbers:
         """omega D_c/V_*, and A."""

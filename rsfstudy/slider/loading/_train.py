@@ -1,0 +1,114 @@
+"""A train of waves: what oscillations of normal stress and of the load point share.
+
+It begins as ``sin(2 pi (t - t_b)/T_o + phase)`` at the time t_b, and ends after some cycles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import number
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
+
+
+def period() -> Any:
+    """The field of the period."""
+    return number(
+        10.0,
+        r"$T_o V_*/D_c$",
+        "1",
+        "period of the oscillation of imposed normal stress",
+        rule="must be greater than 0",
+        scale="D_c/V_*",
+    )
+
+
+def begin() -> Any:
+    """The field of the time at which it begins."""
+    return number(
+        None,
+        r"$t_b V_*/D_c$",
+        "1",
+        "time at which the oscillation begins",
+        rule="must be 0 or greater",
+        remedy="0 is at once.",
+        scale="D_c/V_*",
+        if_stated=True,
+    )
+
+
+def phase() -> Any:
+    """The field of the phase."""
+    about = "angle by which the oscillation is ahead of a sine where it begins"
+    return number(None, r"$\phi_o$", "degree", about, if_stated=True)
+
+
+def cycles() -> Any:
+    """The field of the number of cycles."""
+    return number(
+        None,
+        "$N_o$",
+        "1",
+        "number of cycles after which the oscillation ends",
+        rule="must be greater than 0",
+        remedy="Leave it out for one that goes on for ever.",
+        if_stated=True,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train(Loading):
+    """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated."""
+
+    if TYPE_CHECKING:
+        oscillation_period: float
+        oscillation_begin: float | None
+        oscillation_phase: float | None
+        oscillation_cycles: float | None
+        load_velocity_ratio: float | None
+
+    def check(self, scene: Scene) -> None:
+        """Slow enough where there is no mass."""
+        free = 2.0 * math.pi * scene.inertial_time
+        if self.oscillation_period < free and not scene.has_mass:
+            raise InvalidValue(
+                "oscillation_period",
+                self.oscillation_period,
+                f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters",
+                remedy="Set inertia=True, or give a longer one.",
+            )
+
+    @property
+    def mean_velocity(self) -> float:
+        """V_0/V_*, but for what oscillates."""
+        return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
+
+    @property
+    def angle(self) -> float:
+        """Phase where it begins."""
+        return math.radians(self.oscillation_phase or 0.0)
+
+    @property
+    def waves(self) -> Iterator[Segment]:
+        """The segments that oscillate."""
+        yield Segment(self.mean_velocity, duration=self.lasts)
+
+    @property
+    def lasts(self) -> float:
+        """How long it oscillates."""
+        cycles = self.oscillation_cycles
+        return math.inf if cycles is None else cycles * self.oscillation_period
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """What is before it, itself, and what follows."""
+        steady, begin = Segment(self.mean_velocity), self.oscillation_begin
+        before = [steady._replace(duration=begin)] if begin else []
+        return (*before, *self.waves, *([steady] if self.lasts < math.inf else []))

@@ -1,0 +1,216 @@
+"""Trains of waves: oscillations of normal stress and of the load point that begin, have a phase,
+and end; held to their sine, to linear theory and to what a record of them does.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rsfstudy import Scene, history, simulate
+from rsfstudy.compute.plan import cell_key
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.slider.laws import PARTS as LAWS
+
+IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
+#: A train that begins later, with a jump, and ends with another.
+BEGIN, PERIOD, CYCLES, PHASE = 3.0, 8.0, 2.25, 30.0
+TRAIN = {
+    "oscillation_begin": BEGIN,
+    "oscillation_period": PERIOD,
+    "oscillation_cycles": CYCLES,
+    "oscillation_phase": PHASE,
+}
+END = BEGIN + CYCLES * PERIOD
+STABLE = {"law": "slowness", "stiffness_ratio": 2.0}
+
+
+def wave(time, phase=PHASE):
+    """The sine, and nothing before and after it."""
+    angle = 2.0 * np.pi * (time - BEGIN) / PERIOD + math.radians(phase)
+    return np.where((time > BEGIN) & (time < END), np.sin(angle), 0.0)
+
+
+def all_laws():
+    """Scenes of all laws, all dynamics, and normal stress that follows shear stress or does not."""
+    for law in LAWS:
+        of_law = {"b1_over_a": 1.5} if law.startswith("two") else {}
+        yield {"law": law, "stiffness_ratio": 2.0, **of_law, **IMPOSED}
+    yield {**STABLE, **IMPOSED, "inertia": True}
+    yield {**STABLE, **IMPOSED, "radiation_damping": 1e-3}
+    yield {**STABLE, "normal_stress": "variable", "alpha": 0.3}
+
+
+@pytest.mark.parametrize("slider", [*all_laws()], ids=lambda s: "-".join(map(str, s.values())))
+def test_normal_stress_is_on_its_sine(slider):
+    """Where it begins and ends two rows of one time hold what is before and behind the jump."""
+    motion = simulate(Scene(**slider, oscillation_amplitude=0.02, **TRAIN), engine=COMPILED)
+    time = motion.time.values
+    within = np.minimum(abs(time - BEGIN), abs(time - END)) > 1e-9
+    expected = 1.0 + 0.02 * wave(time)
+    if slider["normal_stress"] == "variable":
+        cot_phi = 1.0 / math.tan(math.radians(60.0))
+        expected += cot_phi * (motion.frictional_stress.values - 0.76)
+    off = abs(motion.normal_stress_ratio.values - expected)
+    assert off[within].max() < 1e-8  # ten times the accuracy of the amplitude
+    assert time[-1] > END
+    assert (~within).sum() == 4
+
+
+def linear(scene, times, stress, velocity):
+    """Spring stress in small departures of the slowness law from steady sliding at V_*.
+
+    a x = f - psi - (mu_* - alpha) sigma,  df/dt = K (v_0 - x),  dpsi/dt = -(Theta + b x), psi being
+    Theta + alpha ln(sigma).
+    """
+    state = scene.alpha if stress else 0.0
+    drive = scene.mu_star - state
+
+    def rate(t, y):
+        now = float(wave(np.array(t)))
+        x = (y[0] - y[1] - drive * stress * now) / scene.a
+        healed = y[1] - state * stress * now + scene.b * x
+        return scene.stiffness * (velocity * now - x), -healed
+
+    found, y = [], np.zeros(2)
+    for begin, end in ((0.0, BEGIN), (BEGIN, END), (END, times[-1])):
+        at = times[(times > begin) & (times <= end)]
+        at = np.append(at, end) if not len(at) or at[-1] < end else at
+        # nothing of the jump at either end
+        inside = np.clip(at, begin + 1e-9, end - 1e-9)
+        run = solve_ivp(
+            rate, (begin + 1e-9, end - 1e-9), y, "DOP853", inside, rtol=1e-10, atol=1e-16
+        )
+        y = run.y[:, -1]
+        found.append(run.y[0, : ((times > begin) & (times <= end)).sum()])
+    return np.concatenate(found)
+
+
+TIMES = np.linspace(0.5, 40.0, 80)
+SMALL = 1e-5
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_small_trains_of_normal_stress_are_answered_linearly(engine):
+    """With the second order of the amplitude left, which A mu_*/a times as much bounds."""
+    scene = Scene(**STABLE, **IMPOSED, oscillation_amplitude=SMALL, **TRAIN)
+    spring = simulate(scene, times=TIMES, rtol=1e-10, engine=engine).shear_stress - scene.mu_star
+    expected = linear(scene, TIMES, SMALL, 0.0)
+    assert abs(spring - expected).max() < SMALL * 0.76 / scene.a * abs(expected).max()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_small_trains_of_the_load_point_are_answered_linearly(engine):
+    """By (pi/n)**2/3 less, and in steps of 1/n of a cycle, whose curvature (pi/n)**2/2 bounds."""
+    of = {"velocity_oscillation": SMALL, "velocity_oscillation_stairs": 200.0, **TRAIN}
+    scene = Scene(**STABLE, normal_stress="constant", **of)
+    motion = simulate(scene, times=TIMES, rtol=1e-10, engine=engine)
+    expected = linear(scene, TIMES, 0.0, SMALL)
+    off = abs(motion.shear_stress - scene.mu_star - expected).max()
+    assert off < (math.pi / 200.0) ** 2 * abs(expected).max()
+    moved = motion.load_point_displacement.values - TIMES
+    turn, angle = 2.0 * np.pi / PERIOD, math.radians(PHASE)
+    at = np.clip(TIMES, BEGIN, END) - BEGIN
+    exact = SMALL / turn * (math.cos(angle) - np.cos(turn * at + angle))
+    assert abs(moved - exact).max() < (math.pi / 200.0) ** 2 * SMALL / turn
+    assert moved[-1] == pytest.approx(exact[-1], rel=1e-6)  # at the end of the last stair
+
+
+@pytest.mark.parametrize("dynamics", [{"inertia": True}, {"radiation_damping": 1e-6}])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+@pytest.mark.parametrize("of", ["normal_stress", "velocity"])
+def test_a_record_of_whole_cycles_moves_the_slider_alike(of, law, dynamics):
+    """Ruptures included. Linear between n samples a cycle, it is off by (pi/n)**2/2 of itself."""
+    n, lasts, begin = 400, 2.0 * PERIOD, {"oscillation_begin": BEGIN, "oscillation_cycles": 2.0}
+    slider = {"law": law, "stiffness_ratio": 0.7, "normal_stress": "constant", **dynamics}
+    time = np.append(0.0, BEGIN + np.linspace(0.0, lasts, 2 * n + 1))
+    angle = 2.0 * np.pi * np.maximum(time - BEGIN, 0.0) / PERIOD
+    if of == "normal_stress":
+        slider |= IMPOSED
+        train = {"oscillation_amplitude": 0.05}
+        record = {"time": time, "normal_stress": 1.0 + 0.05 * np.sin(angle)}
+    else:
+        train = {"velocity_oscillation": 0.5, "velocity_oscillation_stairs": float(n)}
+        moved = time + 0.5 * PERIOD / (2.0 * np.pi) * (1.0 - np.cos(angle))
+        at_last = time[-1] + 1.0, moved[-1] + 1.0
+        record = {"time": np.append(time, at_last[0]), "displacement": np.append(moved, at_last[1])}
+    one = Scene(**slider, **train, **begin, oscillation_period=PERIOD)
+    other = Scene(**slider, loading=history(record))
+    at = np.linspace(1.0, 25.0, 60)
+    one, other = (
+        simulate(s, times=at, rtol=1e-9, engine=COMPILED).shear_stress.values for s in (one, other)
+    )
+    assert np.ptp(one) > 0.01
+    # what is off in stress moves a rupture in time, by as much of a cycle: times its slope
+    assert np.median(abs(one - other)) < (math.pi / n) ** 2 * np.ptp(one)
+
+
+def test_slip_rate_jumps_where_it_begins():
+    """By (mu_* - alpha) A sin(phase)/a less, to first order in A; with mass too, where that has
+    settled: a jump as small never leaves the slow manifold.
+    """
+    for inertia in (False, True):
+        fields = {**STABLE, **IMPOSED, **TRAIN, "inertia": inertia}
+        motion = simulate(Scene(**fields, oscillation_amplitude=SMALL), engine=COMPILED)
+        first = int(np.argmax(motion.time.values > BEGIN - 1e-9))
+        x = motion.log10_slip_rate.values * math.log(10.0)
+        jump = -(0.76 - 0.3) * SMALL * 0.5 / 0.0145
+        assert x[first + 1] - x[first] == pytest.approx(jump, rel=1e-3)
+
+
+@pytest.mark.parametrize("field", ["oscillation_amplitude", "velocity_oscillation"])
+def test_a_motion_that_ended_within_a_train_goes_on(field):
+    stressed = IMPOSED if field.startswith("osc") else {}
+    scene = Scene(**STABLE, **stressed, **{field: 0.05}, **TRAIN)
+    whole = simulate(scene, duration=30.0, engine=COMPILED)
+    for cut in (1.0, BEGIN, 10.0, END, 25.0):
+        part = simulate(scene, duration=cut, engine=COMPILED)
+        rest = simulate(scene, duration=30.0 - cut, start=part, engine=COMPILED)
+        assert float(rest.shear_stress[-1]) == pytest.approx(
+            float(whole.shear_stress[-1]), abs=1e-8
+        )
+        assert float(rest.slip[-1]) == pytest.approx(float(whole.slip[-1]), abs=1e-6)
+
+
+def test_what_is_not_stated_is_no_part_of_names_and_declarations():
+    """Keys of cells are those of before there were trains."""
+    kept = {
+        "d644d6e6df1d801716788fc7cf8a13d5": Scene(),
+        "850bc7cf204aeac15dcd085aa806c153": Scene(
+            normal_stress="imposed", oscillation_amplitude=0.1
+        ),
+    }
+    assert not {*TRAIN, "velocity_oscillation"} - {"oscillation_period"} & {*Scene().as_dict()}
+    for key, scene in kept.items():
+        assert cell_key(scene, LimitCycle()).hex() == key
+    train = Scene(normal_stress="imposed", oscillation_amplitude=0.1, **TRAIN)
+    assert {*TRAIN} <= {*train.as_dict()}
+    assert Scene(**train.as_dict()) == train
+
+
+def test_a_steady_response_is_not_asked_of_a_train():
+    for fields in ({"oscillation_cycles": 3.0}, {"oscillation_begin": 1.0}):
+        scene = Scene(**STABLE, **IMPOSED, oscillation_amplitude=0.01, **fields)
+        with pytest.raises(InvalidValue, match="begins later or ends.*Leave out osc.*_begin and"):
+            NormalStressResponse()(scene, Accuracy())
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"velocity_oscillation": 0.1}, "oscillation_cycles = None: must be stated where load"),
+        ({"velocity_oscillation": 1.5, "oscillation_cycles": 1.0}, "must be 1 or less: friction"),
+        ({"velocity_oscillation": 0.1, **TRAIN, "velocity_oscillation_stairs": 7.5}, "whole"),
+        ({"velocity_oscillation": 0.1, **TRAIN, "oscillation_cycles": 1e4}, "100,000 at most"),
+        ({"velocity_oscillation": 0.1, **TRAIN, "oscillation_period": 1e-9}, "mass matters"),
+        ({"oscillation_cycles": 3.0}, "state oscillation_amplitude or velocity_oscillation too"),
+    ],
+)
+def test_trains_that_are_none(fields, message):
+    with pytest.raises(InvalidValue, match=message):
+        Scene(**fields)
