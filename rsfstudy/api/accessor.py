@@ -333,7 +333,9 @@ def _scene_of(dataset: xr.Dataset) -> Scene:
         own[name_of("loading", rebuilt)] = rebuilt
     if digest:
         told = dataset["history_samples"]
-        sampled = of_samples(told.values, bool(told.attrs["of_stress"]), loading)
+        pressure = bool(told.attrs.get("of_pressure"))
+        stress = bool(told.attrs["of_stress"])
+        sampled = of_samples(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
             raise contents.refused("history_samples", f"are not those of the scene ({digest})")
         own[name_of("loading", sampled)] = sampled

@@ -211,6 +211,7 @@ def _samples(history: History) -> xr.Variable:
     about = {
         "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
         "of_stress": int(history.of_stress),
+        **({"of_pressure": 1} if history.of_pressure else {}),
     }
     return xr.Variable(("history_sample", "history_column"), history.columns, about)
 

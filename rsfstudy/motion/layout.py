@@ -51,6 +51,7 @@ MOTION = np.dtype(
         ("unknowns", "i8"),  # between ruptures, and in them
         ("unknowns_fast", "i8"),
         ("states", "i8"),
+        ("behind", "i8"),  # unknowns of a fluid behind the one that a kink sets
     ]
 )
 #: The same as bytes: fields of records take much longer to write and to read.

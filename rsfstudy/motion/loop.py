@@ -79,6 +79,7 @@ from rsfstudy.slider.places import (
     LOG_LOAD_RATE,
     LOG_VELOCITY,
     RATE,
+    RECHARGE,
     RELIEF,
     VELOCITY,
 )
@@ -170,7 +171,7 @@ def is_full(motion, watched, events, rows):
 
 def turn(motion, space, last, kinks, rows):
     """Go on to the next segment of loading, whose numbers take the place of those before it."""
-    n, p, relief = len(kinks) - motion.kinks, space.p, PSIS + motion.states - 1
+    n, p, relief = len(kinks) - motion.kinks, space.p, PSIS + motion.states - 1 - motion.behind
     copy(space.after, last, PSIS + motion.states)
     motion.slip = slipped(motion, motion.end, motion.lasts, last[SPRING], p)
     motion.spring, motion.time, motion.started = last[SPRING], kinks[n, BEGINS], 0.0
@@ -184,7 +185,8 @@ def turn(motion, space, last, kinks, rows):
         motion.length = 0.0
     p[LOAD_VELOCITY], p[LOG_LOAD_RATE] = kinks[n, VELOCITY], kinks[n, LOG_VELOCITY]
     if not math.isnan(kinks[n, RATE]):
-        p[LOADING], last[relief] = kinks[n, RATE], kinks[n, RELIEF]
+        p[RECHARGE if motion.behind else LOADING] = kinks[n, RATE]
+        last[relief] = kinks[n, RELIEF]
 
 
 def begin_at(motion, y, last, functions, below, limits, p):

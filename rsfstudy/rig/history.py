@@ -43,6 +43,7 @@ def history(
         Arrays by name, or variables, or a CSV file whose first line names columns and units
         (`read_table`): ``time``; ``displacement`` or ``velocity`` of the load point, which moves at
         V_* without either; ``normal_stress``; and ``pore_pressure`` above that before the record.
+        Beside a fluid that dilates it is the pressure around the fault, into which fluid drains.
     laboratory : Laboratory, optional
         The rig whose units are used. Without it all are those of the slider: ``D_c/V_*``, ``D_c``,
         ``V_*``, ``sigma_*``.
@@ -89,7 +90,8 @@ def history(
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
         rule = "leaves no normal stress: it must stay positive, less pore pressure"
         _check(key, found[key].values, fall >= 1.0, rule, found[key].place)
-    return sampled(time, velocity, fall, name)
+    of_pressure = "pore_pressure" in found and "normal_stress" not in found
+    return sampled(time, velocity, fall, name, of_pressure=of_pressure)
 
 
 def _columns(

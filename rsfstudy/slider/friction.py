@@ -12,7 +12,8 @@ and dPsi/dt is the evolution law alone. Of a law with several states, Psi is the
 
 Pore pressure P, over sigma_*, takes from normal stress: s = sigma/sigma_* - P is what friction and
 the effects of stress on the state know of it. P stands last among the states, behind those of the
-law, which alone are part of Theta. What a loading goes on imposing is the same with a P of its own.
+law, which alone are part of Theta. What a loading goes on imposing is the same with a P of its own;
+the pressure that it imposes around a fluid stands first behind the law.
 
 Functions here take the functions of the parts of a scene, and return one that is made of them: the
 plainest that holds all effects there are. What they return takes floats, and the numbers of a scene
@@ -128,12 +129,12 @@ def stress_of(normal_stress: Function | None) -> Function:
     return total_stress
 
 
-def less_pressure(normal_stress: Function) -> Function:
-    """``s - 1`` and its slope, of the same and the pore pressure that stands last."""
+def less_pressure(normal_stress: Function, place: int = -1) -> Function:
+    """``s - 1`` and its slope, of the same and the pore pressure that stands last, or elsewhere."""
 
     def effective_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         excess, change = normal_stress(g, p)
-        return min(max(excess - psis[-1], SMALLEST_RATIO - 1.0), LARGEST_RATIO), change
+        return min(max(excess - psis[place], SMALLEST_RATIO - 1.0), LARGEST_RATIO), change
 
     return effective_stress
 
@@ -143,9 +144,14 @@ def no_pressure(psis: Numbers) -> float:
     return 0.0
 
 
-def last_of(psis: Numbers) -> float:
-    """P, the last of the states."""
-    return psis[-1]
+@cache
+def pressure_at(place: int) -> Function:
+    """``(psis) -> P`` at a place."""
+
+    def pressure(psis: Numbers) -> float:
+        return psis[place]
+
+    return pressure
 
 
 Relation = tuple[float, float, float, float]
@@ -289,8 +295,9 @@ class Parts(NamedTuple):
         How many states end in P.
     auxiliary_rates, auxiliary_steady_states : callable or None
         Theirs: auxiliary rates, and what they are in steady sliding.
-    inside : bool
-        Whether P is pore pressure inside the fault, which a rig does not know of.
+    outside : int
+        Place of the pressure outside the fault, which a rig knows of, among all states and from
+        their end: -1 where P is that; 0 where there is none.
     """
 
     states: int
@@ -303,15 +310,17 @@ class Parts(NamedTuple):
     unknowns: int
     auxiliary_rates: Function | None
     auxiliary_steady_states: Function | None
-    inside: bool
+    outside: int
 
 
 @cache
 def friction_of(parts: Parts) -> Friction:
     """Friction, made of what the parts of a scene say of it."""
     effect = reduce(both, parts.state_effects) if parts.state_effects else None
-    pressure, dry = parts.unknowns > 0, stress_of(parts.normal_stress)
-    wet = less_pressure(parts.normal_stress or constant) if pressure else dry
+    pressure, outside = parts.unknowns > 0, parts.outside
+    total, dry = parts.normal_stress or constant, stress_of(parts.normal_stress)
+    wet = less_pressure(total) if pressure else dry
+    around = wet if outside == -1 else less_pressure(total, outside) if outside else dry
     strength = strength_of(None if wet is constant_stress else wet, effect)
     if parts.regularised:
         strength = reversible(strength)
@@ -326,8 +335,8 @@ def friction_of(parts: Parts) -> Friction:
     return Friction(
         strength=strength,
         effective_stress=wet,
-        outer_stress=dry if parts.inside else wet,
-        outer_pressure=last_of if pressure and not parts.inside else no_pressure,
+        outer_stress=around,
+        outer_pressure=pressure_at(outside) if outside else no_pressure,
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=sum_of(parts.states),

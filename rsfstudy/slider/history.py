@@ -57,11 +57,15 @@ class History(Stated):
         Tells the samples.
     of_stress : bool
         Whether normal stress or pore pressure is among them.
+    of_pressure : bool
+        Whether it is pore pressure alone. Beside a fluid that has pressure too, that is the
+        pressure around the fault; fluid flows in or out until both are the same.
     """
 
     samples: bytes = field(repr=False)  # type: ignore[misc]  # of each, and not of the class
     digest: str  # type: ignore[misc]
     of_stress: bool
+    of_pressure: bool = False
 
     auxiliary_rates = staticmethod(ramp.auxiliary_rates)
     auxiliary_steady_states = staticmethod(ramp.auxiliary_steady_states)
@@ -72,8 +76,8 @@ class History(Stated):
         return _UNKNOWNS if self.of_stress else ()
 
     def check(self, scene: Scene) -> None:
-        """No fluid that changes normal stress too."""
-        if self.of_stress:
+        """No fluid that changes normal stress too, unless it is of pressure."""
+        if self.of_stress and not self.of_pressure:
             refuse_fluid(scene, "loading", self.name)
 
     @property
@@ -149,6 +153,8 @@ def sampled(
     velocity: np.ndarray,
     fall: np.ndarray | None,
     name: str,
+    *,
+    of_pressure: bool = False,
 ) -> History:
     """A loading history of samples.
 
@@ -162,6 +168,8 @@ def sampled(
         By how much normal stress is below sigma_* at the samples, over that; the last stays.
     name : str
         What the history is called in results.
+    of_pressure : bool
+        Whether all of the fall is pore pressure.
 
     Raises
     ------
@@ -175,14 +183,17 @@ def sampled(
     if fall is not None:
         columns[:, FALL] = fall
         columns[:-1, RISING] = -np.diff(fall) / np.diff(time)
-    return of_samples(columns, fall is not None, name)
+    return of_samples(columns, fall is not None, name, of_pressure=of_pressure)
 
 
-def of_samples(columns: np.ndarray, of_stress: bool, name: str) -> History:
+def of_samples(
+    columns: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
+) -> History:
     """A loading history of its columns (see `History.columns`)."""
     samples = np.ascontiguousarray(columns, dtype=float).tobytes()
     digest = hashlib.sha256(samples).hexdigest()[:16]
-    return History(name=name, samples=samples, digest=digest, of_stress=of_stress)
+    told = {"of_stress": of_stress, "of_pressure": of_pressure}
+    return History(name=name, samples=samples, digest=digest, **told)
 
 
 def _log(velocity: np.ndarray) -> np.ndarray:

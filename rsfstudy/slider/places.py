@@ -14,6 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Numbers, Part
 
 if TYPE_CHECKING:
+    from rsfstudy.slider.fluid._recharged import Recharged
     from rsfstudy.slider.scene import Scene
 
 #: Direct effect parameter a; how far ln V moves the states, which is b for one; mu_*, K = k
@@ -25,6 +26,8 @@ A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, IMPOS
 #: the fluid, which then has none. There are few: compiled functions hand on all of `p`.
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
+#: Where both have some, the rate of the loading stands behind the numbers of the fluid.
+RECHARGE = DYNAMICS - 1
 
 #: Columns of the table of segments of a loading: when each begins and ends, V_0/V_* and its
 #: logarithm, and the rate and the fall of normal stress that a loading with unknowns imposes as it
@@ -63,7 +66,7 @@ def numbers_of_friction(scene: Scene) -> Numbers:
     return (*common, *own, *law.numbers(scene))
 
 
-def _filled_up(part: Part, scene: Scene, most: int) -> Numbers:
+def _filled_up(part: Part | Recharged, scene: Scene, most: int) -> Numbers:
     """The numbers of a part, and NaN in the places that it leaves, so that who reads there reads
     nothing.
     """

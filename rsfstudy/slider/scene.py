@@ -30,6 +30,7 @@ from rsfstudy.slider import (
 )
 from rsfstudy.slider.assembly import Layout, Parts
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
+from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import SPRING, Slider
 from rsfstudy.slider.parts import Numbers
@@ -71,7 +72,8 @@ class Scene(ShownAsTable):
     fluid : {"drained", "dilatant"}, or type
         Pore pressure that never changes, or that falls where pores open with slip rate; or a class
         of your own. Stress is in units of the effective normal stress of steady sliding at V_*, so
-        that pore pressure is counted from that of the surroundings, where it begins.
+        that pore pressure is counted from that of the surroundings, where it begins; a history of
+        pore pressure changes that of the surroundings.
     dynamics, loading : type, optional
         A class of your own in these slots, which other fields fill without it; or, as loading, what
         `rsfstudy.protocol` or `rsfstudy.history` made.
@@ -350,9 +352,14 @@ class Scene(ShownAsTable):
         return self.parts.dynamics
 
     @cached_property
-    def pressure_source(self) -> fluid.Fluid | loading.Loading:
-        """The part whose last unknown takes from normal stress, if any has unknowns."""
-        return self.parts.loading if self.parts.loading.unknowns else self.parts.fluid
+    def pressure_source(self) -> fluid.Fluid | loading.Loading | Recharged:
+        """The part whose last unknown takes from normal stress, if any has unknowns; two, where the
+        loading imposes the pressure around a fluid.
+        """
+        imposed, pores = self.parts.loading, self.parts.fluid
+        if not imposed.unknowns:
+            return pores
+        return Recharged(imposed, pores) if pores.unknowns else imposed
 
     @property
     def has_mass(self) -> bool:
@@ -361,8 +368,8 @@ class Scene(ShownAsTable):
 
     @cached_property
     def states(self) -> int:
-        """Number of states: those of the law, and the unknowns of the fluid, or of a
-        loading that goes on changing normal stress.
+        """Number of states: those of the law, and the unknowns of a loading that goes on changing
+        normal stress and of the fluid.
         """
         return self.parts.law.states + len(self.pressure_source.unknowns)
 

@@ -392,6 +392,6 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
         unknowns=len(source.unknowns),
         auxiliary_rates=source.auxiliary_rates,
         auxiliary_steady_states=source.auxiliary_steady_states,
-        inside=source is scene.parts.fluid,
+        outside=-1 - len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0,
     )
     return system_of(parts, acting.slip_rate, acting.rupture_rate)

@@ -1,0 +1,85 @@
+"""A fluid whose surroundings have a pore pressure that the loading changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+from rsfstudy.quantity import Quantity
+from rsfstudy.slider.fluid import Fluid
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.places import DYNAMICS, FLUID, LARGEST_SLOWNESS, RECHARGE
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.loading import Loading
+    from rsfstudy.slider.scene import Scene
+
+
+@cache
+def with_surroundings(rates: Function) -> Function:
+    """Changes of the pressure R of the surroundings, and of the unknowns of a fluid behind it.
+
+    The fluid knows of pressure as far as it exceeds that of the surroundings, P - R, as in
+    ``dP/dt = c* (R - P) - (dphi/dt)/beta``; what it says of the changes holds for P itself.
+    """
+
+    def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+        time = share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+        own = (*states[1:-1], states[-1] - states[0])
+        return (-p[RECHARGE] * time, *rates(log_rate, own, share, p))
+
+    return auxiliary_rates
+
+
+@cache
+def with_surroundings_at_rest(steady_states: Function) -> Function:
+    """The same in steady sliding before the loading: pressures are counted from there."""
+
+    def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
+        return (0.0, *steady_states(log_rate, p))
+
+    return auxiliary_steady_states
+
+
+@dataclass(frozen=True)
+class Recharged:
+    """A fluid together with a loading that imposes the pressure around it.
+
+    Attributes
+    ----------
+    loading, fluid : Loading, Fluid
+        Its parts, both of which have unknowns.
+    """
+
+    loading: Loading
+    fluid: Fluid
+
+    @property
+    def name(self) -> str:
+        """That of the fluid."""
+        return self.fluid.name
+
+    @property
+    def unknowns(self) -> tuple[Quantity, ...]:
+        """Pressure of the surroundings first, and that inside the fault last."""
+        return (*self.loading.unknowns, *self.fluid.unknowns)
+
+    @property
+    def auxiliary_rates(self) -> Function:
+        """Theirs."""
+        assert self.fluid.auxiliary_rates is not None
+        return with_surroundings(self.fluid.auxiliary_rates)
+
+    @property
+    def auxiliary_steady_states(self) -> Function:
+        """Theirs."""
+        assert self.fluid.auxiliary_steady_states is not None
+        return with_surroundings_at_rest(self.fluid.auxiliary_steady_states)
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """Those of the fluid, and the rate of the loading in the last place."""
+        own = self.fluid.numbers(scene)
+        between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
+        return (*own, *between, *self.loading.numbers(scene))
