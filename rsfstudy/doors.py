@@ -28,7 +28,11 @@ def door(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def answered(*args: P.args, **options: P.kwargs) -> T:
-        given = signature.bind(*args, **options).arguments
+        try:
+            given = signature.bind(*args, **options).arguments
+        except TypeError as error:
+            taken = ", ".join(signature.parameters)
+            raise TypeError(f"{function.__name__}() {error}; it takes {taken}") from None
         try:
             return function(*args, **options)
         except (RsfStudyError, Warning, bdb.BdbQuit):

@@ -33,6 +33,7 @@ from rsfstudy.files.comparison import (
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
+from rsfstudy.slider.registry import completed
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def studies() -> dict[str, Study]:
     return {name: catalogue.load(name) for name in names.names()}
 
 
+@completed()
 @door
 def run(
     study: str | Path | Study,

@@ -29,6 +29,7 @@ from rsfstudy.rig.scales import Scale, in_units, scales, scales_of
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
+from rsfstudy.slider.registry import completed
 from rsfstudy.slider.scene import Scene
 
 #: Units of the slider of what a segment of a protocol states.
@@ -99,6 +100,7 @@ class Laboratory:
         """
         return float(in_si_of(name, value, UNITS[scale], self._stress) / self.scales[scale].factor)
 
+    @completed(*FULL)
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
 

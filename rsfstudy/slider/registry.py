@@ -4,10 +4,11 @@ these bring to a scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any, get_type_hints
+from inspect import Parameter, signature
+from typing import Any, TypeVar, get_type_hints
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
@@ -17,6 +18,7 @@ from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.synonyms import law_name
 
+F = TypeVar("F", bound=Callable[..., Any])
 #: A part of a user's own: its class, whose fields are fields of the scene; or a loading, which is
 #: data.
 Own = type[Part] | Stated
@@ -138,13 +140,29 @@ KINDS: Mapping[str, Any] = {slot.name: str for slot in NAMED} | {n: _kind(n) for
 
 
 def defaults() -> dict[str, Any]:
-    """The fields of a scene, and what is meant where they are not stated."""
+    """What a scene may state, and what is meant where it does not."""
     choices = {slot.name: slot.default for slot in NAMED}
     fields = ((name, OWNERS.get(name)) for name in FIELDS)
     return {
         name: choices[name] if part is None else part.__dataclass_fields__[name].default
         for name, part in fields
-    }
+    } | {slot.name: None for slot in SLOTS if slot not in NAMED}
+
+
+def completed(*more: str) -> Callable[[F], F]:
+    """A decorator that gives a function which takes fields a signature that names those of every
+    scene, and more: what editors complete.
+    """
+
+    def named(function: F) -> F:
+        stated = signature(function)
+        *first, last = stated.parameters.values()
+        names = (*defaults(), *more)
+        fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
+        function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
+        return function
+
+    return named
 
 
 # ---- parts of a user's own -----------------------------------------------------------------------

@@ -165,7 +165,7 @@ class Scene(ShownAsTable):
 
     parts: Parts
 
-    #: What editors complete: the fields of every scene.
+    #: What editors complete.
     __signature__: ClassVar[Signature] = Signature(
         [Parameter(n, Parameter.KEYWORD_ONLY, default=d) for n, d in registry.defaults().items()]
     )
@@ -253,6 +253,7 @@ class Scene(ShownAsTable):
 
     # ---- other scenes ---------------------------------------------------------------------------
 
+    @registry.completed()
     def with_(self, **changes: Any) -> Scene:
         """A copy with some fields changed, checked anew.
 

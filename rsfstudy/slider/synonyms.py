@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-_SPRING = "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*)"
-_SLIP = "Slip is in units of D_c here: state D_c as slip_distance to rsfstudy.Laboratory or to_si."
-_STRESS = (
-    "Stress is in units of sigma_* here: state sigma_* as normal_stress to rsfstudy.Laboratory or "
-    "to_si."
+_SPRING = (
+    "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*; of a rig with "
+    "units, as in '0.05 MPa/um')"
 )
-_VELOCITY = (
-    "Slip rate is in units of V_* here: state V_* as reference_velocity to rsfstudy.Laboratory."
-)
-_MASS = "Write inertia=True, and period for its period of free oscillation in s."
+_MASS = "Write inertia=True, and period for its period of free oscillation in s; or state the rig."
+_LOADING = "Write load_velocity_ratio, which is V_0/V_*; of a rig load_velocity with units."
 _OF_SIMULATE = "It belongs to rsfstudy.simulate(scene, duration=...)."
+
+
+def _of_rig(symbol: str, name: str) -> str:
+    """The remedy for a quantity of a rig."""
+    return (
+        f"{symbol} is {name} of a rig: Laboratory({name}=...), or an axis or another value of a "
+        "study that has one."
+    )
 
 
 def _each(names: str, remedy: str) -> dict[str, str]:
@@ -28,13 +33,19 @@ _FIELDS: Mapping[str, str] = {
     **_each("b B", "Write b_over_a, which is b/a."),
     **_each("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
     **_each("A", "Write a."),
-    **_each("Dc dc D_c d_c DC L dcrit", _SLIP),
+    **_each("Dc dc D_c d_c DC L dcrit slip_distance", _of_rig("D_c", "slip_distance")),
     **_each("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
-    **_each("sigma sigma_n sigman sigma0 sigma_star", _STRESS),
+    **_each("sigma sigma_n sigman sigma0 sigma_star sn", _of_rig("sigma_*", "normal_stress")),
+    **_each("V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOADING),
     **_each(
-        "V0 V_0 v0 v_0 Vl vl vlp velocity load_velocity", "Write load_velocity_ratio: V_0/V_*."
+        "V_star v_star vstar Vref vref V_ref v_ref reference_velocity",
+        _of_rig("V_*", "reference_velocity"),
     ),
-    **_each("V_star v_star vstar Vref vref V_ref v_ref", _VELOCITY),
+    **_each("G shear_modulus", _of_rig("G", "shear_modulus")),
+    **_each("rho density", _of_rig("rho", "density")),
+    **_each("kc k_c kcr k_cr k_ratio k_over_kc k_kc", "Write stiffness_ratio, which is k/k_cr."),
+    **_each("tau tau0 tau_0", "Write initial_stress, over sigma_*, above that of steady sliding."),
+    **_each("theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."),
     **_each("m M mass", _MASS),
     **_each("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
     **_each("T", "Write period, in s."),
@@ -68,6 +79,8 @@ def _plain(value: str) -> str:
 
 def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
     """Remedy for this choice in a slot; empty where nobody knows."""
+    if slot == "normal_stress" and re.match(r"[\d.]", str(value)):
+        return _of_rig("sigma_*", slot)
     if not isinstance(value, str):
         return ""
     plain = _plain(value)
@@ -78,7 +91,7 @@ def instead_of_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
 
 def instead_of_unnamed(value: Any, slots: Mapping[str, Iterable[str]]) -> str:
     """Remedy for a value that was given to a scene without a name."""
-    for slot, choices in slots.items():
+    for slot, choices in slots.items() if isinstance(value, str) else ():
         found = instead_of_choice(slot, value, choices)
         if found:
             return found
