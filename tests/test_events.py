@@ -131,7 +131,7 @@ def test_all_drops_of_three_standard_deviations_are_found(correlation):
         assert float(off.max()) < 5.0  # of 105
 
 
-def test_a_record_tells_slip_rate_and_dynamic_drop():
+def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
     """A fall over ten samples, twice as fast in its second half, by displacement."""
     fall = np.interp(np.arange(4000), [2000, 2005, 2010], [0.0, 1.0, 3.0])
     time, rng = 0.1 * np.arange(4000), np.random.default_rng(5)
@@ -151,6 +151,12 @@ def test_a_record_tells_slip_rate_and_dynamic_drop():
     assert event.slip.attrs["units"] == "um"
     assert event.peak_slip_rate.attrs["units"] == "um s-1"
     assert float(event.time) == pytest.approx(200.0, abs=1.0)
+    file = tmp_path / "record.csv"
+    header = [f"{name} ({values.units})" for name, values in record.items()]
+    record.to_dataframe().to_csv(file, index=False, header=header)
+    xr.testing.assert_identical(rsfstudy.events(file), rsfstudy.events(record))
+    plain = rsfstudy.events(**{name: values.values for name, values in record.items()})
+    assert not any("units" in plain[name].attrs for name in ("slip", "peak_slip_rate", "noise"))
 
 
 def test_coarse_digits_are_no_events():

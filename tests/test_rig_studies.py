@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -342,6 +343,8 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     rig = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
     there = lattice.on(studied, rig)
     assert there.axes[2].units == {"hold_time": "s"}
+    # what is fitted is what was: D_c/V_* is 10 s
+    assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
     for one, other in zip(studied.scenes(), there.scenes(), strict=True):
         ours, theirs = numbers(one), numbers(other)
         del ours["reference_rate"], theirs["reference_rate"]
@@ -356,6 +359,19 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     assert results["hold_time"].attrs["units"] == "s"
     assert results["dimensionless_hold_time"].values == pytest.approx([1.0, 10.0])
     assert float(results["dimensionless_stiffness"]) == pytest.approx(0.02)
+
+
+def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
+    """Of a study with mass on a rig that radiates, and of one that radiates on a rig with mass."""
+    scales = {n: v for n, v in STATED.items() if n != "stiffness"}
+    radiates = Laboratory(**scales, shear_modulus="30 GPa", density="2700 kg/m^3")
+    swings = Laboratory(**scales, period="10 ms")
+    study = catalogue.load("limit_cycles")
+    damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
+    for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
+        there = lattice.on(before, rig).base
+        assert there.has_mass is mass
+        assert (there.radiation_damping == 0.0) is mass
 
 
 def test_options_of_the_rig_and_values_in_units_in_show():

@@ -70,6 +70,8 @@ def _units(quantity: Quantity, about: Mapping[str, Mapping[Any, Any]]) -> dict[s
         source = about[_MEASURED_AS[quantity.scale]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
     if quantity.scale:
-        time, slip = (str(about[name].get("units", "1")) for name in ("time", "slip"))
-        return {"units": f"{slip} {time}-1"}
+        if "scale" in about["slip"]:
+            return {"units": quantity.units, "scale": quantity.scale}
+        time, slip = (about[name].get("units") for name in ("time", "slip"))
+        return {"units": f"{slip} {time}-1"} if time and slip else {}
     return {"units": quantity.units}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.stats import norm
 from rsfstudy.api.catalogue import catalogue
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.table import read_table
 
 #: Chance that a record of Gaussian noise holds any event: one record in 10,000.
 _CHANCE = 1e-4
@@ -29,7 +31,7 @@ _NORMAL = 1.4826
 
 @door
 def events(
-    record: xr.Dataset | None = None,
+    record: xr.Dataset | str | Path | None = None,
     *,
     time: Any = None,
     displacement: Any = None,
@@ -52,10 +54,12 @@ def events(
 
     Parameters
     ----------
-    record : xarray.Dataset, optional
-        ``time``, ``shear_stress`` and, where it was measured, ``displacement``, with units.
+    record : xarray.Dataset, str or Path, optional
+        ``time``, ``shear_stress`` and, where it was measured, ``displacement``, with units; or a
+        CSV file of these, whose first line names columns and units (`read_table`).
     time, displacement, shear_stress : array_like
-        The same as arrays; one with the attribute ``units`` keeps them.
+        The same as arrays; one with the attribute ``units`` keeps them, and numbers that are read
+        of others have no attribute ``units``.
 
     Returns
     -------
@@ -74,6 +78,9 @@ def events(
         increase.
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
+    if isinstance(record, str | Path):
+        table = read_table(record).items()
+        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table})
     if record is not None:
         given = {name: record.get(name) for name in given}
     times, stress = (_samples(name, given[name]) for name in ("time", "shear_stress"))
@@ -90,7 +97,7 @@ def events(
     found, noise, smallest = _drops(stress)
     rows = [_row(times, stress, moves, drop) for drop in found]
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
-    units = {"units": str(about["shear_stress"].get("units", "1"))}
+    units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
     words = "drop of shear stress that is found but once in 1,000"
     dataset["smallest_drop"] = ((), smallest, {"long_name": words, **units})

@@ -47,8 +47,16 @@ def _one_row(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
-    """Write the table of a dataset; numbers keep all their digits."""
-    to_dataframe(dataset).to_csv(path, index=False)
+    """Write the table of a dataset, whose header names units as `read_table` reads them; numbers
+    keep all their digits.
+    """
+    table = to_dataframe(dataset)
+    headed = {n: f"{n} ({_units(dataset[n]) or 1})" for n in table if table[n].dtype.kind in "iuf"}
+    table.rename(columns=headed).to_csv(path, index=False)
+
+
+def _units(values: xr.DataArray) -> str:
+    return str(values.attrs.get("scale") or values.attrs.get("units", ""))
 
 
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
@@ -66,10 +74,7 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
             legal = f"{legal[: _LONGEST - 1]}x"
         names[name] = legal
     about = {
-        "units": {
-            short: str(dataset[name].attrs.get("scale") or dataset[name].attrs.get("units", ""))
-            for name, short in names.items()
-        },
+        "units": {short: _units(dataset[name]) for name, short in names.items()},
         "dimensions": {short: " ".join(map(str, dataset[n].dims)) for n, short in names.items()},
         "attributes": {
             re.sub(r"\W", "_", str(name))[:_LONGEST]: value for name, value in dataset.attrs.items()

@@ -98,6 +98,8 @@ class Laboratory:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
         ``sigma_*/D_c`` is asked for.
         """
+        if scale not in self.scales:
+            raise InvalidValue("scale", scale, "is no scale of a rig", choices=self.scales)
         return float(in_si_of(name, value, UNITS[scale], self._stress) / self.scales[scale].factor)
 
     @completed(*FULL)

@@ -357,21 +357,34 @@ def _squeezed(along: Sequence[Axis], values: np.ndarray) -> tuple[tuple[str, ...
 
 
 def on(study: Study, laboratory: Laboratory) -> Study:
-    """A study of no rig on a rig: what its axes and its base hold without dimension is turned into
-    SI units, and what the rig states takes the place of theirs.
+    """A study of no rig on a rig: what its axes, its base and the ranges of its fits hold without
+    dimension is turned into SI units, and what the rig states takes the place of theirs.
     """
     scales_ = _scales(laboratory.as_dict())
-    axes = []
+    axes, every = [], {}
     for along in study.axes:
         sizes = {n: scales_[FIELDS[n].scale] for n in along.fields if _is_scaled(n)}
+        every |= sizes
         rows = [
             {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
             for row in along.rows
         ]
         units = {n: UNITS[FIELDS[n].scale] for n in sizes}
         axes.append(along.with_rows(rows, units, along.drawn))
-    base = study.base.with_(**of_scene(laboratory.as_dict()))
-    return replace(study, laboratory=laboratory, base=base, axes=axes)
+    reductions = [_in_range(each, every.get(getattr(each, "on", ""))) for each in study.reductions]
+    changes = of_scene(laboratory.as_dict())
+    if {"inertia", "radiation_damping"} & set(changes):  # in place of what the study has
+        changes = {"inertia": False, "radiation_damping": 0.0, **changes}
+    base = study.base.with_(**changes)
+    return replace(study, laboratory=laboratory, base=base, axes=axes, reductions=reductions)
+
+
+def _in_range(reduction: Any, size: float | None) -> Any:
+    """A reduction whose range, if it has any, is in SI units."""
+    span = getattr(reduction, "within", None)
+    if size is None or span is None:
+        return reduction
+    return replace(reduction, within=tuple(size * end for end in span))
 
 
 def _is_scaled(name: str) -> bool:
