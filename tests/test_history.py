@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from extensions.order_four import OrderFour
-from running import run
+from running import called, run
 
+import rsfstudy
 from rsfstudy import (
     Axis,
     Laboratory,
@@ -197,6 +198,58 @@ def test_a_motion_holds_its_samples(tmp_path):
     motion["history_samples"] = 2.0 * motion.history_samples
     with pytest.raises(DataError, match="history_samples are not those of the scene"):
         _ = motion.rsf.scene
+
+
+def test_results_hold_the_loadings_of_their_study(tmp_path):
+    """Records and protocols are data: a study is had of its file, and computed again, without the
+    file that declares it. Two of one name are told apart.
+    """
+    steps = protocol([{"velocity": 3.0, "duration": 5.0}, {"velocity": 0.5}], "steps")
+    record = history(wave(20))
+    study = Study(
+        name="records", title="A record and steps", base=Scene(**PLAIN),
+        axes=[Axis("loading", [record, steps])], measure=StepResponse(peaks=2, phases=2),
+    )  # fmt: skip
+    run(study, rtol=1e-4, output=tmp_path, engine=COMPILED)
+    Scene(**PLAIN, loading=history(wave(30)))
+    results = rsfstudy.open(tmp_path / "records.nc")
+    assert results.history_samples.dims == ("history_sample", "history_column")
+    assert [scene.parts.loading for scene in results.rsf.study.scenes()] == [record, steps]
+    table = rsfstudy.rerun(tmp_path / "records.nc", workers=0, progress=False)
+    assert not table.attrs["differs"]
+    assert table["identical"].dropna().equals(table["values"][table["identical"].notna()])
+    with pytest.raises(DataError, match="history_samples holds no loading of 4 columns"):
+        results.isel(history_column=slice(3)).rsf.study  # noqa: B018
+
+
+def test_the_command_line_follows_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = [f"{t:.17g},{d:.17g}" for t, d in zip(*wave(20).values(), strict=True)]
+    Path("record.csv").write_text("\n".join(["time (D_c/V_*), displacement (D_c)", *rows]))
+    Path("steps.csv").write_text("velocity (V_*), duration (D_c/V_*)\n3, 5\n0.5, 15\n")
+    words = [f"--set={name}={value}" for name, value in PLAIN.items()]
+    for told in (["--set", "loading=record.csv"], ["--protocol", "record.csv"]):
+        status, said = called(["simulate", *words, *told, "--rtol", "1e-4"])
+        assert status == 0, said
+        motion = xr.load_dataset("motion.nc")
+        assert motion.rsf.scene.parts.loading == history(wave(20), name="record")
+    Path("mine.py").write_text(
+        "from rsfstudy import Axis, Scene, Study\n"
+        "from rsfstudy.measures.step_response import StepResponse\n"
+        "study = Study(name='mine', title='Mine', base=Scene(normal_stress='constant', "
+        "stiffness=0.02), axes=[Axis('a', [0.01, 0.012])], "
+        "measure=StepResponse(peaks=2, phases=2))\n"
+    )
+    words = ["--set", "loading=record.csv,steps.csv", "--rtol", "1e-4", "--serial", "--quiet"]
+    status, said = called(["run", "mine.py", *words])
+    assert status == 0, said
+    assert rsfstudy.open("mine").loading.values.tolist() == ["record", "steps"]
+    status, said = called(["rerun", "outputs/mine.nc", "--serial", "--quiet"])
+    assert status == 0, said
+    assert "every number is the same" in said
+    status, said = called(["simulate", "--set", "loading=absent.csv"])
+    assert status == 1
+    assert "absent.csv: cannot be read as CSV" in said
 
 
 def test_the_files_that_ship_are_followed():

@@ -76,15 +76,15 @@ class Accessor:
         InvalidValue
             Where the study has code of a user's own.
         """
-        from rsfstudy.files import contents, restore
+        from rsfstudy.files import contents, loadings, restore
 
         self._must_be_of_a_study()
         declared, about = contents.declaration(self._dataset), contents.provenance(self._dataset)
-        if about["fingerprint"]["own_code"] != "none":
+        if restore.has_own_code(self._dataset):
             rule = "has code of a user's own, and code is never taken from a dataset"
             remedy = f"Import the study from the file that declares it. {about['declared_in']}"
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
-        return restore.from_declaration(declared)
+        return restore.from_declaration(declared, loadings.held(self._dataset))
 
     @door
     def to_si(self, **scales: Any) -> xr.Dataset:

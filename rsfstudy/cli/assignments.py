@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any
 
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.history import history
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.protocol_file import read_protocol
 from rsfstudy.rig.quantities import SCALES, STATED
+from rsfstudy.rig.table import read_table
 from rsfstudy.rig.units import number, spaced
+from rsfstudy.slider.protocol import Stated
 
 _FLAGS = {"true": True, "yes": True, "false": False, "no": False}
 
@@ -22,7 +27,25 @@ def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
         if name in values_by_name:
             raise InvalidValue("--set", text, f"sets {name} twice")
         values_by_name[name] = values
+        if name == "loading":
+            files = values if isinstance(values, list) else [values]
+            loadings = [loading(each, study.laboratory) for each in files]
+            values_by_name[name] = loadings if isinstance(values, list) else loadings[0]
     return values_by_name
+
+
+def loading(value: Any, laboratory: Laboratory | None) -> Any:
+    """A value of `loading`: what a CSV file tells, which goes by the name of the file."""
+    path = Path(str(value))
+    return from_table(path, laboratory) if path.suffix.lower() == ".csv" else value
+
+
+def from_table(path: Path, laboratory: Laboratory | None) -> Stated:
+    """The loading that a table tells: a record where it has the column ``time``, else a
+    protocol.
+    """
+    read = history if "time" in read_table(path) else read_protocol
+    return read(path, laboratory, name=path.stem)
 
 
 def laboratory(texts: Mapping[str, str]) -> Laboratory:

@@ -18,13 +18,15 @@ from rsfstudy.motion.engines import ENGINES, SCIPY
     "settings",
     multiple=True,
     metavar="FIELD=VALUE",
-    help="A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'.",
+    help="A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
+    "a loading from a CSV file, as in loading=record.csv.",
 )
 @click.option(
     "--protocol",
     "protocol_file",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="CSV file of what the load point does: a header such as 'velocity (um/s), duration (s)'.",
+    help="CSV file of what the load point does: a header such as 'velocity (um/s), duration (s)', "
+    "or, of a record, 'time (s), displacement (um)'. The same as --set loading=FILE.",
 )
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
 @options.against

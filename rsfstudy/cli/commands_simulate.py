@@ -21,7 +21,6 @@ from rsfstudy.declare.wording import short
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
 from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.protocol_file import read_protocol
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -79,7 +78,9 @@ def _scene(
     fields: dict[str, Any], protocol_file: Path | None, laboratory: Laboratory | None
 ) -> Scene:
     if protocol_file is not None:
-        fields["loading"] = read_protocol(protocol_file, laboratory)
+        fields["loading"] = assignments.from_table(protocol_file, laboratory)
+    elif "loading" in fields:
+        fields["loading"] = assignments.loading(fields["loading"], laboratory)
     return laboratory.scene(**fields) if laboratory else Scene(**fields)
 
 

@@ -41,7 +41,7 @@ settings = click.option(
     multiple=True,
     metavar="AXIS=VALUES",
     help="Other values: a comma list, start:stop:count or start:stop:count:log; of a rig with "
-    "units, as in hold_time='10 s,100 s'.",
+    "units, as in hold_time='10 s,100 s'; of loading CSV files of protocols or records.",
 )
 rtol = click.option(
     "--rtol",

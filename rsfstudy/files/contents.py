@@ -255,14 +255,14 @@ def scene(
         raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
 
 
-def own_part(declared: Declaration) -> tuple[str, str] | None:
-    """Slot and name of a part that the user wrote, if any cell has one."""
+def own_part(declared: Declaration, held: Collection[str] = ()) -> tuple[str, str] | None:
+    """Slot and name of a part that the user wrote, if any cell has one; not one that is held."""
     rows: list[Mapping[str, Any]] = [declared.base]
     for axis in declared.axes:
         rows += rows_of(axis)
     for slot in SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
-            if isinstance(name, str) and name not in slot.choices:
+            if isinstance(name, str) and name not in (*slot.choices, *held):
                 return slot.name, name
     return None
 

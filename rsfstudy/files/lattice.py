@@ -12,6 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.axis import kinds
 from rsfstudy.declare.study import Study
+from rsfstudy.files import loadings
 from rsfstudy.files.contents import LAYOUT
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.quantity import Quantity
@@ -130,7 +131,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name, {}))
     for name, values in study.measure.inner_coordinates.items():
         coords[name] = (name, np.asarray(values), _about(name, own))
-    return coords
+    return coords | loadings.variables(study.own_parts.values())
 
 
 def _array(values: list[Any]) -> np.ndarray:

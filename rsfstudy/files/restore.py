@@ -22,7 +22,7 @@ from rsfstudy.declare.figure import figure_name
 from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue, brief
-from rsfstudy.files import contents
+from rsfstudy.files import contents, loadings
 from rsfstudy.files.contents import (
     Declaration,
     PlainAxis,
@@ -38,6 +38,8 @@ from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.reductions import InUnits
 from rsfstudy.slider.registry import SLOTS, Own, by_class
 
+_NAME_IT = "Name the file that declares it: --study FILE (study=)."
+
 
 def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """The study that made a dataset, from the declaration in it; where it uses code of the user,
@@ -52,22 +54,31 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
             raise refused(axis["dimension"], rule)
     if file is None:
         about = contents.provenance(results)
-        if about["fingerprint"]["own_code"] != "none":
+        if has_own_code(results):
             rule = "is a user's own, and code is never taken from a results file"
-            remedy = "Name the file that declares it: --study FILE (study=)."
+            remedy = _NAME_IT
             if about["declared_in"]:
                 remedy += f" It was {brief(about['declared_in'])}."
-            name, value = contents.own_part(declared) or ("measure", declared.measure["name"])
+            of_user = contents.own_part(declared, loadings.held(results))
+            name, value = of_user or ("measure", declared.measure["name"])
             raise InvalidValue(name, value, rule, remedy=remedy)
-        study = from_declaration(declared)
+        study = from_declaration(declared, loadings.held(results))
     else:
         named = catalogue.load(str(file))
         if named.name != declared.name:
             rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
             raise InvalidValue("study", str(file), rule)
-        study = from_declaration(declared, of_its_own=named)
+        study = from_declaration(declared, loadings.held(results), named)
     _check_lattice(study, results)
     return study
+
+
+def has_own_code(results: xr.Dataset) -> bool:
+    """True where code of the user decided a dataset; loadings, which it holds, are data."""
+    if contents.provenance(results)["fingerprint"]["own_code"] == "none":
+        return False
+    held = loadings.held(results)
+    return not held or contents.own_part(contents.declaration(results), held) is not None
 
 
 def own_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
@@ -100,12 +111,16 @@ def _check_lattice(study: Study, results: xr.Dataset) -> None:
             raise refused(name, "is not that axis of the declaration")
 
 
-def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> Study:
+def from_declaration(
+    declared: Declaration, held: Mapping[str, Own], of_its_own: Study | None = None
+) -> Study:
     """The study with this declaration.
 
     Parameters
     ----------
     declared : Declaration
+    held : mapping of str to Stated
+        Loadings of the user's own, by name.
     of_its_own : Study, optional
         Where to take the measure, the reductions and parts of the slider from, if they are
         not part of rsfstudy; the measure with the plain fields that the declaration states.
@@ -118,7 +133,7 @@ def from_declaration(declared: Declaration, of_its_own: Study | None = None) -> 
         Where the declaration makes no study, naming the part.
     """
     parts = msgspec.structs.asdict(declared)
-    own = _own_parts(of_its_own)
+    own = {**_own_parts(of_its_own), **held}
     parts["base"] = contents.scene(declared.base, own)
     if of_its_own is None:
         parts["measure"] = measure(declared.measure, "declaration.measure")
@@ -175,7 +190,8 @@ def measure(described: PlainMeasure, path: str) -> Measure:
     name = values.pop("name")
     kinds = _kinds(Measure, measures, name)
     if name not in kinds:
-        raise InvalidValue("measure", name, "is not part of rsfstudy", choices=kinds)
+        rule = "is not part of rsfstudy"
+        raise InvalidValue("measure", name, rule, choices=kinds, remedy=_NAME_IT)
     given = dict(kinds[name].restored_fields(values, path))
     if isinstance(values.get("measure"), Mapping):
         given["measure"] = measure(values.pop("measure"), f"{path}.measure")
@@ -190,10 +206,8 @@ def _reduction(described: PlainReduction, path: str) -> Reduction:
     if wanted not in kinds:
         kinds |= _kinds(Reduction, reduce, wanted)
     if wanted not in kinds:
-        remedy = "If it is your own, name the file that declares it: --study FILE (study=)."
-        raise InvalidValue(
-            "reduction", wanted, "is not part of rsfstudy", choices=kinds, remedy=remedy
-        )
+        rule = "is not part of rsfstudy"
+        raise InvalidValue("reduction", wanted, rule, choices=kinds, remedy=_NAME_IT)
     made: Reduction = restored(values, kinds[wanted], path)
     return made
 

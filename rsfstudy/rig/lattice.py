@@ -361,7 +361,8 @@ def on(study: Study, laboratory: Laboratory) -> Study:
     dimension is turned into SI units, and what the rig states takes the place of theirs.
     """
     scales_ = _scales(laboratory.as_dict())
-    axes, every = [], {}
+    axes: list[Axis] = []
+    every: dict[str, float] = {}
     for along in study.axes:
         sizes = {n: scales_[FIELDS[n].scale] for n in along.fields if _is_scaled(n)}
         every |= sizes

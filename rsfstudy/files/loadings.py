@@ -1,0 +1,65 @@
+"""Loadings of a user's own in results files: they are data, and stand there as variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.files.contents import refused
+from rsfstudy.slider.history import RISING, History, of_samples
+from rsfstudy.slider.loading import Segment
+from rsfstudy.slider.protocol import Protocol, Stated, protocol
+from rsfstudy.slider.registry import Own
+
+#: What the columns are, by how many there are in each row, and what a row is.
+_SAMPLE = ("sample", "time, load point velocity, fall and rate of normal stress")
+_SEGMENT = ("segment", "load point velocity and step, duration, and normal stress above sigma_star")
+
+
+def variables(parts: Iterable[Own]) -> dict[str, xr.Variable]:
+    """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
+    of what they are made of, in units of the slider.
+    """
+    found = {}
+    for part in parts:
+        if isinstance(part, History):
+            (row, columns), rows = _SAMPLE, part.columns
+        elif isinstance(part, Protocol):
+            (row, columns), rows = _SEGMENT, np.array(part.history)
+        else:
+            continue
+        about: dict[str, Any] = {
+            "long_name": f"{columns} of a loading",
+            "units": "1",
+            "loading": part.name,
+        }
+        if isinstance(part, History):
+            about["of_stress"] = int(part.of_stress)
+        dims = (f"{part.name}_{row}", f"{part.name}_column")
+        found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
+    return found
+
+
+def held(results: xr.Dataset) -> Mapping[str, Stated]:
+    """The loadings that results hold, by name.
+
+    Raises
+    ------
+    DataError
+        Where a variable that is said to hold one does not.
+    """
+    found: dict[str, Stated] = {}
+    for key, values in results.variables.items():
+        name = values.attrs.get("loading")
+        if name is None:
+            continue
+        if values.dtype.kind != "f" or values.ndim != 2 or values.shape[1] != RISING + 1:
+            raise refused(str(key), f"holds no loading of {RISING + 1} columns")
+        if "of_stress" in values.attrs:
+            found[name] = of_samples(values.values, bool(values.attrs["of_stress"]), name)
+        else:
+            found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
+    return found
