@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from rsfstudy.rig.quantities import (
     units_of,
 )
 from rsfstudy.rig.scales import BESIDE, scales
-from rsfstudy.rig.units import factor, in_si, parted, spaced
+from rsfstudy.rig.units import exact, factor, parted, spaced, times
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
         if isinstance(number, float) and written == units:
             found.append(number)
         else:
-            found.append(in_si(name, value, str(kind)) / size)
+            found.append(float(exact(name, value, str(kind)) / size))
     wrong = [
         value for number, value in zip(found, values, strict=True) if not _is_meant(name, number)
     ]
@@ -187,7 +188,7 @@ def _stated_units(value: Any) -> str:
     return parted(value)[1] if isinstance(value, str) else ""
 
 
-def _size(name: str, units: str) -> float:
+def _size(name: str, units: str) -> Fraction:
     """Factor to SI units; of a stiffness that is friction over displacement to 1/m."""
     if name == "stiffness" and is_friction(f"1 {units}"):
         return factor(name, units, "1/m")
@@ -249,7 +250,7 @@ class Cells:
         found, units = dict(self.laboratory.as_dict()), self.units
         for name in OF_AXIS:
             if name in units and row.get(name) is not None:
-                found[OF_AXIS[name]] = row[name] * _size(name, units[name])
+                found[OF_AXIS[name]] = times(row[name], _size(name, units[name]))
         in_friction = is_friction(f"1 {units.get('stiffness', '')}")
         if row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
@@ -275,7 +276,8 @@ class Cells:
                 found[name] = value
             elif name not in OF_AXIS:
                 scale = FIELDS[field].scale
-                found[field] = value * _size(name, units[name]) / (here[scale] if scale else 1.0)
+                in_si = times(value, _size(name, units[name]))
+                found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
     def _held(self, here: Mapping[str, Any]) -> dict[str, Any]:

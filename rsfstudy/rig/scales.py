@@ -71,7 +71,7 @@ def _held(
             raise InvalidValue(name, None, "is not in the dataset", remedy=remedy)
         return stated
     variable = dataset[held_as].variable.to_base_variable()
-    held = variable * factor(held_as, variable.attrs.get("units", units), units)
+    held = variable * float(factor(held_as, variable.attrs.get("units", units), units))
     if stated is not None and not np.allclose(held, stated, rtol=_ROUNDING, atol=0.0):
         rule = f"contradicts that of the dataset, {_range(held)} {units}"
         remedy = "Each cell is converted by its own: state another to the scenes."
@@ -84,7 +84,7 @@ def in_units(
 ) -> xr.Dataset:
     """A dataset in units of stress, length and time, by its scales in SI units; see `scaled`."""
     units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
-    size = {name: factor("units", *pair) for name, pair in units.items()}
+    size = {name: float(factor("units", *pair)) for name, pair in units.items()}
     size["V_*"] = size["D_c"] / size["D_c/V_*"]
     size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
     size["V_*/D_c"] = 1.0 / size["D_c/V_*"]

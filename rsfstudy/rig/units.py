@@ -1,7 +1,8 @@
 """Numbers with units: the usual ones of a rig are known here, all others to pint.
 
 A quantity is one number and one unit, in one grammar for both: pint is asked for names of units
-only, since it would take numbers among them for factors.
+only, since it would take numbers among them for factors. Factors are fractions, and a conversion is
+rounded once: 0.01 mm and 10 um are one number.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import importlib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from numbers import Real
 from typing import Any
 
@@ -19,26 +21,27 @@ from rsfstudy.declare.axis import plain
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.
-Unit = tuple[float, tuple[int, int, int]]
+Unit = tuple[Fraction, tuple[int, int, int]]
 
 _STRESS, _FORCE, _LENGTH, _TIME = (1, -1, -2), (1, 1, -2), (0, 1, 0), (0, 0, 1)
-_KNOWN: Mapping[str, Unit] = {
-    "kg": (1.0, (1, 0, 0)),
-    **{f"{p}Pa": (x, _STRESS) for p, x in (("", 1.0), ("k", 1e3), ("M", 1e6), ("G", 1e9))},
-    "bar": (1e5, _STRESS),
-    **{f"{p}N": (x, _FORCE) for p, x in (("", 1.0), ("k", 1e3), ("M", 1e6))},
-    "m": (1.0, _LENGTH),
-    "cm": (1e-2, _LENGTH),
-    "mm": (1e-3, _LENGTH),
-    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), (1e-6, _LENGTH)),
-    "nm": (1e-9, _LENGTH),
-    "ms": (1e-3, _TIME),
-    "s": (1.0, _TIME),
-    "min": (60.0, _TIME),
-    "h": (3600.0, _TIME),
-    "day": (86400.0, _TIME),
-    "year": (365.25 * 86400.0, _TIME),
+_SIZES: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
+    "kg": (1, (1, 0, 0)),
+    **{f"{p}Pa": (x, _STRESS) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"), ("G", "1e9"))},
+    "bar": ("1e5", _STRESS),
+    **{f"{p}N": (x, _FORCE) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"))},
+    "m": (1, _LENGTH),
+    "cm": ("1e-2", _LENGTH),
+    "mm": ("1e-3", _LENGTH),
+    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), ("1e-6", _LENGTH)),
+    "nm": ("1e-9", _LENGTH),
+    "ms": ("1e-3", _TIME),
+    "s": (1, _TIME),
+    "min": (60, _TIME),
+    "h": (3600, _TIME),
+    "day": (86400, _TIME),
+    "year": (31557600, _TIME),
 }
+_KNOWN: Mapping[str, Unit] = {name: (Fraction(size), of) for name, (size, of) in _SIZES.items()}
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf")
 #: A name with its power: of one digit, so that no power overflows.
 _POWER = (
@@ -121,7 +124,7 @@ def in_si(name: str, value: Any, units: str) -> float:
         For what is no finite number, and for units that are unknown or of another kind.
     """
     if isinstance(value, str):
-        converted: Any = _of_text(name, value, units)
+        converted: Any = _rounded(_of_text(name, value, units))
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
         converted = _converted(name, value, value, units)
     else:
@@ -134,20 +137,52 @@ def in_si(name: str, value: Any, units: str) -> float:
     return float(converted)
 
 
-def factor(name: str, stated: str, units: str) -> float:
+def exact(name: str, value: Any, units: str) -> Fraction:
+    """A quantity in SI units, of a text before it is rounded; raises as `in_si`."""
+    rounded = in_si(name, value, units)
+    return Fraction(_of_text(name, value, units) if isinstance(value, str) else rounded)
+
+
+def factor(name: str, stated: str, units: str) -> Fraction:
     """Factor from the units that were stated to SI units; raises as `in_si`."""
-    return in_si(name, f"1 {stated}", units)
+    return exact(name, f"1 {stated}", units)
 
 
-def _of_text(name: str, text: str, units: str) -> float:
+def times(values: Any, factor: Fraction) -> Any:
+    """A number or an array in other units, each as a text of its digits would be."""
+    if isinstance(values, np.ndarray):  # with what stands in it many times
+        each, places = np.unique(values, return_inverse=True)
+        return np.array([times(x, factor) for x in each.tolist()])[places].reshape(values.shape)
+    return _rounded(_shortest(values) * factor) if math.isfinite(values) else values
+
+
+def _shortest(number: float) -> Fraction:
+    """The shortest digits that round to a number: of as many as were written there may be any."""
+    return Fraction(repr(float(number)))
+
+
+def _rounded(number: Fraction | float) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
+
+
+def _of_text(name: str, text: str, units: str) -> Fraction | float:
+    """A quantity in SI units; the number itself where that is not finite."""
     match = _NUMBER.match(text.strip())
     powers = _powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
         remedy = f"Write a number and its units, as in '{example}', with a decimal point."
         raise InvalidValue(name, text, "is no quantity", remedy=remedy)
+    number = float(match[0])
+    if not math.isfinite(number):
+        return number
+    stated = _shortest(number)
     if not all(unit in _KNOWN for unit, _power in powers):
-        return float(match[0]) * _factor_of_pint(name, text, powers, units)
+        size = _factor_of_pint(name, text, powers, units)
+        return stated * Fraction(size) if math.isfinite(size) else size
     scale, exponents = _product(powers)
     wanted = _product(_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, wanted[2]):
@@ -155,7 +190,7 @@ def _of_text(name: str, text: str, units: str) -> float:
         raise InvalidValue(name, text, rule, remedy="Divide it by the area of the fault.")
     if exponents != wanted:
         raise _misfit(name, text, units)
-    return float(match[0]) * scale
+    return stated * scale
 
 
 def _misfit(name: str, value: Any, units: str) -> InvalidValue:
@@ -173,7 +208,7 @@ def _powers(units: str) -> list[tuple[str, int]] | None:
 
 def _product(powers: Iterable[tuple[str, int]]) -> Unit:
     """Units that are known here, multiplied."""
-    scale, exponents = 1.0, [0, 0, 0]
+    scale, exponents = Fraction(1), [0, 0, 0]
     for name, power in powers:
         size, of = _KNOWN[name]
         scale *= size**power
