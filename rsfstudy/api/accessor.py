@@ -57,9 +57,9 @@ class Accessor:
             Where no single cell is selected, or a part is a user's own and not known here.
         """
         if "rows_fitted" in self._dataset:
-            from rsfstudy.api import fitting
+            from rsfstudy.api import fit_results
 
-            return fitting.scene(self._dataset)
+            return fit_results.scene(self._dataset)
         if self._is_study:
             return self.study.scene(_cell_of(self._dataset, self.study))
         return _scene_of(self._dataset)
@@ -213,18 +213,18 @@ class Accessor:
         DataError
             Where the dataset is no fit.
         """
-        from rsfstudy.api import fitting
+        from rsfstudy.api import fit_results
 
-        return fitting.table(self._dataset)
+        return fit_results.table(self._dataset)
 
     @door
     def draw(self, n: int, seed: int = 0) -> xr.Dataset:
         """Samples of the parameters of one fit, along ``draw``, as its errors let them be; see
-        `rsfstudy.api.fitting.draw`.
+        `rsfstudy.api.fit_results.draw`.
         """
-        from rsfstudy.api import fitting
+        from rsfstudy.api import fit_results
 
-        return fitting.draw(self._dataset, n, seed)
+        return fit_results.draw(self._dataset, n, seed)
 
     @door
     def failures(self) -> pd.DataFrame:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
-from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import runs
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.doors import door
-from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import contents
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene
 
@@ -49,11 +47,13 @@ def fit(
     after: Any = 0.0,
     noise: str = "ar",
     loading: str = "steps",
-    stiffness: float | None = None,
+    stiffness: Any = None,
+    slip_distance: Any = None,
     engine: Any = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = BUDGET,
     workers: int = 0,
+    command: str = "rsfstudy.fit",
     **scene: Any,
 ) -> xr.Dataset:
     """The friction parameters that a record tells, with errors that count correlated noise.
@@ -84,36 +84,61 @@ def fit(
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).
-    stiffness : float, optional
-        Stiffness over normal stress in 1/um, where no rig states one.
+    stiffness : quantity, optional
+        Of the machine, where no rig states it: over normal stress ("1.6e-3 1/um", a plain number
+        is in 1/um), or in MPa/um, over the mean of the normal stress that the record holds. The
+        first guess, where ``free`` names it.
+    slip_distance : quantity, optional
+        First guess ("10 um", a plain number is in um); by default a twentieth of the way after the
+        step. Five others are tried, a tenth to ten times as long.
     engine, rtol, budget, workers
         As in `rsfstudy.run`; the engine is "compiled" where that is installed.
+    command : str
+        What to note in the history.
     **scene
-        Other fields of the scene: what is not looked for.
+        Other fields of the scene: what is not looked for, as in ``alpha=0.3`` beside
+        ``normal_stress="imposed"``, or ``a=0.01`` where ``free`` leaves it out.
 
     Returns
     -------
     xarray.Dataset
         By law, and by step and record where there are several: each parameter with its standard
-        error (``_stderr``), the ends of its 95 % interval and its numerical error; covariance;
-        along the rows of the record, the friction of the fit and what it leaves. Lengths are in um.
-        ``dataset.rsf.table()``, ``.rsf.plot()`` and ``.rsf.draw()`` say more.
+        error (``_stderr``), the ends of its 95 % interval (``_low``, ``_high``) and its numerical
+        error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
+        (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
+        the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
+        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
+        record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
+        ``.rsf.plot()``, ``.rsf.scene`` and ``.rsf.draw()`` say more.
 
     Raises
     ------
     InvalidValue
         For parameters that a law does not have, no stiffness, and records without steps.
+
+    Warns
+    -----
+    Incomplete
+        Where a fit failed.
+
+    Examples
+    --------
+    >>> record = rsfstudy.read_record("record.csv", normal_stress="20 MPa")
+    >>> fit = rsfstudy.fit(record, stiffness="1.6e-3 1/um", laws=["slip"], after="250 um")
+    >>> fit.rsf.table()
     """
+    if "law" in scene:
+        raise InvalidValue("law", scene["law"], "are laws here", remedy="Write laws=[...].")
     records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
     numbers = _numbers(records, steps)
-    guess = _guess(records[0], rig, numbers[0])
+    guess = _guess(records[0], rig, numbers[0], slip_distance)
     if "alpha" in free:
         scene = {"normal_stress": "imposed", **scene}
-    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free) * guess)
+    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
     _check_free(free, laws, first)
     measure = Fit(
         records=records,
@@ -142,7 +167,9 @@ def fit(
         plot="fits",
         accuracy=Accuracy(rtol, budget, engine=engine),
     )
-    return runs.run(study, workers=workers, output=None, progress=False, keep_going=True)
+    return runs.run(
+        study, workers=workers, output=None, progress=False, keep_going=True, command=command
+    )
 
 
 def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
@@ -164,8 +191,10 @@ def _together(records: Sequence[Record], numbers: Sequence[int]) -> tuple[tuple[
     return tuple((r.name, n) for r in records for n in numbers if n <= len(r.found))
 
 
-def _guess(record: Record, rig: Laboratory | None, number: int) -> float:
+def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> float:
     """Slip distance to begin with, in um."""
+    if stated is not None:
+        return _micrometres("slip_distance", stated)
     if rig is not None:
         return float(rig.slip_distance * 1e6)
     begins = record.found[number - 1].begins
@@ -173,18 +202,33 @@ def _guess(record: Record, rig: Laboratory | None, number: int) -> float:
     return float(_GUESS * (moved[-1] - np.interp(begins, record.time, moved)))
 
 
-def _stiffness(rig: Laboratory | None, stated: float | None, free: Sequence[str]) -> float:
+def _stiffness(rig: Laboratory | None, stated: Any, free: Sequence[str], record: Record) -> float:
     """Stiffness over normal stress, in 1/um."""
     if stated is not None:
-        return stated
+        found = _over_normal_stress(stated, record)
+        if not found > 0.0:
+            raise InvalidValue("stiffness", stated, "must be positive")
+        return found
     if rig is not None and rig.stiffness is not None:
         return float(rig.stiffness / rig.normal_stress * 1e-6)
     if "stiffness" in free:
         return 1e-3
-    remedy = (
-        "Give a rig that states it, or stiffness in 1/um, or look for it: free=[..., 'stiffness']."
-    )
+    remedy = "Give stiffness, as in '1.6e-3 1/um', or a rig that states it, or name it in free."
     raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
+
+
+def _over_normal_stress(stated: Any, record: Record) -> float:
+    """A stiffness in 1/um."""
+    if isinstance(stated, Real):
+        return float(stated)
+    if is_friction(stated):
+        return in_si("stiffness", stated, "1/m") * 1e-6
+    stress = record.columns.get("normal_stress")
+    found = in_si("stiffness", stated, "Pa/m") * 1e-6
+    if stress is None:
+        remedy = "State normal_stress to read_record, or give it over normal stress, in 1/um."
+        raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
+    return found / float(stress.mean())
 
 
 def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
@@ -213,116 +257,3 @@ def _check_free(free: Sequence[str], laws: Sequence[str], scene: Scene) -> None:
 
 def _micrometres(name: str, value: Any) -> float:
     return float(value) if isinstance(value, int | float) else in_si(name, value, "m") * 1e6
-
-
-def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The fits that a dataset holds, one by one."""
-    if "rows_fitted" not in dataset:
-        raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
-    dims = dataset["rows_fitted"].dims
-    sizes = [dataset.sizes[d] for d in dims]
-    return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
-
-
-def table(dataset: xr.Dataset) -> pd.DataFrame:
-    """One row a fit, with the columns that laboratories use; lengths in um.
-
-    ``_std`` are standard errors; NaN stands where something was not looked for.
-    """
-    names = {"a": "a", "b": "b", "b1": "b1", "b2": "b2", "slip_distance": "Dc"}
-    names |= {"slip_distance_2": "Dc2", "stiffness": "k", "law_exponent": "exponent"}
-    names |= {"mu_star": "mu_0", "trend1": "trend"}
-    rows = []
-    for one in cells(dataset):
-        row: dict[str, Any] = {n: one[n].item() for n in ("record", "step") if n in one.coords}
-        for name, short in names.items():
-            if name in one.data_vars:
-                row[short] = one[name].item()
-                row[f"{short}_std"] = one[f"{name}_stderr"].item()
-        row |= {
-            "a_minus_b": one["a_minus_b"].item(),
-            "a_minus_b_std": one["a_minus_b_stderr"].item(),
-        }
-        row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
-        row |= {"law": one["law"].item() if "law" in one.coords else ""}
-        row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
-        row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
-        row["status"] = _label(one)
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _label(one: xr.Dataset) -> str:
-    flags = dict(
-        zip(one["status"].flag_values.tolist(), one["status"].flag_meanings.split(), strict=True)
-    )
-    return str(flags[one["status"].item()])
-
-
-def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
-    """Samples of the parameters of one fit, as its errors let them be.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of which one fit is selected.
-    n : int
-        How many.
-    seed : int
-
-    Returns
-    -------
-    xarray.Dataset
-        Each parameter along ``draw``. Slip distances and stiffness stay positive: their logarithms
-        are drawn. The distribution is Student's t.
-    """
-    found = cells(dataset)
-    if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
-    if not isinstance(n, int) or n < 1:
-        raise InvalidValue("n", n, "must be a whole number, 1 or more")
-    one = found[0]
-    names = [str(name) for name in one["parameter"].values]
-    at = np.array([one[name].item() for name in names])
-    covariance = one["covariance"].values
-    if not np.isfinite(covariance).all():
-        raise InvalidValue("dataset", _label(one), "has no covariance to draw from")
-    logs = np.array([name in LOGARITHMIC for name in names])
-    scales = np.where(logs, at, 1.0)
-    rng = np.random.default_rng(seed)
-    degrees = one["degrees_of_freedom"].item()
-    spread = rng.multivariate_normal(np.zeros(len(at)), covariance / np.outer(scales, scales), n)
-    spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
-    drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
-    data = {
-        name: ("draw", drawn[:, place], {"units": one[name].attrs.get("units", "1")})
-        for place, name in enumerate(names)
-    }
-    return xr.Dataset(data, coords={"draw": np.arange(n)})
-
-
-def scene(dataset: xr.Dataset) -> Scene:
-    """The scene of one fit, with the parameters that it found, in units of its slip distance and of
-    the velocity before the step.
-    """
-    found = cells(dataset)
-    if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
-    one, plain = found[0], json.loads(dataset.attrs["declaration"])
-    first = contents.scene(plain["base"], {})
-    if "law" in one.coords:
-        first = first.with_(law=str(one["law"].item()))
-    value = {n: one[n].item() for n in map(str, one["parameter"].values)}
-    guess = float(plain["measure"]["slip_distance_guess"])
-    distance, a = value.get("slip_distance", guess), value.get("a", first.a)
-    changes: dict[str, Any] = {
-        n: value[n] for n in ("a", "mu_star", "alpha", "law_exponent") if n in value
-    }
-    changes |= {f"{n}_over_a": value[n] / a for n in ("b", "b1", "b2") if n in value}
-    if "slip_distance_2" in value:
-        changes["length_ratio"] = value["slip_distance_2"] / distance
-    changes["stiffness"] = value.get("stiffness", first.stiffness / guess) * distance
-    changes["reference_rate"] = one["velocity_before"].item() / distance
-    return first.with_(**changes)

@@ -17,7 +17,7 @@ from typing import Any
 
 import click
 
-from rsfstudy.cli import command_line_simulate, options
+from rsfstudy.cli import command_line_fit, command_line_simulate, options
 from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS
 from rsfstudy.doors import in_words
@@ -301,6 +301,7 @@ def export(**given: Any) -> int:
 
 
 cli.add_command(command_line_simulate.simulate)
+cli.add_command(command_line_fit.fit)
 
 if __name__ == "__main__":
     main()

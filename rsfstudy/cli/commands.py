@@ -17,7 +17,7 @@ import click
 import xarray as xr
 
 from rsfstudy.api import exchange, runs
-from rsfstudy.cli import assignments, commands_simulate, terminal, terminal_numbers
+from rsfstudy.cli import assignments, commands_fit, commands_simulate, terminal, terminal_numbers
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.options import RIG
 from rsfstudy.cli.terminal import FAILED, OK, Ended
@@ -49,6 +49,8 @@ def show(
         dataset = store.read_any(Path(name))
         if contents.is_of_a_scene(dataset):
             return commands_simulate.show(dataset)
+        if commands_fit.is_fit(dataset):
+            return commands_fit.show(dataset)
         return terminal.results(dataset, name)
     terminal.declaration(_declared(catalogue.load(name), settings, rig, rtol=rtol), output)
     return OK

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +45,13 @@ def simulate(
     """Follow one motion, draw it and write it."""
     if output.suffix not in (".png", ".pdf", ".svg"):
         raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
-    _check_replaceable(output.with_suffix(".nc"))
-    fields, velocity = _fields(settings), rig.pop("load_velocity")
+    check_replaceable(output.with_suffix(".nc"), _is_motion, "motion")
+    stated_fields, velocity = fields(settings), rig.pop("load_velocity")
     stated = {name: text for name, text in rig.items() if text is not None}
     laboratory = assignments.laboratory(stated) if stated else None
     if velocity is not None:
-        fields["load_velocity"] = assignments.number_or_text(velocity)
-    scene = _scene(fields, protocol_file, laboratory)
+        stated_fields["load_velocity"] = assignments.number_or_text(velocity)
+    scene = _scene(stated_fields, protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
     motion = motion.assign_attrs(provenance.attributes(shlex.join(["rsfstudy", *sys.argv[1:]])))
@@ -60,18 +61,22 @@ def simulate(
     return _NO_PHYSICS if BEYOND in motion.attrs else terminal.OK
 
 
-def _check_replaceable(data: Path) -> None:
-    """What is there may be an earlier motion, and nothing else."""
+def check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
+    """What is there may be an earlier one of its kind, and nothing else."""
     if not data.exists():
         return
     try:
         with xr.open_dataset(data, engine="netcdf4") as there:
-            if "scene" in there.attrs and "time" in there.dims:
+            if is_one(there):
                 return
     except (OSError, RuntimeError, ValueError):
-        pass  # whatever it is, it is no motion
+        pass  # whatever it is, it is none
     remedy = "Choose another --output, or move it away first."
-    raise InvalidValue("--output", str(data), "is there already, and no motion", remedy=remedy)
+    raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)
+
+
+def _is_motion(there: xr.Dataset) -> bool:
+    return "scene" in there.attrs and "time" in there.dims
 
 
 def _scene(
@@ -139,8 +144,8 @@ def show(answer: xr.Dataset) -> int:
     """
     about, ours = answer.attrs, Accessor(answer)
     console.print(about.get("title", "answer for one scene"), style="bold")
-    fields = {name: value for name, value in ours.scene.as_dict().items() if value is not None}
-    console.print(", ".join(f"{name} = {short(value)}" for name, value in fields.items()))
+    stated = {name: value for name, value in ours.scene.as_dict().items() if value is not None}
+    console.print(", ".join(f"{name} = {short(value)}" for name, value in stated.items()))
     made, source = (about.get(name, "unknown") for name in ("history", "source"))
     console.print(f"made by {made}, with {source}")
     if "load_point_displacement" in answer:
@@ -154,13 +159,14 @@ def show(answer: xr.Dataset) -> int:
     return terminal.OK if about["status"] == Status.OK.label else terminal.FAILED
 
 
-def _fields(settings: tuple[str, ...]) -> dict[str, Any]:
-    fields: dict[str, Any] = {}
+def fields(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Fields of a scene that ``--set`` states."""
+    stated: dict[str, Any] = {}
     for text in settings:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
             raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
-        if name in fields:
+        if name in stated:
             raise InvalidValue("--set", text, f"sets {name} twice")
-        fields[name] = assignments.value(value)
-    return fields
+        stated[name] = assignments.value(value)
+    return stated

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model
+from rsfstudy.analysis.fitting.model import INSTEAD, LOGARITHMIC, PARAMETERS, Model
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.record import COLUMNS, Record, loading_of
 from rsfstudy.analysis.fitting.search import Fitted, Search
@@ -33,8 +33,10 @@ _BACK, _POINTS, _ROWS = 0.5, 3.0, 3
 _LATE = 0.2
 #: Lags at which residuals freed of correlation are tested for what is left of it.
 _LAGS = 20
-#: Standard errors that numerical errors are held to as to the parameter itself.
+#: Standard errors that numerical errors are held to as to the parameter itself: at the default
+#: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
 _SMALL = 1000.0
+#: Fields of a scene that follow from what is found.
 _SOUGHT = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
@@ -145,7 +147,10 @@ class Fit(Measure):
             raise InvalidValue("free", self.free, "must name parameters, each once")
         for name in self.free:
             if name not in PARAMETERS:
-                raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS)
+                remedy = f"Write {INSTEAD[name]}." if name in INSTEAD else ""
+                raise InvalidValue(
+                    "free", name, "is no parameter", choices=PARAMETERS, remedy=remedy
+                )
         for name, step in self._windows:
             if name not in names:
                 raise InvalidValue("record", name, "is unknown", choices=names)
@@ -227,6 +232,13 @@ class Fit(Measure):
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         records = {record.name: record.digest for record in self.records}
         return {"name": self.name, **stated, "free": list(self.free), "records": records}
+
+    @classmethod
+    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """Raises InvalidValue: records are told by their digests."""
+        rule = "are fitted, and the file has no more than digests of them"
+        remedy = "Fit them again: show FILE tells the command."
+        raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @property
     def _involved(self) -> tuple[Record, ...]:

@@ -47,8 +47,10 @@ Draw = Callable[[xr.Dataset, Axes], Any]
 
 #: What draws any lattice.
 _ANY = ("lines", "maps")
+#: What draws fits of records.
+_FITS = "fits"
 #: Names of figures: those, and those of the named studies.
-NAMES = (*_ANY, *names.names())
+NAMES = (*_ANY, _FITS, *names.names())
 
 #: Points an inch of what a notebook shows.
 _ON_SCREEN = 150
@@ -166,8 +168,8 @@ def _fitting(
     """
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
     study = catalogue.load(name) if name in names.names() else None
-    if name == "fits" and own is variable is None:
-        return Declared(importlib.import_module(f"{__name__}.fits").panels(dataset)), dataset
+    if name == _FITS and own is variable is None:
+        return Declared(importlib.import_module(f"{__name__}.{_FITS}").panels(dataset)), dataset
     if own is None and study is None and name not in _ANY:
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}

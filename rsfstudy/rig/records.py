@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ _UNITS = {
     "shear_stress": ("Pa", 1.0),
     "normal_stress": ("Pa", 1.0),
 }
+#: The usual units.
+_USUAL = {"time": "s", "displacement": "um"}
 #: How headings of the usual files begin.
 _HEADINGS = {
     "time": r"t(ime)?\b|time",
@@ -41,10 +43,10 @@ _BEGIN = _HEAD + _HEADER * _COLUMNS
 @door
 def read_record(
     source: Any,
-    columns: Mapping[str, tuple[Any, ...]] | None = None,
+    columns: Mapping[str, Any] | None = None,
     *,
     normal_stress: Any = None,
-    name: str = "record",
+    name: str = "",
 ) -> Record:
     """A record of an experiment, for `rsfstudy.fit`.
 
@@ -54,15 +56,15 @@ def read_record(
         A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
         the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
         recorded. Plain arrays are in s, um, and MPa.
-    columns : mapping of str to (heading, units), optional
-        Heading in the file, and units, of each: ``{"time": ("t", "s")}``. Without it headings are
-        known by how they begin, and state their units, as in ``Displ (um)``. Columns of xlook's
-        files are named by their heading or number, with a scale and an offset where their numbers
-        are raw: ``{"displacement": ("LP_disp", "um", 0.1, 0.0)}``.
+    columns : mapping of str to str or (heading, units), optional
+        Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
+        "s")``. Without it headings are known by how they begin, and state their units, as in
+        ``Displ (um)``. Columns of xlook's files are named by their heading or number, with a scale
+        and an offset where their numbers are raw: ``{"displacement": ("LP", "um", 0.1, 0.0)}``.
     normal_stress : quantity, optional
         By which shear stress is divided where no normal stress was recorded ("20 MPa").
     name : str
-        What it is called in results.
+        What it is called in results; by default as the file is, or "record".
 
     Returns
     -------
@@ -95,7 +97,14 @@ def read_record(
             rule = "must be a finite number"
             raise InvalidValue(key, float(column.values[row]), rule).at(column.place(row))
         values[key] = column.values * _scale(key, column.units)
-    return _record(values, normal_stress, name)
+    return _record(values, normal_stress, name or _name(source))
+
+
+def _name(source: Any) -> str:
+    """That of a file, as an identifier."""
+    stem = Path(source).stem if isinstance(source, str | Path) else "record"
+    text = re.sub(r"\W", "_", stem, flags=re.ASCII)
+    return text if text.isidentifier() else f"record_{text}"
 
 
 def _scale(key: str, units: str) -> float:
@@ -109,18 +118,17 @@ def _scale(key: str, units: str) -> float:
 
 
 def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Record:
+    if normal_stress is not None and "normal_stress" not in values:
+        stated = in_si("normal_stress", normal_stress, "Pa")
+        values["normal_stress"] = np.full(len(values["time"]), stated)
     if "friction" not in values:
         if "shear_stress" not in values:
             rule = "tells no friction: it needs friction, or shear_stress"
             raise InvalidValue("record", [*values], rule)
         stress = values.get("normal_stress")
         if stress is None:
-            if normal_stress is None:
-                remedy = "Give normal_stress, as in '20 MPa'."
-                raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
-            stress = np.full(
-                len(values["shear_stress"]), in_si("normal_stress", normal_stress, "Pa")
-            )
+            remedy = "Give normal_stress, as in '20 MPa'."
+            raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
         if not (stress > 0.0).all():
             row = int(np.argmax(~(stress > 0.0)))
             rule = f"must be positive, and is not in row {row + 1}"
@@ -129,28 +137,20 @@ def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Rec
     return Record({q.name: values[q.name] for q in COLUMNS if q.name in values}, name)
 
 
-def _of_text(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mapping[str, Column]:
+def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
     """Columns of a text file, by headings that are known."""
-    if columns is not None:
-        return read_table(
-            path, {key: (heading, units) for key, (heading, units) in columns.items()}
-        )
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         header = file.readline()
     between = next((c for c in "\t;," if c in header), None)
+    headings = [text.strip() for text in header.rstrip("\n").split(between)]
+    if columns is not None:
+        return read_table(path, {key: _told(key, of, headings) for key, of in columns.items()})
     wanted: dict[str, tuple[str, str]] = {}
-    for text in header.rstrip("\n").split(between):
+    for text in headings:
         match = _HEADING.fullmatch(text)
         for key, begins in _HEADINGS.items():
             if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                units = (match[2] or "").strip()
-                if not units and key != "friction":
-                    rule = "states no units"
-                    remedy = f"Write them behind it, as in {text.strip()} (um), or give columns."
-                    raise InvalidValue("heading", text.strip(), rule, remedy=remedy).at(
-                        f"{path}, line 1"
-                    )
-                wanted[key] = (text.strip(), units)
+                wanted[key] = _told(key, text, headings)
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (
@@ -163,12 +163,28 @@ def _of_text(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mappi
     return read_table(path, wanted)
 
 
+def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str]:
+    """Heading and units of a column; of one text, units stand in brackets behind the heading, in
+    the file too or not.
+    """
+    if not isinstance(told, str):
+        heading, units = told
+        return str(heading), str(units)
+    match = _HEADING.fullmatch(told)
+    units = (match[2] or "").strip() if match else ""
+    if not units and key != "friction":
+        remedy = f"Write them behind it, as in {told} ({_USUAL.get(key, 'MPa')})."
+        remedy += " Where the file does not, give columns."
+        raise InvalidValue("heading", told, "states no units", remedy=remedy)
+    return told if told in headings or not match else match[1], units
+
+
 def _is_binary(path: Path) -> bool:
     with path.open("rb") as file:
         return b"\0" in file.read(_BEGIN)
 
 
-def _of_xlook(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mapping[str, Column]:
+def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
     """Columns of a binary file of xlook: big-endian, headers of 84 bytes, then float32 one column
     after the other. Its first column is the time that each sample takes.
     """
@@ -195,10 +211,11 @@ def _of_xlook(path: Path, columns: Mapping[str, tuple[Any, ...]] | None) -> Mapp
         names = ", ".join(f"{n}: {h} ({u})" for n, (h, u, _v) in enumerate(headings, start=1))
         remedy = f"Name them by columns=. It holds {names}."
         raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
-    for key, (heading, units, *line) in columns.items():
-        places = [n for n, (h, _u, _v) in enumerate(headings, 1) if heading in (n, h)]
+    known = [heading for heading, _units, _values in headings]
+    for key, told in columns.items():
+        heading, units, *line = _told(key, told, known) if isinstance(told, str) else told
+        places = [n for n, h in enumerate(known, 1) if heading in (n, str(n), h)]
         if len(places) != 1:
-            known = [h for h, _u, _v in headings]
             raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)
         scale, offset = (*line, 1.0, 0.0)[:2] if len(line) != 1 else (line[0], 0.0)
         values = headings[places[0] - 1][2] * scale + offset

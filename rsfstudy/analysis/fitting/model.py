@@ -45,6 +45,18 @@ PARAMETERS = {
         ),
     )
 }
+#: What others call them.
+INSTEAD = {
+    **dict.fromkeys(("Dc", "dc", "D_c", "d_c", "L", "dcrit"), "slip_distance"),
+    **dict.fromkeys(("Dc1", "L1"), "slip_distance"),
+    **dict.fromkeys(("Dc2", "L2", "dc2"), "slip_distance_2"),
+    **dict.fromkeys(("mu", "mu0", "mu_0", "f0", "f_0", "mu_ref"), "mu_star"),
+    **dict.fromkeys(("k", "K", "kappa", "stiffness_ratio"), "stiffness"),
+    **dict.fromkeys(("trend", "slope", "drift", "detrend"), "trend1"),
+    **dict.fromkeys(("a_minus_b", "b_over_a"), "a and b, of which both follow"),
+    **dict.fromkeys(("eps", "epsilon"), "law_exponent, with law='family'"),
+    **dict.fromkeys(("t0", "step"), "step_time"),
+}
 #: Those whose logarithm is looked for.
 LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
 #: Central differences of fourth order: places and weights; and those of second order. Friction is

@@ -63,7 +63,8 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
         return ()
     t0, x0 = t[0], x[0]
     sums = _Sums(t - t0, x - x0)
-    knots = _merged(sums, sorted(_parted(sums, 0, len(t), _noise(t, x))), t)
+    variance = _noise(t, x)
+    knots = _merged(sums, sorted(_parted(sums, 0, len(t), variance)), t, variance)
     lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
         _meeting(lines[n], lines[n + 1], t[k - 1] - t0, t[k] - t0)
@@ -127,12 +128,13 @@ def _parted(sums: _Sums, first: int, last: int, variance: float) -> set[int]:
     return found
 
 
-def _merged(sums: _Sums, knots: list[int], t: np.ndarray) -> list[int]:
+def _merged(sums: _Sums, knots: list[int], t: np.ndarray, variance: float) -> list[int]:
     """Knots without those between pieces that tell no step, the least one first."""
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
         speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
-        left = math.sqrt(sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1])
+        left = sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1]
+        left = math.sqrt(max(left, variance))
         change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*knots[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
         differs = change / (_DIFFERS * np.maximum(faster, _HELD * np.abs(speeds).max()))

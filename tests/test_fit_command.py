@@ -1,0 +1,246 @@
+"""The command `fit`: what it prints, draws and writes; what becomes of its files; and how columns
+of records are named.
+"""
+
+import math
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from running import call
+
+import rsfstudy
+from rsfstudy.api import fit_results
+from rsfstudy.cli.commands_fit import with_error
+from rsfstudy.errors import DataError, InvalidValue
+
+#: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
+TRUE = {"a": 0.010, "b": 0.013, "slip_distance": 12.0, "mu_star": 0.6, "trend1": -5e-6}
+STIFFNESS = 2e-3
+COLUMNS = "time=t (s),displacement=lp (um),friction=mu"
+FIT = ("--columns", COLUMNS, "--stiffness", f"{STIFFNESS} /um", "--law", "slowness")
+
+
+def rows(seed: int = 0, noise: float = 3e-4) -> np.ndarray:
+    """Time, load point displacement and friction of two velocity steps, by Runge and Kutta in steps
+    of 1/400 of D_c; of each, the state is ln(theta V_0/D_c). Noise is correlated by .8.
+    """
+    a, b, dc, mu_star, trend = TRUE.values()
+
+    def slopes(mu: float, psi: float, load: float) -> tuple[float, float]:
+        rate = math.exp((mu - mu_star - b * psi) / a)
+        return STIFFNESS * (load - rate), (math.exp(-psi) - rate) / dc
+
+    time, place = 0.0, 0.0
+    mu, psi, found = mu_star, 0.0, []
+    for load, lasts, every in ((1.0, 100.0, 0.5), (10.0, 40.0, 0.1), (1.0, 300.0, 0.5)):
+        count = 10 * math.ceil(every * load * 40 / dc)
+        for _ in range(round(lasts / every)):
+            found.append((time, place, mu + trend * place))
+            h = every / count
+            for _ in range(count):
+                k1 = slopes(mu, psi, load)
+                k2 = slopes(mu + h / 2 * k1[0], psi + h / 2 * k1[1], load)
+                k3 = slopes(mu + h / 2 * k2[0], psi + h / 2 * k2[1], load)
+                k4 = slopes(mu + h * k3[0], psi + h * k3[1], load)
+                mu += h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0])
+                psi += h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1])
+            time, place = time + every, place + every * load
+    told = np.array(found)
+    rng = np.random.default_rng(seed)
+    last = 0.0
+    for n in range(len(told) if noise else 0):
+        last = 0.8 * last + 0.6 * rng.standard_normal()
+        told[n, 2] += noise * last
+    return told
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A directory with a record, its fits by the command, and what that said."""
+    here = tmp_path_factory.mktemp("fits")
+    with (here / "record.csv").open("w") as file:
+        file.write("t (s),lp (um),mu\n")
+        file.writelines("{:.2f},{:.3f},{:.6f}\n".format(*row) for row in rows())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "80")
+        patch.chdir(here)
+        ran = call("fit", "record.csv", *FIT)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return here, ran.stdout
+
+
+def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
+    _here, said = written
+    assert re.search(r"record: 1,200 rows, 2 steps", said)
+    steps = re.findall(r"^ +[12] +(\d+) +0 ", said, re.MULTILINE)
+    assert steps == ["100", "140"]
+    for name in ("a", "b", "a_minus_b", r"Dc \(um\)", "mu_0", r"trend \(1/um\)"):
+        row = rf"^ {name} +\S.* \+- \S.*$"
+        assert len(re.findall(row, said, re.MULTILINE)) == 2, name
+    assert "residuals freed of correlation are white" in said
+    assert max(len(line.rstrip()) for line in said.splitlines()) <= 80
+
+
+def test_what_it_finds_is_what_the_record_was_made_of(written):
+    """Each within 4 standard errors: of 8 numbers one lies outside once in 2,000 records."""
+    here, _said = written
+    found = rsfstudy.open(here / "fit.nc")
+    for name in ("a", "b", "slip_distance", "trend1"):
+        for one in fit_results.cells(found):
+            off = (one[name].item() - TRUE[name]) / one[f"{name}_stderr"].item()
+            assert abs(off) < 4.0, (name, off)
+
+
+def test_its_file_is_shown_drawn_and_exported(written):
+    here, said = written
+    file = str(here / "fit.nc")
+    shown = call("show", file)
+    assert shown.returncode == 0
+    table = [line for line in said.splitlines() if "+-" in line]
+    assert table
+    assert all(line.rstrip() in map(str.rstrip, shown.stdout.splitlines()) for line in table)
+    assert "made by rsfstudy fit record.csv" in shown.stdout
+    assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
+    drawn = call("plot", file, "--output", str(here / "again.pdf"))
+    assert drawn.returncode == 0, drawn.stderr
+    assert "drawn as lines" not in drawn.stderr
+    assert call("export", file, "--csv").returncode == 0
+    assert "slip_distance_stderr" in (here / "fit.csv").read_text().splitlines()[0]
+    assert call("check", file).returncode == 0
+
+
+def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, monkeypatch):
+    here, _said = written
+    monkeypatch.chdir(tmp_path)
+    ran = call("fit", str(here / "record.csv"), *FIT, "--together")
+    assert ran.returncode == 0, ran.stderr
+    assert "step 1 of record, step 2 of record" in " ".join(ran.stdout.split())
+    for name in ("a", r"Dc \(um\)", "mu_0_1", "mu_0_2", r"trend_2 \(1/um\)"):
+        assert len(re.findall(rf"^ {name} +\S", ran.stdout, re.MULTILINE)) == 1, name
+    figure = rsfstudy.open(tmp_path / "fit.nc").rsf.plot()
+    curves = [line for line in figure.axes[0].lines if line.get_label() == "slowness law"]
+    symbols = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
+    assert len(curves) == 1  # windows that follow each other are one piece
+    assert symbols[3:] == [r"$\mu_*^{(1)}$", "$c_1^{(1)}$", r"$\mu_*^{(2)}$", "$c_1^{(2)}$"]
+
+
+def test_a_rerun_says_what_it_lacks(written):
+    here, _said = written
+    for words in ((), ("--cell", "step=1")):
+        ran = call("rerun", str(here / "fit.nc"), "--serial", *words)
+        assert ran.returncode == 2
+        assert "Fit them again" in " ".join(ran.stderr.split())
+
+
+def test_numbers_of_its_file_say_what_they_are(written):
+    here, _said = written
+    found = xr.load_dataset(here / "fit.nc")
+    assert found.slip_distance.attrs["units"] == "um"
+    assert found.slip_distance_stderr.attrs["long_name"].startswith("standard error of the ")
+    assert "misfit of the fitted law" not in found.a_stderr.attrs["long_name"]
+    for name, values in found.data_vars.items():
+        assert values.attrs["long_name"], name
+
+
+def test_files_of_others_are_not_replaced(written, tmp_path):
+    here, _said = written
+    (tmp_path / "fit.nc").write_text("mine")
+    ran = call("fit", str(here / "record.csv"), *FIT, "--output", str(tmp_path / "fit.png"))
+    assert ran.returncode == 2
+    assert "no fit" in ran.stderr
+    assert (tmp_path / "fit.nc").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--free", "a,b,Dc"), "slip_distance"),
+        (("--free", "a,b,k"), "stiffness"),
+        (("--law", "magic"), "law"),
+        (("--step", "one"), "--step"),
+        (("--step", "7"), "has 2"),
+        (("--columns", "time"), "NAME=HEADING"),
+        (("--columns", "time=t,displacement=lp (um),friction=mu"), "states no units"),
+        (("--columns", "time=t (s),displacement=lpd (um),friction=mu"), "lp (um)"),
+        (("--stiffness", "0.04 MPa/um"), "normal stress"),
+        (("--stiffness", "5 mm"), "another kind"),
+        (("--noise", "pink"), "white"),
+        (("--output", "fit.txt"), ".png"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_message(written, words, told):
+    here, _said = written
+    ran = call("fit", str(here / "record.csv"), *FIT, "--output", str(here / "x.png"), *words)
+    assert ran.returncode == 2, ran.stderr
+    assert told in " ".join(ran.stderr.split())
+    assert "Traceback" not in ran.stderr
+
+
+def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
+    here, _said = written
+    record = rsfstudy.read_record(
+        here / "record.csv",
+        {"time": ("t (s)", "s"), "displacement": "lp (um)", "friction": "mu"},
+        normal_stress="20 MPa",
+    )
+    assert record.name == "record"
+    options = {"laws": ["slowness"], "steps": [1], "free": ["mu_star"], "noise": "white"}
+    fits = [
+        rsfstudy.fit(
+            record, stiffness=stated, a=0.01, b_over_a=1.3, slip_distance="12 um", **options
+        )
+        for stated in (STIFFNESS, "2e-3 /um", "0.04 MPa/um", "2 1/mm")
+    ]
+    found = [float(one.mu_star[0]) for one in fits]
+    assert found == pytest.approx([found[0]] * 4, rel=1e-12)
+
+
+def test_laws_are_named_as_a_list(written):
+    here, _said = written
+    record = rsfstudy.read_record(here / "record.csv", {"time": "t (s)", "displacement": "lp (um)",
+                                                        "friction": "mu"})  # fmt: skip
+    with pytest.raises(InvalidValue, match="laws="):
+        rsfstudy.fit(record, stiffness=STIFFNESS, law="slip")
+
+
+def test_a_number_has_the_digits_that_its_error_gives_it():
+    def told(value, error):
+        return with_error(xr.Dataset({"x": value, "x_stderr": error}), "x")
+
+    assert told(0.0100312, 0.00011) == "0.01003 +- 0.00011"
+    assert told(12.345, 0.14) == "12.35 +- 0.14"
+    assert told(1234.5, 120.0) == "1234 +- 120"
+    assert told(-5.29e-6, 3.7e-7) == "(-5.29 +- 0.37)e-06"
+    assert told(1e-9, 4e-7) == "(0.0 +- 4.0)e-07"
+    assert told(3.0, math.inf) == "3 +- inf"
+    assert told(math.nan, math.nan) == "-"
+
+
+def test_the_figure_shows_each_record_and_says_what_panels_show(written):
+    """Symbols for all parameters; no grid over the matrix; letters beside titles, not on them."""
+    here, _said = written
+    figure = rsfstudy.open(here / "fit.nc").rsf.plot()
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    record, residual, lags, matrix = figure.axes
+    labels = [text.get_text() for text in matrix.get_xticklabels()]
+    assert len(labels) == 5
+    assert all(label.startswith("$") for label in labels)
+    assert not any(line.get_visible() for line in matrix.get_xgridlines())
+    assert record.get_xlabel() == residual.get_xlabel() == r"Load point displacement ($\mu$m)"
+    assert lags.get_xlabel() == "Lag (rows)"
+    for axes in figure.axes:
+        letter, title = (
+            next(t for t in axes.get_children() if t is getattr(axes, name)).get_window_extent(
+                renderer
+            )
+            for name in ("_left_title", "title")
+        )
+        assert letter.x1 <= title.x0 or not axes.get_title()
+
+
+def test_what_is_no_fit_says_so():
+    with pytest.raises(DataError, match="no fit"):
+        rsfstudy.simulate(rsfstudy.Scene(hold_time=1.0), duration=1.0).rsf.table()
