@@ -113,8 +113,8 @@ def _scale(key: str, units: str) -> float:
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
     if si == "1":
-        return 1.0 if units in ("1", "-") else factor(key, units, si)
-    return factor(key, units, si) * ours
+        return 1.0 if units in ("1", "-") else float(factor(key, units, si))
+    return float(factor(key, units, si)) * ours
 
 
 def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Record:

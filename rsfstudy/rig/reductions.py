@@ -48,5 +48,5 @@ class InUnits(Reduction):
         scale, known = dataset[self.of].attrs.get("scale", ""), scales_of(dataset)
         if scale not in known:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
-        size = known[scale].factor / factor(self.name, self.units, known[scale].units)
+        size = known[scale].factor / float(factor(self.name, self.units, known[scale].units))
         return xr.DataArray(size)
