@@ -35,9 +35,11 @@ SHORT = {
 
 
 def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The fits that a dataset holds, one by one."""
+    """The fits that a dataset holds, one by one; of several windows, that of the whole one."""
     if "rows_fitted" not in dataset:
         raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
+    if "part" in dataset.dims:
+        dataset = dataset.isel(part=0)
     dims = dataset["rows_fitted"].dims
     sizes = [dataset.sizes[d] for d in dims]
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
@@ -63,7 +65,7 @@ def shown(one: xr.Dataset) -> dict[str, tuple[str, str]]:
 def table(dataset: xr.Dataset) -> pd.DataFrame:
     """One row a fit, with the columns that laboratories use; lengths in um.
 
-    ``_std`` are standard errors; NaN stands where something was not looked for.
+    ``_std`` are standard errors, ``_windows`` what parameters scatter by among windows; NaN stands where something was not looked for.
     """
     rows = []
     for one in cells(dataset):
@@ -71,6 +73,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
         for name, (short, _units) in shown(one).items():
             row[short] = one[name].item()
             row[f"{short}_std"] = one[f"{name}_stderr"].item()
+            if f"{name}_windows" in one:
+                row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"

@@ -18,6 +18,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
+from rsfstudy.reduce import StandardDeviation
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.units import in_si
@@ -30,6 +31,8 @@ FREE = ("a", "b", "slip_distance", "mu_star", "trend1")
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
 #: First guesses of a scene: those of a record take their place.
+#: Shortest of several windows, as a part of what follows a step.
+_SHORTEST = 0.5
 _SCENE = {"a": 0.01, "b_over_a": 1.2, "mu_star": 0.6, "normal_stress": "constant"}
 _TWO = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
@@ -45,6 +48,7 @@ def fit(
     together: bool = False,
     before: Any = 0.0,
     after: Any = 0.0,
+    windows: int = 1,
     noise: str = "ar",
     loading: str = "steps",
     stiffness: Any = None,
@@ -79,6 +83,10 @@ def fit(
     before, after : quantity
         Load point displacement that is fitted around each ("100 um"); 0: all up to the next step,
         and half the way back to the one before.
+    windows : int
+        Number of windows, from half of what follows each step to all of it. How far parameters
+        scatter among them is told beside their standard errors (``_windows``): where that is more,
+        something else than noise is in the record, a trend that is none of those fitted, say.
     noise : str
         "white", "ar" (autoregressive, of an order that a criterion chooses), or "ar1" and so on.
     loading : {"steps", "recorded"}
@@ -157,6 +165,12 @@ def fit(
         axes.append(Axis("record", [one.name for one in records]))
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
+    reductions = []
+    if not isinstance(windows, int) or windows < 1:
+        raise InvalidValue("windows", windows, "must be a whole number, 1 or more")
+    if windows > 1:
+        axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
+        reductions = [StandardDeviation(f"{n}_windows", n, over="part") for n in measure.parameters]
     engine = engine or (COMPILED if is_installed(COMPILED) else SCIPY)
     study = Study(
         name="fit",
@@ -164,6 +178,7 @@ def fit(
         base=first,
         axes=axes,
         measure=measure,
+        reductions=reductions,
         plot="fits",
         accuracy=Accuracy(rtol, budget, engine=engine),
     )

@@ -58,6 +58,14 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
     "--after", default="0 um", help="That after it, as in '250 um'.  [default: up to the next step]"
 )
 @click.option(
+    "--windows",
+    type=click.IntRange(1),
+    metavar="N",
+    default=1,
+    show_default=True,
+    help="Windows, from half of what follows a step to all of it; tells what parameters scatter by.",
+)
+@click.option(
     "--noise",
     default="ar",
     show_default=True,

@@ -16,6 +16,7 @@ import xarray as xr
 from rich.table import Column, Table
 
 from rsfstudy import plots
+from rsfstudy.analysis.fitting.joint import plain
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import fit_results, fitting
 from rsfstudy.cli import commands_simulate, terminal
@@ -212,6 +213,12 @@ def _remarks(one: xr.Dataset) -> None:
     law, message = _law(one), str(one["message"].item())
     if message:
         console.print(f"{law}: {fit_results.status(one).replace('_', ' ')}: {message}")
+    spreads = {n: one[f"{n}_windows"] for n in fit_results.shown(one) if f"{n}_windows" in one}
+    if spreads:
+        each = ", ".join(
+            f"{fit_results.SHORT[plain(n)][0]} {v.item():.2g}" for n, v in spreads.items()
+        )
+        console.print(f"{law}: among windows parameters scatter by {each}")
     chance = one["whiteness"].item()
     if math.isfinite(chance):
         verdict = "white" if chance > _CHANCE else "still correlated"

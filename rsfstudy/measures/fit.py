@@ -100,6 +100,8 @@ class Fit(Measure):
     before, after : float
         Load point displacement in um that is fitted before the step and after it. Zero: half the
         way back to the step before, and up to the next.
+    part : float
+        Part of what follows the step that is fitted.
     noise : str
         "white"; "ar", an autoregressive process whose order a criterion chooses; or "ar1" and so
         on.
@@ -121,6 +123,7 @@ class Fit(Measure):
     together: tuple[tuple[str, int], ...] = ()
     before: float = 0.0
     after: float = 0.0
+    part: float = 1.0
     noise: str = "ar"
     loading: str = "steps"
     name: ClassVar[str] = "fit"
@@ -133,6 +136,7 @@ class Fit(Measure):
         Quantity("step", "", "1", "number of the step in the record"),
         Quantity("before", "", "um", "load point displacement that is fitted before the step"),
         Quantity("after", "", "um", "load point displacement that is fitted after the step"),
+        Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
     )
@@ -159,6 +163,8 @@ class Fit(Measure):
         for name in ("before", "after"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
+        if not 0.0 < self.part <= 1.0:
+            raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
         for name in ("slip_distance_guess", "slip_distance_2_guess"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InvalidValue(name, getattr(self, name), "must be positive, in um")
@@ -324,6 +330,10 @@ class Fit(Measure):
         if self.after:
             beyond = (moved > at + self.after) & (record.time > step.begins)
             last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
+        if self.part < 1.0:
+            until = at + self.part * (np.interp(last, record.time, moved) - at)
+            beyond = (moved > until) & (record.time > step.begins)
+            last = record.time[np.argmax(beyond)]
         return float(begins), float(last)
 
     def _first(self, scene: Scene, model: Model, step: Step) -> dict[str, float]:

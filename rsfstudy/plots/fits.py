@@ -37,10 +37,11 @@ _DISPLACEMENT = r"Load point displacement ($\mu$m)"
 def panels(dataset: xr.Dataset) -> Sequence[Panel]:
     """Each record with its fits; and of the first one, what is left, and correlations."""
     records = dataset.sizes.get("record", 1)
-    first = {d: 0 for d in ("record",) if d in dataset.dims}
+    whole = {d: 0 for d in ("part",) if d in dataset.dims}
+    first = whole | {d: 0 for d in ("record",) if d in dataset.dims}
     of_record = [
         Panel(
-            at={"record": number} if first else {},
+            at=whole | ({"record": number} if "record" in dataset.dims else {}),
             marks=[_record],
             title=partial(_named, records),
             x_label=_DISPLACEMENT,
