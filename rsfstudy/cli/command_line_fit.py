@@ -63,7 +63,7 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
     metavar="N",
     default=1,
     show_default=True,
-    help="Windows, from half of what follows a step to all of it; tells what parameters scatter by.",
+    help="Windows, from half of what follows a step to all of it: how parameters scatter.",
 )
 @click.option(
     "--noise",
