@@ -223,33 +223,6 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
         assert (peak >= scene.log_norm_rate - 1e-9) is reaches
 
 
-# ---- published numbers
-# ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("fields", "value", "digits"),
-    [
-        (CONSTANT, 1.99995, 5),
-        ({"b_over_a": math.e, **CONSTANT}, 1.581977, 6),
-        ({}, 1.66025, 5),
-        ({"alpha": 0.25}, 1.83416, 5),
-        ({"law": "slowness", "b_over_a": math.e}, 11.8, 1),
-        ({"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}, 2361, 0),
-    ],
-)
-def test_known_rate_steps(fields, value, digits):
-    assert found(Scene(**fields))[0] == pytest.approx(value, abs=0.51 * 10.0**-digits)
-
-
-def test_variable_normal_stress_hardly_moves_the_displacement_boundary():
-    """C10: within a few per cent of D_c/lambda."""
-    for alpha in (0.25, 0.56):
-        for b_over_a in (1.5, 2.0, 3.0):
-            value = found(Scene(alpha=alpha, b_over_a=b_over_a), DISPLACEMENT)[0]
-            assert value * (b_over_a - 1.0) == pytest.approx(1.0, abs=0.03)
-
-
 # ---- mass
 # -----------------------------------------------------------------------------------------
 

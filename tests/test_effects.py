@@ -68,14 +68,6 @@ def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
     assert ours == pytest.approx(eq_13(scene, displacement), rel=1e-12)
 
 
-def test_jump_of_the_paper_is_2p697():
-    """C9: D_c/lambda, alpha = 0.56, k = k_cr."""
-    scene = Scene(displacement_step=1.0)
-    assert math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0)) == pytest.approx(
-        2.697, abs=6e-4
-    )
-
-
 @given(shear)
 def test_alpha_to_zero_is_the_effect_absent(g):
     """Each effect at vanishing strength equals the effect absent."""

@@ -20,12 +20,11 @@ from rsfstudy import Scene, simulate
 from rsfstudy.declare.axis import Axis
 from rsfstudy.files.restore import study_of
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY
+from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import READ, STATES, Recording
@@ -65,15 +64,6 @@ def closed_form(a: float, b: float, weakening: float, drainage: float) -> float:
     return 0.5 * (root - linear) / (1.0 + c)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(
-    ("drainage", "expected"), [(0.1, 0.00306725), (1.0, 0.00444076), (10.0, 0.00499026)]
-)
-def test_critical_stiffness_has_known_values(law, drainage, expected):
-    scene = dilatant(0.002 / 0.76, drainage, law=law, a=0.01, b_over_a=1.5, **CONSTANT)
-    assert scene.critical_stiffness == pytest.approx(expected, abs=5.1e-9)  # digits given
-
-
 @given(
     st.floats(0.003, 0.02),
     st.floats(1.1, 4.0),
@@ -95,20 +85,6 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     # slopes of the law are differences of order eight, and roots of polynomials lose digits where
     # drainage is many times faster or slower than slip: up to c = 1.5e6 here
     assert ours == pytest.approx(exact, rel=1e-9)
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("stress", STRESS)
-def test_limits_of_drainage(law, stress):
-    """Fast drainage is no fluid, to 1/c of it; and undrained, at constant normal stress, a rise of
-    ln V strengthens by E more: b - a - E, to a c of it.
-    """
-    drained = Scene(law=law, **stress).critical_stiffness
-    fast = dilatant(drainage=1e5, law=law, **stress).critical_stiffness
-    assert fast == pytest.approx(drained, rel=3e-5)
-    if stress == CONSTANT:
-        slow = dilatant(drainage=1e-7, law=law, **stress).critical_stiffness
-        assert slow == pytest.approx(0.0145 - 0.76 * 0.005, rel=1e-5)
 
 
 # ---- the relation and the equations --------------------------------------------------------------
@@ -254,34 +230,6 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
 
 
 SLOW = {"a": 0.01, "b_over_a": 1.5, "mu_star": 0.6, "stiffness": 0.0025, **CONSTANT}
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("dynamics", [{"inertia": True}, {"radiation_damping": 1e-9}])
-def test_dilatancy_makes_cycles_slow(law, dynamics):
-    """Ruptures have no time to drain. Well above the undrained critical stiffness b - a - E, and
-    below that of steady sliding, cycles never come to rupture: they slip at up to 100 V_*.
-    """
-    # with mass, as the study of dilatant cycles has them
-    engine = COMPILED if "inertia" in dynamics else SCIPY
-    peaks = {}
-    for weakening in (0.001, 0.004):
-        scene = dilatant(weakening / 0.6, 1.0, law=law, **SLOW, **dynamics)
-        assert 0.9 * scene.critical_stiffness > 0.0025
-        outcome = LimitCycle(phases=20)(scene, Accuracy(1e-5, engine=engine))
-        assert outcome.status is Status.OK, outcome.message
-        peaks[weakening] = outcome.values["max_log10_slip_rate"]
-    assert peaks[0.001] > 7.0
-    assert 1.0 < peaks[0.004] < 2.5
-
-
-@pytest.mark.parametrize("of", ["load_velocity_ratio", "displacement_step"])
-def test_critical_steps_of_a_dilatant_fault(of):
-    """No path in a plane leads to them, and motions forward do; both sides are confirmed."""
-    scene = dilatant(0.002, 1.0, stiffness_ratio=1.3, **CONSTANT)
-    outcome = CriticalStep(of=of)(scene, Accuracy(1e-4, 2_000_000))
-    assert outcome.status is Status.OK, outcome.message
-    assert outcome.values[f"{CriticalStep(of=of).headline}_error"] > 0.0
 
 
 def test_critical_steps_of_a_fault_that_drains_fast():

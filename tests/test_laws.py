@@ -94,14 +94,6 @@ def test_slowness_law_at_constant_rate_is_eq_16(log_rate, slipped):
     assert state_after("slowness", log_rate, slipped) == pytest.approx(exact, abs=1e-11)
 
 
-def test_slowness_law_needs_3p5_slip_distances_to_lose_1_minus_1_over_e():
-    """C5: at V = 200 V_* the stress drop reaches 1 - 1/e of its total after 3.4978 D_c."""
-    log_rate = math.log(200.0)
-    total = Scene().b * log_rate
-    left = total + state_after("slowness", log_rate, 3.4978)
-    assert left / total == pytest.approx(math.exp(-1.0), abs=1e-5)  # slip is given to 4 decimals
-
-
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
 def test_evolution_goes_over_to_that_of_stationary_contact(log_rate, log_theta, log_load):
     """Slowness law, in time: b (V_*/theta - V)/(V + V_0) per unit of slip and load point

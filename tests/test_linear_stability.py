@@ -2,15 +2,13 @@
 
 import math
 
-import numpy as np
 import pytest
-from conftest import cot_phi
 
 from rsfstudy import Scene
 from rsfstudy.measures.linear_stability import LinearStability, growth, jacobian
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import by_displacement, by_inertial_time, relation_of
+from rsfstudy.slider.equations import by_displacement
 from rsfstudy.status import Status
 
 
@@ -20,34 +18,6 @@ def test_without_steady_state_there_is_no_critical_stiffness():
     assert outcome.values["steady_friction"] > math.tan(math.radians(40.0))
     faster = LinearStability()(Scene(phi=40.0, load_velocity_ratio=1.0), Accuracy())
     assert faster.status is Status.OK
-
-
-@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
-def test_mass_shifts_the_threshold(effects):
-    """At T = 1e8 s double precision sees K = K_cr (1 + D q), q = K eps**2/a, D = 1 - mu_*
-    cot(phi).
-    """
-    scene = Scene(inertia=True, period=1e8, **effects)
-    steadiness = 1.0 - scene.mu_star * cot_phi(scene)
-
-    def growth(ratio: float) -> float:
-        system = by_inertial_time(scene.with_(stiffness_ratio=ratio))
-        columns = []
-        for unit, scale in zip(np.eye(3), system.scales, strict=True):
-            step = 1e-5 * scale * unit
-            ahead, behind = system.rates(step), system.rates(-step)
-            columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
-        values = np.linalg.eigvals(np.array(columns).T)
-        return float(values[np.argsort(np.abs(values))][:2].real.max())
-
-    low, high = 1.0, 1.2
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if growth(middle) > 0.0 else (low, middle)
-    shift = steadiness * low * scene.critical_stiffness * scene.inertial_time**2 / scene.a
-    assert shift > 0.005
-    assert low == pytest.approx(1.0 + shift, rel=1e-6)
-    assert relation_of(scene)(0.0)[0] == 0.0
 
 
 def test_where_mass_leaves_no_stable_stiffness():

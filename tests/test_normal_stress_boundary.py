@@ -39,39 +39,6 @@ def found(scene: Scene, measure: CriticalStep = FALL, accuracy: Accuracy | None 
 # ---- closed forms -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.56])
-@pytest.mark.parametrize(
-    ("law", "ratio"),
-    [("slip", 0.4), ("slip", 1.0), ("slip", 2.0), (0.5, 0.4), (0.5, 1.0), ("slowness", 0.5)],
-)
-def test_closed_forms(law, ratio, alpha):
-    """Load point held, norm so high that it hardly counts: within the error estimate, and what the
-    norm leaves of neighbours of the threshold, exp(-(b/a - 1) |h'(u*)| x/(q k^)) at ln V = x.
-    """
-    exponent = {"slip": 0.0, "slowness": 1.0}.get(law, law)
-    kind = {"law": "family", "law_exponent": law} if law == 0.5 else {"law": law}
-    scene = Scene(
-        **kind, **IMPOSED, alpha=alpha, stiffness_ratio=ratio, b_over_a=1.8, instability_norm=1e12
-    )
-    value, error, _outcome = found(scene)
-    numbers = (scene.mu_star, scene.a, scene.b_over_a, alpha)
-    exact = closed_forms.normal_stress_step(*numbers, exponent, ratio)
-    pull = ratio / (1.0 + exact)
-    forgetting = (scene.b_over_a - 1.0) * (1.0 - exponent * pull) * scene.log_norm_rate / pull
-    assert abs(value - exact) <= error + 5.0 * abs(exact) * math.exp(-forgetting)
-    if not exponent:
-        form = closed_forms.FORMS["normal_stress_step"].value
-        assert form(*numbers, ratio) == exact
-
-
-@pytest.mark.parametrize("ratio", [0.5, 1.5])
-def test_coulomb_stress_is_exact_for_the_slip_law_without_alpha(ratio):
-    """mu_* |dsigma| = a k/k_cr sigma_*, which is what a displacement step takes, K d."""
-    scene = Scene(**IMPOSED, alpha=0.0, stiffness_ratio=ratio, instability_norm=1e12)
-    value, error, _outcome = found(scene)
-    assert -scene.mu_star * value == pytest.approx(scene.a * ratio, abs=error + 1e-9 * scene.a)
-
-
 def test_an_extreme_law():
     """Perrin, Rice and Zheng: its threshold is asinh(q k^)."""
     scene = Scene(
@@ -107,23 +74,6 @@ def test_what_is_left_where_the_law_never_lets_go():
     assert outcome.values["slip_rate_after_step"] == pytest.approx(
         math.exp(scene.log_norm_rate), rel=1e-6
     )
-
-
-def test_the_first_order_is_a_coulomb_stress():
-    """mu' = mu_* - alpha (1 - a/b), also where driving is inclined: to the second order in k^."""
-    ratio = 0.02
-    for fields in ({**IMPOSED, "law": "slowness"}, {"phi": 55.0}):
-        scene = Scene(alpha=0.5, stiffness_ratio=ratio, **fields)
-        found = Triggers()(scene, Accuracy(1e-4))
-        assert found.status is Status.OK
-        assert found.values["coulomb_ratio"] == pytest.approx(1.0, abs=0.05 * ratio)
-        friction = closed_forms.effective_friction(scene.mu_star, scene.b_over_a, 0.5)
-        assert found.values["effective_friction"] == friction == pytest.approx(0.51)
-    forms, numbers = closed_forms.FORMS, (0.76, 0.0145, 2.0, 0.5)
-    first = forms["coulomb_normal_stress_step"].value(*numbers, 1e-4)
-    for exponent in (0.0, 0.3, 1.0):
-        whole = forms["normal_stress_step_of_the_family"].value(*numbers, exponent, 1e-4)
-        assert whole == pytest.approx(first, rel=1e-4)
 
 
 # ---- all triggers at once -----------------------------------------------------------------------

@@ -166,27 +166,6 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
     assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
 
 
-@pytest.mark.parametrize(("law", "true"), [("slip", True), ("slowness", False)])
-def test_alpha_is_read_right_by_the_slip_law_alone(law, true):
-    """As K grows, by extrapolation of what first order leaves; the slowness law's is that of its
-    closed form, which is no exponential.
-    """
-    scene = Scene(law=law, **IMPOSED, **STEP)
-    soft, stiff = (
-        read(NormalStressTransient(record=12.0, phases=2), scene.with_(stiffness_ratio=k), 1e-6)
-        for k in (150.0, 300.0)
-    )
-    b, r = scene.b, 1.1
-    left = [b * math.log1p((r ** (-0.3 / b) - 1.0) * math.exp(-slip)) for slip in (0.5, 1.5)]
-    distance = 1.0 if true else 1.0 / math.log(left[0] / left[1])
-    alpha = 0.3 if true else -left[0] * math.exp(0.5 / distance) / math.log(r)
-    for name, expected in (("apparent_alpha", alpha), ("apparent_slip_distance", distance)):
-        assert 2.0 * stiff[name] - soft[name] == pytest.approx(expected, rel=2e-3), name
-    if true:
-        share = 2.0 * stiff["evolution_left"] - soft["evolution_left"]
-        assert share == pytest.approx(math.exp(-1.0), rel=2e-3)
-
-
 @pytest.mark.parametrize("inertia", [False, True])
 def test_errors_of_a_transient_cover_and_engines_agree(inertia):
     scene = Scene(law="slowness", **IMPOSED, **STEP, stiffness_ratio=20.0, inertia=inertia)

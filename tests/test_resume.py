@@ -9,7 +9,6 @@ import resource
 import signal
 import subprocess
 import sys
-import threading
 
 import psutil
 import pytest
@@ -29,7 +28,7 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy.compute import cells, clusters
+from rsfstudy.compute import cells
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.files import journal
 from rsfstudy.status import Status
@@ -201,39 +200,6 @@ def test_workers_that_cannot_start(tmp_path):
     assert "No module named 'no_such_module'" in (tmp_path / "faulty.workers.log").read_text()
 
 
-def test_ctrl_c_waits_until_the_workers_are_there():
-    """Also where another thread gets the signal; pressed twice, it does not wait."""
-    done, reached = threading.Event(), []
-    other = threading.Thread(target=done.wait)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    read, write = os.pipe()
-    os.set_blocking(write, False)
-    arrived = signal.set_wakeup_fd(write)
-    other.start()
-
-    @clusters._interrupts_held()
-    def pressed(times):
-        for press in range(times):
-            signal.pthread_kill(other.ident, signal.SIGINT)
-            os.read(read, 1)  # until it has arrived
-            reached.append(press)
-
-    try:
-        for times in (1, 2):
-            reached.clear()
-            with pytest.raises(KeyboardInterrupt):
-                pressed(times)
-            assert reached == [0]
-            assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    finally:
-        done.set()
-        other.join()
-        signal.set_wakeup_fd(arrived)
-        signal.signal(signal.SIGINT, before)
-        os.close(read)
-        os.close(write)
-
-
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
     """The old file stays, nothing is left beside it, and no cell is computed again."""
     study = declared(cells=CELLS)
@@ -270,26 +236,6 @@ rsfstudy.run(sys.argv[1], output=sys.argv[2], workers=0, progress=False, b_over_
     assert (tmp_path / ".faulty.nc.new").exists()
     same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
     goes_on(tmp_path, CELLS)
-
-
-def test_killed_in_the_middle_of_keeping_cells(tmp_path):
-    """A transaction cut short leaves SQLite's own journal beside: the next run rolls it back."""
-    study = declared(cells=CELLS)
-    run(study.with_(b_over_a=[2.0, 2.5]), output=tmp_path)
-    script = """
-import os, signal, sqlite3, sys
-database = sqlite3.connect(sys.argv[1])
-database.execute("PRAGMA cache_size=1")
-database.execute("BEGIN")
-for i in range(20):
-    row = (bytes([i]), "OK", "", 0, 0.0, bytes(100_000), 0)
-    database.execute("INSERT INTO cells VALUES (?,?,?,?,?,?,?)", row)
-os.kill(os.getpid(), signal.SIGKILL)
-"""
-    killed(script, tmp_path / "faulty.cells.sqlite")
-    assert (tmp_path / "faulty.cells.sqlite-journal").exists()
-    goes_on(tmp_path, 2)
-    assert cells_in(tmp_path / "faulty.cells.sqlite") == CELLS
 
 
 def test_fresh_leaves_no_half_transaction_behind(tmp_path):

@@ -76,18 +76,6 @@ def test_variable_normal_stress_makes_up_and_down_steps_unequal():
     assert response(1e-3)["evolution_asymmetry"] > 0.05
 
 
-def test_variable_normal_stress_separates_large_down_steps_of_the_slowness_law():
-    """C4: after D_c, steps down by 2 and by 4 decades leave the same stress at constant normal
-    stress only.
-    """
-    apart = {}
-    for name, fields in (("constant", CONSTANT), ("variable", {})):
-        two, four = (response(r, law="slowness", **fields) for r in (1e-2, 1e-4))
-        apart[name] = abs(two["stress_left_at_unit_slip"] / four["stress_left_at_unit_slip"] - 1.0)
-    assert apart["constant"] < 0.02
-    assert apart["variable"] > 10.0 * apart["constant"]
-
-
 def test_steps_without_a_response_are_named():
     assert RigidResponse()(Scene(), Accuracy()).status is Status.NO_STEP
     beyond = Scene(load_velocity_ratio=1e-35)

@@ -108,13 +108,6 @@ def test_no_steady_state_below_the_slowest_rate():
     assert steady.slowest_steady(Scene(normal_stress="constant")) == -math.inf
 
 
-def test_faster_sliding_stabilises():
-    """C2: a stiffness that is critical at V_* is above critical at any larger V."""
-    scene = Scene()
-    for log_rate in (0.5, 2.0, 8.0):
-        assert stability.critical_stiffness(scene, log_rate) < scene.critical_stiffness
-
-
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])
 def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
     """But for its own root, 1e9 to 1e24 of the others, they are those without it."""

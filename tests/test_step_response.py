@@ -48,10 +48,6 @@ def test_peaks_of_the_slowness_law_are_those_of_its_conserved_quantity(weakening
     assert found.values["peak_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_the_two_hundred_fold_step_peaks_at_10_to_the_87():
-    assert closed_peak(1.0, 200.0) == pytest.approx(87.03, abs=5e-3)
-
-
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_the_error_estimate_covers_the_error_and_is_smooth(rtol):
     """Over the next floating-point neighbours of the load point velocity, which change where steps
@@ -83,21 +79,6 @@ def test_no_step_leaps_over_a_turn():
     error = abs(found["max_log10_slip_rate"] - tight["max_log10_slip_rate"])
     assert error <= found["max_log10_slip_rate_error"]
     assert error < 1e-6 * tight["max_log10_slip_rate"]
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
-def test_oscillations_above_critical_stiffness_decay(law, normal_stress):
-    found = response(
-        law=law, normal_stress=normal_stress, stiffness_ratio=1.1, load_velocity_ratio=1.2
-    )
-    assert (np.diff(found.values["peak_log10_slip_rate"]) < 0.0).all()
-    assert found.values["peak_ratio"] < 0.8
-
-
-def test_below_critical_stiffness_they_grow():
-    found = response(stiffness_ratio=0.95, load_velocity_ratio=1.01)
-    assert found.values["peak_ratio"] > 1.0
 
 
 def test_mass_lowers_the_peak_after_a_large_step_and_leaves_small_ones_alone():
