@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,8 +25,9 @@ import rsfstudy
 # what prints takes its width from the environment when it is loaded: not from that of a test
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
-from rsfstudy.compute import plan
+from rsfstudy.compute import cells, plan
 from rsfstudy.declare import catalogue
+from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.engines import COMPILED
@@ -60,6 +61,24 @@ def run_with_failures(*words, **options) -> xr.Dataset:
     """The same, where cells are to fail, which is told."""
     with pytest.warns(Incomplete, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"):
         return run(*words, **options)
+
+
+@contextlib.contextmanager
+def asked_for() -> Iterator[list[Cell]]:
+    """The cells that are computed meanwhile, in this process."""
+    asked, computed = list[Cell](), cells.computed
+
+    def counted(task, cell, **options):
+        asked.append(cell)
+        return computed(task, cell, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells, "computed", counted)
+        yield asked
+
+
+#: Clusters of Dask whose pages are seen from nowhere.
+QUIET = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that

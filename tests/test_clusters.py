@@ -19,7 +19,18 @@ import psutil
 import pytest
 import yaml
 from faulty import declared
-from running import FAULTY, HANGS, SMALL, command, ended, run, same_numbers, until, until_kept
+from running import (
+    FAULTY,
+    HANGS,
+    QUIET,
+    SMALL,
+    command,
+    ended,
+    run,
+    same_numbers,
+    until,
+    until_kept,
+)
 
 import rsfstudy
 from rsfstudy.compute import clusters, provenance
@@ -178,8 +189,7 @@ def encrypted():
 
     pytest.importorskip("cryptography")
     security = Security.temporary()
-    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
-    with LocalCluster(1, protocol="tls", security=security, **quiet) as encrypted:
+    with LocalCluster(1, protocol="tls", security=security, **QUIET) as encrypted:
         yield encrypted
 
 
@@ -222,8 +232,7 @@ def test_a_port_that_listens_and_says_nothing(tmp_path):
 def test_a_client_that_is_closed(tmp_path):
     from distributed import Client
 
-    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
-    with Client(n_workers=1, processes=False, **quiet) as client:
+    with Client(n_workers=1, processes=False, **QUIET) as client:
         pass
     with pytest.raises(RunError, match="client is closed"):
         run(client=client)

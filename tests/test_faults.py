@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, HANGS, call, run, run_with_failures
+from running import FAULTY, HANGS, QUIET, call, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -128,8 +128,7 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     from distributed import Client
 
     monkeypatch.setenv("FAULT_TAKES", "0.3")
-    quiet = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
-    with Client(processes=False, n_workers=1, **quiet) as client:
+    with Client(processes=False, n_workers=1, **QUIET) as client:
         dataset = run(declared(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
 
@@ -183,12 +182,7 @@ def test_a_cell_that_exhausts_memory(monkeypatch):
     monkeypatch.setattr(workers, "_TRIES", 1)  # a worker takes seconds to start
     with (
         LocalCluster(
-            n_workers=1,
-            threads_per_worker=1,
-            memory_limit="600MiB",
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=50,
+            n_workers=1, threads_per_worker=1, memory_limit="600MiB", silence_logs=50, **QUIET
         ) as cluster,
         Client(cluster) as client,
     ):
@@ -409,9 +403,7 @@ def test_workers_that_never_come(monkeypatch):
     for name, seconds in {"_LOOK": 0.1, "TELL": 0.2, "PATIENCE": 0.4}.items():
         monkeypatch.setattr(workers, name, seconds)
     with (
-        LocalCluster(
-            n_workers=0, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}
-        ) as cluster,
+        LocalCluster(n_workers=0, **QUIET) as cluster,
         Client(cluster) as client,
         pytest.warns(UserWarning, match=r"has no worker: waiting 0\.4 s for one"),
         pytest.raises(RunError, match=r"no worker for 0\.4 s: start some"),

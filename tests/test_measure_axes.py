@@ -9,11 +9,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, run, same_numbers
+from running import asked_for, call, run, same_numbers
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer
@@ -162,15 +161,7 @@ def test_a_name_that_both_have_is_the_scenes():
 
 def computed_by(study: Study, output) -> int:
     """How many cells a run of it computes."""
-    asked = []
-    original = cells.computed
-
-    def counted(task, cell, **options):
-        asked.append(cell)
-        return original(task, cell, **options)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cells, "computed", counted)
+    with asked_for() as asked:
         run(study, output=output)
     return len(asked)
 

@@ -17,6 +17,7 @@ from running import (
     FAULTY,
     HANGS,
     SMALL,
+    asked_for,
     cells_in,
     command,
     ended,
@@ -28,7 +29,6 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy.compute import cells
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.files import journal
 from rsfstudy.status import Status
@@ -86,15 +86,7 @@ def held(tmp_path):
 
 def goes_on(output, already):
     """The same command again: only what is missing is computed, and the numbers are the same."""
-    asked = []
-    original = cells.computed
-
-    def counted(task, cell, **options):
-        asked.append(cell)
-        return original(task, cell, **options)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cells, "computed", counted)
+    with asked_for() as asked:
         resumed = run(declared(cells=CELLS), output=output)
     assert len(asked) == CELLS - already
     same_numbers(resumed, uninterrupted())
@@ -286,19 +278,13 @@ def test_a_full_disk_while_the_result_is_written(tmp_path):
     goes_on(tmp_path, CELLS)
 
 
-def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path, monkeypatch):
+def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path):
     first = run(output=tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.nc"]
-    asked, original = [], cells.computed
-
-    def counted(task, cell, **options):
-        asked.append(cell.scene.b_over_a)
-        return original(task, cell, **options)
-
-    monkeypatch.setattr(cells, "computed", counted)
     longer = SMALL.with_(b_over_a=[2.0, 2.25, 2.5, 3.0, 3.5])
-    extended = run(longer, output=tmp_path)
-    assert sorted(asked) == [2.25, 2.25, 3.5, 3.5]
+    with asked_for() as asked:
+        extended = run(longer, output=tmp_path)
+    assert sorted(cell.scene.b_over_a for cell in asked) == [2.25, 2.25, 3.5, 3.5]
     same_numbers(extended.sel(b_over_a=[2.0, 2.5, 3.0]), first)
     same_numbers(extended, run(longer))
 
@@ -335,22 +321,15 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
         run(output=tmp_path)
 
 
-def test_failures_are_tried_again(tmp_path, monkeypatch):
+def test_failures_are_tried_again(tmp_path):
     """A cell that failed has no answer: the next run computes it, and only it."""
     failing = declared("raises", at=(2.5,))
     status = run_with_failures(failing, output=tmp_path).status
     assert status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
     assert cells_in(tmp_path / "faulty.cells.sqlite") == 4
-    asked = []
-    original = cells.computed
-
-    def counted(task, cell, **options):
-        asked.append(cell.scene.b_over_a)
-        return original(task, cell, **options)
-
-    monkeypatch.setattr(cells, "computed", counted)
-    run_with_failures(failing, output=tmp_path)
-    assert asked == [2.5]
+    with asked_for() as asked:
+        run_with_failures(failing, output=tmp_path)
+    assert [cell.scene.b_over_a for cell in asked] == [2.5]
 
 
 # ---- more work ----------------------------------------------------------------------------------
