@@ -123,6 +123,7 @@ ENOUGH = {
         "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
     },
     "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
+    "wave_triggering": {"cycle_phase": [0.5, 0.8, 0.9]},
     "two_states": {
         "stiffness_ratio": [0.84, 0.8531, 0.8567, 0.8655, 0.8659, 0.8663, 0.8667, 0.9, 0.95, 1.02]
     },
@@ -145,6 +146,7 @@ LEFT_TO_COMPILED = (
     "triggering",
     "two_states",
     "velocity_steps",
+    "wave_triggering",
 )
 
 

@@ -67,6 +67,7 @@ WIDE = {
     "slide_hold_slide P3": "3 peaks in 100 are as far off, by where a step ends",
     "slide_hold_slide P4": "one bound for every stiffness; what is left out falls with 1/k",
     "stability_map C1": "half of a bracket, which holds the boundary anywhere",
+    "wave_triggering W1": "one bound of second order for all; of slow waves it nearly vanishes",
     "stress_drop C15": "the paper says whole multiples",
 }
 
