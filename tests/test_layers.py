@@ -35,6 +35,7 @@ FLOORS = {
     "compute": 8,
     "plots": 9,
     "api": 10,
+    "referee": 10,
     "cli": 11,
     "__init__": 10,
     "named_studies": 10,

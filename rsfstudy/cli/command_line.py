@@ -17,7 +17,12 @@ from typing import Any
 
 import click
 
-from rsfstudy.cli import command_line_fit, command_line_simulate, options
+from rsfstudy.cli import (
+    command_line_fit,
+    command_line_referee,
+    command_line_simulate,
+    options,
+)
 from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS
 from rsfstudy.doors import in_words
@@ -302,6 +307,8 @@ def export(**given: Any) -> int:
 
 cli.add_command(command_line_simulate.simulate)
 cli.add_command(command_line_fit.fit)
+cli.add_command(command_line_referee.problems)
+cli.add_command(command_line_referee.verify)
 
 if __name__ == "__main__":
     main()

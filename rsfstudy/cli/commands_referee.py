@@ -1,0 +1,121 @@
+"""The commands `problems` and `verify`; how they are spelt is in `command_line_referee`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rsfstudy.cli import terminal
+from rsfstudy.cli.console import console
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.referee import theirs, writing
+from rsfstudy.referee.problem import read, shipped
+from rsfstudy.referee.verdict import Verdict, known, verdict
+
+
+def problems(directory: Path) -> int:
+    """Write all problems."""
+    writing.write(directory)
+    console.print(f"wrote {len(shipped())} problems into {directory}")
+    return terminal.OK
+
+
+def verify(
+    files: tuple[Path, ...],
+    problem: str | None,
+    columns: str | None,
+    digits: float,
+    figure: Path | None,
+) -> int:
+    """Hold files against answers; FAILED where one does not pass."""
+    if figure is not None and figure.suffix not in (".png", ".pdf", ".svg"):
+        raise InvalidValue("--figure", str(figure), "must end in .png, .pdf or .svg")
+    mapped = theirs.column_map(columns) if columns else None
+    found = [_verdict(file, problem, mapped, digits) for file in files]
+    for file, one in zip(files, found, strict=True):
+        _tell(file, one)
+    console.print(_to_quote(found), style="bold")
+    if figure is not None:
+        _draw(found, figure)
+    return terminal.OK if all(one.passes for one in found) else terminal.FAILED
+
+
+def _verdict(
+    file: Path, stated: str | None, columns: Mapping[str, tuple[str, str]] | None, digits: float
+) -> Verdict:
+    number = stated or file.name[:2]
+    there = shipped()
+    if stated is not None and not stated.isdecimal():
+        posed, path = read(Path(stated)), None
+    elif number.isdecimal() and int(number) in there:
+        posed = read(there[int(number)])
+        path = there[int(number)].with_suffix(".csv")
+    else:
+        remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
+        raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
+    told = theirs.read(file, posed, columns)
+    problem, answer = known(posed, path)
+    return verdict(problem, answer, told, digits)
+
+
+def _tell(file: Path, one: Verdict) -> None:
+    problem = one.problem
+    name = f"problem {problem.number}" if problem.number else "own problem"
+    outcome = "passed" if one.passes else "not passed"
+    console.print(f"{file}: {name}, {problem.title}: {outcome}", style="bold")
+    for agreement in one.agreements:
+        text = f"  {agreement.quantity:20s} {agreement.digits:4.1f} digits"
+        if agreement.to_the_last_place:
+            text += ", to the last place that is written"
+        elif agreement.digits == problem.digits:
+            text += ", all that are known"
+        elif problem.key:
+            at = problem.rows[agreement.row]
+            text += f", fewest at {problem.key} = {at:g} {problem.units[problem.key]}".removesuffix(
+                " 1"
+            )
+        if agreement.parts is not None and problem.key:
+            text += f"; they part at {problem.key} = {problem.rows[agreement.parts]:g}"
+        console.print(text)
+    if not one.passes:
+        console.print(f"  {one.explanation or 'no usual difference of conventions explains it'}")
+
+
+def _to_quote(found: list[Verdict]) -> str:
+    """One line to quote."""
+    passed = [math.floor(one.digits) for one in found if one.passes]
+    own = all(one.problem.number == 0 for one in found)
+    of = "one's own" if own else f"{len(shipped())}"
+    text = f"{len(passed)} problem{'s' * (len(passed) != 1)} of {of}"
+    if not passed:
+        return text
+    low, high = min(passed), max(passed)
+    return f"{text}, {low} to {high} digits" if low < high else f"{text}, {low} digits"
+
+
+def _draw(found: list[Verdict], path: Path) -> None:
+    """Digits along the rows of one problem, or by problem."""
+    from rsfstudy.plots import rendered, styled, write_image
+    from rsfstudy.plots._agreement import agreement
+
+    digits: dict[str, list[tuple[float, float]]] = {}
+    problem, label = found[0].problem, "problem"
+    if len(found) == 1 and problem.key:
+        label = f"{problem.key} ({problem.units[problem.key]})"
+        for one in found[0].agreements:
+            along = -np.log10(np.maximum(one.off, 10.0**-problem.digits))
+            digits[one.quantity] = list(zip(problem.rows, along, strict=True))
+    else:
+        for number, verdict_of in enumerate(found, start=1):
+            at = verdict_of.problem.number or number
+            for one in verdict_of.agreements:
+                digits.setdefault(one.quantity, []).append((at, one.digits))
+    try:
+        with styled(None):
+            drawn = agreement(digits, label, found[0].enough)
+            write_image(rendered(drawn, path.suffix[1:]), path)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error})") from error

@@ -1,0 +1,111 @@
+"""What another code answers: a table of any names and units, read as a problem asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.referee.problem import Problem
+from rsfstudy.rig.table import Column, read_table
+from rsfstudy.rig.units import in_si
+
+#: What a code may tell instead of a quantity, and in which units.
+_INSTEAD = {"slip_rate": ("log10_slip_rate", "1"), "friction": ("shear_stress", "Pa")}
+_UNITS = dict(_INSTEAD.values())
+#: Times may differ by so much, over the last: they are written in decimals.
+_LATE = 1e-9
+
+
+class Told(NamedTuple):
+    """A quantity of another code in SI units, and one in the last place that is written."""
+
+    values: np.ndarray
+    last_place: float
+
+
+def column_map(text: str) -> dict[str, tuple[str, str]]:
+    """Names, headings and units, of ``time=t (s), friction=mu``."""
+    found = {}
+    for part in text.split(","):
+        name, equals, heading = (word.strip() for word in part.partition("="))
+        heading, _, units = heading.partition("(")
+        if not (name and equals and heading.strip()):
+            rule = "must read NAME=HEADING (UNITS), as in 'time=t (s), friction=mu'"
+            raise InvalidValue("--columns", part.strip(), rule)
+        found[name] = heading.strip(), units.rstrip(") ")
+    return found
+
+
+def read(
+    path: Path, problem: Problem, columns: Mapping[str, tuple[str, str]] | None = None
+) -> dict[str, Told]:
+    """The columns that a problem asks for, in SI units.
+
+    Raises
+    ------
+    InvalidValue
+        For a column that is missing, units of another kind, a gap, other times or another length.
+    """
+    table = read_table(path, columns)
+    asked = {*problem.columns, *_UNITS}
+    found = {key: _plain(key, column, problem) for key, column in table.items() if key in asked}
+    for name, (other, _units) in _INSTEAD.items():
+        if name not in found and other in found:
+            found[name] = Told(_instead(name, problem, found), 0.0)
+    for name in problem.columns:
+        if name not in found:
+            remedy = f"Head it {name} ({problem.units[name]}), or say --columns '{name}=...'."
+            rule = "is missing"
+            raise InvalidValue("column", name, rule, choices=table, remedy=remedy).at(str(path))
+    rows = problem.rows
+    if len(found[problem.columns[0]].values) != len(rows):
+        count = len(found[problem.columns[0]].values)
+        rule = f"is not what problem {problem.number} asks for, which is {len(rows)}"
+        raise InvalidValue("number of rows", count, rule).at(str(path))
+    if problem.key:
+        _check_rows(table[problem.key], found[problem.key].values, rows, problem)
+    return {name: found[name] for name in problem.columns}
+
+
+def _instead(name: str, problem: Problem, found: Mapping[str, Told]) -> np.ndarray:
+    """A quantity by what is told instead: friction by the shear stress of the spring."""
+    if name == "slip_rate":
+        return np.asarray(10.0 ** found["log10_slip_rate"].values)
+    radiated = problem.damping * found["slip_rate"].values if problem.damping else 0.0
+    return np.asarray((found["shear_stress"].values - radiated) / problem.rig.normal_stress)
+
+
+def _plain(key: str, column: Column, problem: Problem) -> Told:
+    """A column in SI units."""
+    wrong = ~np.isfinite(column.values)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InvalidValue(key, float(column.values[row]), "must be a number").at(column.place(row))
+    units = problem.units.get(key) or _UNITS[key]
+    one = "1" if column.units in ("", "1") else f"1 {column.units}"
+    if units != "1" and one == "1":
+        remedy = f"Write them in the header, or --columns '{key}=... ({units})'."
+        raise InvalidValue(key, column.units, "has no units", remedy=remedy).at(column.path)
+    try:
+        factor = in_si(key, 1.0 if one == "1" else one, units)
+    except InvalidValue as error:
+        raise error.at(column.path) from error
+    return Told(column.values * factor, factor * _last_place(column.values))
+
+
+def _last_place(values: np.ndarray) -> float:
+    exponents = (Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist())
+    return float(10.0 ** min(x for x in exponents if isinstance(x, int)))
+
+
+def _check_rows(column: Column, told: np.ndarray, rows: np.ndarray, problem: Problem) -> None:
+    wrong = np.abs(told - rows) > _LATE * np.abs(rows).max()
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        rule = f"must be {rows[row]:g} {problem.units[problem.key]}: nothing is interpolated"
+        raise InvalidValue(problem.key, float(told[row]), rule).at(column.place(row))

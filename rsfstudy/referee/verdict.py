@@ -1,0 +1,212 @@
+"""How far two answers agree, from where on they part, and what would explain it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rsfstudy.errors import RsfStudyError
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
+from rsfstudy.motion.meter import Halt
+from rsfstudy.referee import ours
+from rsfstudy.referee.ours import Table, off
+from rsfstudy.referee.problem import Problem
+from rsfstudy.referee.theirs import Told
+from rsfstudy.rig.table import read_table
+
+#: Digits that make a problem passed, unless others are asked for.
+ENOUGH = 6
+#: A candidate explains a difference if it leaves so many digits, and so many more than there were.
+_EXPLAINS, _MORE = 3.0, 1.5
+#: Units in the last place by which what is written in decimals may differ: one of rounding in the
+#: code, and half of rounding in the file, a little more for ours.
+_ROUNDED = 1.51
+#: Accuracies of ours where a problem has no answer yet; what candidates need.
+_TWICE, _ROUGH, _BUDGET = (1e-9, 1e-11), 1e-8, 5_000_000
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far a quantity agrees.
+
+    Attributes
+    ----------
+    quantity : str
+    digits : float
+        To which all of it agrees, no more than are known.
+    row : int
+        Where it agrees least.
+    parts : int or None
+        The first row that has fewer digits than make a pass.
+    to_the_last_place : bool
+        Whether it agrees as far as it is written.
+    off : ndarray
+        Relative differences.
+    """
+
+    quantity: str
+    digits: float
+    row: int
+    parts: int | None
+    to_the_last_place: bool
+    off: np.ndarray
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What there is to say of an answer.
+
+    Attributes
+    ----------
+    problem : Problem
+    agreements : tuple of Agreement
+    enough : float
+        Digits that make a pass.
+    explanation : str
+        What would explain that it does not pass, or nothing.
+    """
+
+    problem: Problem
+    agreements: tuple[Agreement, ...]
+    enough: float
+    explanation: str = ""
+
+    @property
+    def digits(self) -> float:
+        """Digits to which all of it agrees."""
+        return min(agreement.digits for agreement in self.agreements)
+
+    @property
+    def passes(self) -> bool:
+        """True if every quantity has digits enough."""
+        return self.digits >= self.enough
+
+
+def known(problem: Problem, path: Path | None) -> tuple[Problem, Table]:
+    """A problem and its answer: the one that is shipped; or ours, with the digits to which two
+    motions of different accuracy agree.
+
+    Raises
+    ------
+    RsfStudyError
+        Where rsfstudy finds none.
+    """
+    if path is not None:
+        table = read_table(path)
+        return problem, {name: column.values for name, column in table.items()}
+    engine = COMPILED if is_installed(COMPILED) else SCIPY
+    try:
+        rough, fine = (
+            ours.answer(problem, Accuracy(rtol, _BUDGET, engine=engine)) for rtol in _TWICE
+        )
+    except Halt as halt:
+        raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
+    both = [a.digits for a in _agreements(problem, rough, fine, 0.0)]
+    return replace(problem, digits=max(1, math.floor(min(both)))), fine
+
+
+def verdict(problem: Problem, answer: Table, told: Mapping[str, Told], enough: float) -> Verdict:
+    """How far what another code told agrees with an answer."""
+    values = {name: column.values for name, column in told.items()}
+    places = {name: column.last_place for name, column in told.items()}
+    found = Verdict(problem, _agreements(problem, values, answer, enough, places), enough)
+    if found.passes:
+        return found
+    best, words = max(_explained(problem, values, answer), default=(0.0, ""))
+    better = best >= max(_EXPLAINS, found.digits + _MORE)
+    return replace(found, explanation=f"{words}: {best:.1f} digits then" if better else "")
+
+
+def _agreements(
+    problem: Problem,
+    theirs: Table,
+    answer: Table,
+    enough: float,
+    places: Mapping[str, float] | None = None,
+) -> tuple[Agreement, ...]:
+    found = []
+    for name in problem.quantities:
+        apart = off(name, theirs[name], answer[name], problem.digits)
+        few = np.flatnonzero(apart > 10.0**-enough)
+        place = (places or {}).get(name, 0.0)
+        found.append(
+            Agreement(
+                name,
+                min(-math.log10(max(float(apart.max()), 1e-300)), float(problem.digits)),
+                int(np.argmax(apart)),
+                int(few[0]) if len(few) else None,
+                bool((np.abs(theirs[name] - answer[name]) <= _ROUNDED * place).all()),
+                apart,
+            )
+        )
+    return tuple(found)
+
+
+def _explained(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[float, str]]:
+    """Digits to which what is told agrees with other conventions, and these."""
+    for words, table in _read_otherwise(problem, theirs, answer):
+        yield min(a.digits for a in _agreements(problem, table, answer, 0.0)), words
+    for words, other in _posed_otherwise(problem):
+        try:
+            table = ours.answer(other, Accuracy(_ROUGH, _BUDGET))
+        except (Halt, RsfStudyError):
+            continue
+        yield min(a.digits for a in _agreements(problem, theirs, table, 0.0)), words
+
+
+def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[str, Table]]:
+    """What is told, as it would read by other conventions."""
+    shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
+    if "friction" in theirs:
+        for sign, place in ((1.0, "left out of"), (-1.0, "left in")):
+            moved = theirs["friction"] + sign * shift
+            words = f"friction is shifted by b ln 2, as where 2 D_c is {place} the logarithm"
+            yield words, theirs | {"friction": moved}
+        if problem.damping and "slip_rate" in theirs:
+            at_fault = theirs["friction"] - problem.damping * theirs["slip_rate"] / stress
+            words = "friction is that of the spring, which holds eta V/sigma too"
+            yield words, theirs | {"friction": at_fault}
+    for name in problem.quantities:
+        factor = float(np.median(theirs[name] / np.where(answer[name], answer[name], np.nan)))
+        if math.isfinite(factor) and factor:
+            yield f"{name} is {factor:.6g} times as much", theirs | {name: theirs[name] / factor}
+        apart = float(np.median(theirs[name] - answer[name]))
+        yield f"{name} is shifted by {apart:.6g}", theirs | {name: theirs[name] - apart}
+
+
+def _posed_otherwise(problem: Problem) -> Iterator[tuple[str, Problem]]:
+    """The problem with other conventions."""
+
+    def changed(**parameters: object) -> Problem:
+        return replace(problem, parameters={**problem.parameters, **parameters})
+
+    if problem.damping:
+        yield (
+            "damping is twice as much (G/c_s for G/(2 c_s))",
+            changed(radiation_damping=f"{2.0 * problem.damping!r} Pa s/m"),
+        )
+        yield (
+            "damping is half as much",
+            changed(radiation_damping=f"{0.5 * problem.damping!r} Pa s/m"),
+        )
+        yield "there is no damping", changed(radiation_damping="0 Pa s/m")
+    if problem.initial:
+        steady = [f"{theta!r} s" for theta in problem.theta_star]
+        rate = problem.initial["slip_rate"]
+        at_rate = [f"{theta!r} s" for theta in problem.theta_at_rest]
+        for words, thetas in (("D_c/V_*", steady), (f"D_c/V(0) with V(0) = {rate}", at_rate)):
+            other = {**problem.initial, "theta": thetas}
+            yield f"theta_0 is {words}, and not as stated", replace(problem, initial=other)
+    if problem.parameters.get("regularised"):
+        yield "friction has a logarithm for arcsinh", changed(regularised=False)
+    for name in ("alpha", "stress_dependence"):
+        if problem.parameters.get(name):
+            yield f"{name} is left out", changed(**{name: 0.0})
+    law = {"slip": "slowness", "slowness": "slip"}.get(problem.law)
+    if law:
+        yield f"the law is the {law} law", replace(problem, law=law)

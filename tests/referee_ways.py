@@ -1,0 +1,461 @@
+"""Answers to the problems of the referee, by two ways that share neither equations nor arithmetic,
+and nothing of the package.
+
+The first solves the equations as the problems state them, in SI units: spring stress, theta in s
+and slip, slip rate by the friction law (or the root of it and damping), with 30 digits (mpmath).
+The second differentiates friction: ln(V/V_*), logarithms of theta, stress deviation and slip,
+dimensionless, in double precision. Both take extrapolated modified midpoint steps (Gragg, Bulirsch
+and Stoer), of order 20 and 14. `referee_answers` writes what both agree on.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mpmath
+
+import rsfstudy
+
+PROBLEMS = Path(rsfstudy.__file__).parent / "referee" / "problems"
+State = list[Any]
+Rates = Callable[[Any, State], State]
+
+
+def stated(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text())
+
+
+def plain(value: Any) -> Any:
+    """A number, without the units that are SI in every problem."""
+    return value.split()[0] if isinstance(value, str) else value
+
+
+# ---- integration ---------------------------------------------------------------------------------
+
+
+class Steps:
+    """Extrapolated midpoint steps of adaptive length, in any arithmetic."""
+
+    def __init__(self, order: int, tolerance: Any, scales: Sequence[Any]) -> None:
+        self.sequence = tuple(range(2, order + 1, 2))
+        self.tolerance, self.scales = tolerance, scales
+
+    def step(self, rates: Rates, t: Any, y: State, h: Any, first: State) -> tuple[State, Any]:
+        """The state after a step, and its error over the scales; increments keep more digits."""
+        table: list[State] = []
+
+        def slope(i: Any, moved: State) -> State:
+            return rates(t + i, [a + b for a, b in zip(y, moved, strict=True)])
+
+        for count in self.sequence:
+            part = h / count
+            before, now = [0 * a for a in y], [part * b for b in first]
+            for i in range(1, count):
+                by = zip(before, slope(i * part, now), strict=True)
+                before, now = now, [a + 2 * part * b for a, b in by]
+            ends = zip(before, now, slope(h, now), strict=True)
+            table = [[(a + b + part * c) / 2 for a, b, c in ends], *table]
+            last = table[-1]
+            for j in range(1, len(table)):
+                other = self.sequence[len(table) - 1 - j]
+                over = count * count - other * other
+                gain = other * other
+                table[j] = [
+                    a + (a - b) * gain / over for a, b in zip(table[j - 1], table[j], strict=True)
+                ]
+        off = zip(table[-1], last, self.scales, strict=True)
+        after = [a + b for a, b in zip(y, table[-1], strict=True)]
+        return after, max(abs(a - b) / c for a, b, c in off)
+
+    def path(self, rates: Rates, t: Any, y: State, until: Any, h: Any) -> Iterator[tuple[Any, ...]]:
+        """Steps up to a time: time and state before, and the length; the last is (time, state)."""
+        grows = 1.0 / (2 * len(self.sequence) - 1)
+        while t < until:
+            first = rates(t, y)
+            while True:
+                ends = t + h >= until
+                taken = until - t if ends else h
+                try:
+                    after, error = self.step(rates, t, y, taken, first)
+                    size = float(error / self.tolerance)
+                except (ArithmeticError, ValueError, TypeError):  # beyond all numbers
+                    size = math.inf
+                if size <= 1.0:
+                    break
+                h = taken * max(0.2, 0.8 * size**-grows)
+            yield t, y, taken
+            t, y = until if ends else t + taken, after
+            h = taken * min(3.0, 0.8 * max(size, 1e-30) ** -grows)
+        yield t, y, None
+
+    def to(self, rates: Rates, t: Any, y: State, until: Any) -> State:
+        *_others, (_t, y, _h) = self.path(rates, t, y, until, until - t)
+        return y
+
+
+# ---- what a problem states -----------------------------------------------------------------------
+
+
+class Slider:
+    """The numbers of a problem in an arithmetic: `number` makes them, `m` has exp and log."""
+
+    def __init__(self, problem: dict[str, Any], m: Any, number: Callable[[Any], Any]) -> None:
+        self.m, self.problem, self.law = m, problem, problem["law"]
+        given = {
+            n: v if isinstance(v, bool) else plain(v) for n, v in problem["parameters"].items()
+        }
+
+        def of(name: str, other: Any = 0) -> Any:
+            return number(given.get(name, other))
+
+        self.a, self.mu, self.sigma = of("a"), of("mu_star"), of("normal_stress")
+        self.star, self.k, self.eta = of("V_star"), of("stiffness"), of("radiation_damping")
+        self.alpha, self.c = of("alpha"), of("stress_dependence")
+        self.eps, self.cutoff = of("law_exponent"), of("V_c")
+        self.dilatancy, self.drainage = of("dilatancy"), of("drainage")
+        self.amplitude, self.turn = of("oscillation_amplitude"), of("oscillation_period", 1)
+        self.mass = self.k * (of("period") / (2 * m.pi)) ** 2
+        self.regularised = bool(given.get("regularised"))
+        self.cot = 1 / m.tan(of("phi") * m.pi / 180) if "phi" in given else number(0)
+        pairs = [("b", "D_c"), ("b_2", "D_c_2")][: 1 + ("b_2" in given)]
+        self.b, self.lengths = zip(*((of(b), of(d)) for b, d in pairs), strict=True)
+        factor = 2 if self.law == "perrin_rice_zheng" else 1
+        if self.law == "composite":
+            factor = m.exp(rest_of_composite(m.exp(-self.star / self.cutoff), m))
+        self.theta_star = [factor * length / self.star for length in self.lengths]
+        size = sum(abs(b) for b in self.b)
+        self.shares = [abs(b) / size for b in self.b]
+        self.number, self.given = number, given
+
+    def evolution(self, velocity: Any, theta: Any, length: Any, healing: Any) -> Any:
+        """dtheta/dt as the problems have it."""
+        omega, m = velocity * theta / length, self.m
+        if self.law in ("slowness", "two_slowness_states"):
+            return 1 - omega
+        if self.law in ("slip", "two_slip_states"):
+            return -omega * m.log(omega)
+        if self.law == "perrin_rice_zheng":
+            return 1 - (omega / 2) ** 2
+        if self.law == "family":
+            return omega * (omega ** (-self.eps) - 1) / self.eps
+        return healing - omega * m.log(omega)
+
+    def segments(self) -> list[tuple[Any, Any, Any]]:
+        """Beginning, load point velocity and normal stress of each segment of loading."""
+        found, begins, sigma = [], self.number(0), self.sigma
+        for segment in self.problem.get("loading") or [{"velocity": self.star}]:
+            sigma = self.number(plain(segment.get("normal_stress", sigma)))
+            found.append((begins, self.number(plain(segment["velocity"])), sigma))
+            begins = begins + self.number(plain(segment.get("duration", 0)))
+        return found
+
+    def initial(self) -> tuple[Any, list[Any]]:
+        """Slip rate and thetas at the beginning."""
+        stated = self.problem.get("initial")
+        if not stated:
+            return self.star, list(self.theta_star)
+        thetas = stated["theta"] if isinstance(stated["theta"], list) else [stated["theta"]]
+        return self.number(plain(stated["slip_rate"])), [self.number(plain(x)) for x in thetas]
+
+
+def rest_of_composite(healing: Any, m: Any) -> Any:
+    """u with u exp(u) = healing, by Newton's method."""
+    u = healing / 2
+    for _ in range(60):
+        u = u - (u * m.exp(u) - healing) / (m.exp(u) * (1 + u))
+    return u
+
+
+# ---- the first way: as stated --------------------------------------------------------------------
+
+
+class AsStated:
+    """Unknowns tau, thetas, slip, phi and p, and slip rate where there is mass, in SI units."""
+
+    def __init__(self, problem: dict[str, Any]) -> None:
+        self.s = s = Slider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
+        self.load, self.imposed = s.star, s.sigma
+        states = [abs(star) for star in s.theta_star]
+        self.steps = Steps(
+            20, mpmath.mpf("1e-19"), [s.sigma / 100, *states, *s.lengths[:1], 1, 1, s.star]
+        )
+        self.last = mpmath.mpf(0)
+
+    def begin(self) -> State:
+        s = self.s
+        rate, thetas = s.initial()
+        self.last = mpmath.log(rate / s.star)
+        psi = self._state(thetas)
+        tau = s.sigma * self._friction(self.last, psi) + s.eta * rate
+        return [tau, *thetas, mpmath.mpf(0), mpmath.mpf(0), mpmath.mpf(0), rate]
+
+    def _state(self, thetas: Sequence[Any]) -> Any:
+        s = self.s
+        if not all(theta > 0 for theta in thetas):
+            raise ArithmeticError("a trial step beyond the logarithm")
+        parts = zip(s.b, thetas, s.theta_star, strict=True)
+        return sum(b * mpmath.log(theta / star) for b, theta, star in parts)
+
+    def _friction(self, x: Any, psi: Any) -> Any:
+        s = self.s
+        if s.regularised:
+            return s.a * mpmath.asinh(mpmath.exp(x + (s.mu + psi) / s.a) / 2)
+        return s.mu + s.a * x + psi
+
+    def _rate(self, tau: Any, sigma: Any, psi: Any) -> Any:
+        s = self.s
+        if s.regularised:
+            return 2 * s.star * mpmath.sinh(tau / sigma / s.a) * mpmath.exp(-(s.mu + psi) / s.a)
+        x = (tau / sigma - s.mu - psi) / s.a
+        if s.eta:
+            top, x = x, min(self.last, x)
+            for _ in range(60):
+                radiated = s.eta * s.star * mpmath.exp(x) / sigma / s.a
+                change = (top - radiated - x) / (1 + radiated)
+                x = x + change
+                if abs(change) < mpmath.mpf("1e-26"):
+                    break
+            self.last = x
+        if x > 1000:
+            raise ArithmeticError("a trial step beyond all slip rates")
+        return s.star * mpmath.exp(x)
+
+    def stress(self, t: Any, tau: Any, p: Any) -> tuple[Any, Any]:
+        """Effective normal stress, and the rate of what is imposed of it."""
+        s = self.s
+        angle = 2 * mpmath.pi / s.turn
+        sigma = self.imposed + s.cot * (tau - s.mu * s.sigma) - p
+        if not s.amplitude:
+            return sigma, mpmath.mpf(0)
+        wave = s.amplitude * mpmath.sin(angle * t)
+        return sigma + wave, s.amplitude * angle * mpmath.cos(angle * t)
+
+    def now(self, t: Any, y: State) -> dict[str, Any]:
+        s, count = self.s, len(self.s.b)
+        tau, thetas, slip, p = y[0], y[1 : 1 + count], y[1 + count], y[3 + count]
+        sigma, imposed = self.stress(t, tau, p)
+        velocity = y[-1] if s.mass else self._rate(tau, sigma, self._state(thetas))
+        told = {"friction": (tau - s.eta * velocity) / sigma, "slip_rate": velocity, "slip": slip}
+        told |= {"theta": thetas[0], "theta_1": thetas[0], "theta_2": thetas[-1]}
+        return told | {"normal_stress": sigma, "pore_pressure": p, "imposed": imposed}
+
+    def rates(self, t: Any, y: State) -> State:
+        s, count = self.s, len(self.s.b)
+        now, thetas = self.now(t, y), y[1 : 1 + count]
+        v, sigma = now["slip_rate"], now["normal_stress"]
+        loading = s.k * (self.load - v)
+        opening = -v / s.lengths[0] * (y[2 + count] - s.dilatancy * mpmath.log(v / s.star))
+        draining = -s.drainage * y[3 + count] - opening
+        pressed = now["imposed"] + s.cot * loading
+        healing = mpmath.exp(-v / s.cutoff) if s.cutoff else 0
+        states = zip(thetas, s.lengths, s.b, s.shares, strict=True)
+        evolving = [
+            s.evolution(v, theta, length, healing)
+            - theta / (b * sigma) * share * (s.alpha * pressed + s.c * loading)
+            for theta, length, b, share in states
+        ]
+        faster = mpmath.mpf(0)
+        if s.mass:
+            mu = self._friction(mpmath.log(v / s.star), self._state(thetas))
+            faster = (y[0] - sigma * mu) / s.mass
+        return [loading, *evolving, v, opening, draining, faster]
+
+    def growth(self, t: Any, y: State) -> Any:
+        """d ln V/dt; at constant normal stress."""
+        s, count = self.s, len(self.s.b)
+        if s.mass:
+            return self.rates(t, y)[-1] / y[-1]
+        slopes, v = self.rates(t, y), self.now(t, y)["slip_rate"]
+        states = zip(s.b, slopes[1 : 1 + count], y[1 : 1 + count], strict=True)
+        falls = s.sigma * sum(b * slope / theta for b, slope, theta in states)
+        return (slopes[0] - falls) / (s.a * s.sigma + s.eta * v)
+
+    def enter(self, y: State, velocity: Any, sigma: Any) -> State:
+        """The state as a segment of loading begins."""
+        s, count = self.s, len(self.s.b)
+        ratio, self.load, self.imposed = self.imposed / sigma, velocity, sigma
+        parts = zip(y[1 : 1 + count], s.b, s.shares, strict=True)
+        thetas = [theta * ratio ** (s.alpha * share / b) for theta, b, share in parts]
+        return [y[0], *thetas, *y[1 + count :]]
+
+
+# ---- the second way: logarithms, in double precision ---------------------------------------------
+
+
+class InLogarithms:
+    """Unknowns ln(V/V_*), Theta of each state, spring stress deviation over sigma_*, slip in D_c,
+    and phi and p over sigma_*; time in D_c/V_*.
+    """
+
+    def __init__(self, problem: dict[str, Any]) -> None:
+        self.s = s = Slider(problem, math, float)
+        self.load, self.imposed = 1.0, 1.0
+        self.k, self.eta = s.k * s.lengths[0] / s.sigma, s.eta * s.star / s.sigma
+        self.unit = s.lengths[0] / s.star
+        self.mass = s.mass * s.star / (s.sigma * self.unit)
+        scales = [1.0, *[s.a] * len(s.b), s.a, 1.0, s.a, s.a]
+        self.steps = Steps(14, 1e-14, scales)
+        self.rest = math.log(s.theta_star[0] * s.star / s.lengths[0])
+
+    def begin(self) -> State:
+        s = self.s
+        rate, thetas = s.initial()
+        parts = zip(s.b, thetas, s.theta_star, strict=True)
+        states = [b * math.log(theta / star) for b, theta, star in parts]
+        x = math.log(rate / s.star)
+        f = self._friction(x, sum(states)) - s.mu + self.eta * math.expm1(x)
+        return [x, *states, f, 0.0, 0.0, 0.0]
+
+    def _friction(self, x: float, state: float) -> float:
+        s = self.s
+        if s.regularised:
+            return s.a * math.asinh(0.5 * math.exp(x + (s.mu + state) / s.a))
+        return s.mu + s.a * x + state
+
+    def _evolution(self, u: float, v: float) -> float:
+        """dTheta/d(slip) over b, with u = ln(theta V/D_c), or (2 D_c)."""
+        s = self.s
+        if s.law in ("slip", "two_slip_states"):
+            return -u
+        if s.law == "perrin_rice_zheng":
+            return -math.sinh(u)
+        if s.law == "family":
+            return math.expm1(-s.eps * u) / s.eps
+        if s.law == "composite":
+            u += self.rest
+            return math.exp(-v * s.star / s.cutoff - u) - u
+        return math.expm1(-u)
+
+    def _stress(self, t: float, f: float, p: float) -> tuple[float, float]:
+        s = self.s
+        sigma = self.imposed + s.cot * f - p
+        if not s.amplitude:
+            return sigma, 0.0
+        angle, size = 2.0 * math.pi * self.unit / s.turn, s.amplitude / s.sigma
+        return sigma + size * math.sin(angle * t), size * angle * math.cos(angle * t)
+
+    def rates(self, t: float, y: State) -> State:
+        s, count = self.s, len(self.s.b)
+        x, states, f, phi, p = y[0], y[1 : 1 + count], y[1 + count], y[3 + count], y[4 + count]
+        v = math.exp(x)
+        sigma, imposed = self._stress(t, f, p)
+        loading = self.k * (self.load - v)
+        opening = -v * (phi - s.dilatancy / s.sigma * x)
+        draining = -s.drainage * self.unit * p - opening
+        pressed = imposed + s.cot * loading
+        taken = (s.alpha * pressed + s.c * loading) / sigma
+        parts = zip(states, s.b, s.lengths, s.shares, strict=True)
+        evolving = [
+            v * s.lengths[0] / length * b * self._evolution(state / b + x, v) - share * taken
+            for state, b, length, share in parts
+        ]
+        mu = self._friction(x, sum(states))
+        steep = math.tanh(mu / s.a) if s.regularised else 1.0
+        left = loading - mu * (pressed - draining) - sigma * steep * sum(evolving)
+        growth = left / (sigma * steep * s.a + self.eta * v)
+        if s.mass:
+            growth = (f - s.a * x - sum(states)) / (self.mass * v)  # at constant normal stress
+        return [growth, *evolving, loading, v, opening, draining]
+
+    def growth(self, t: float, y: State) -> float:
+        return self.rates(t, y)[0]
+
+    def now(self, t: float, y: State) -> dict[str, float]:
+        s, count = self.s, len(self.s.b)
+        parts = zip(s.theta_star, y[1 : 1 + count], s.b, strict=True)
+        thetas = [star * math.exp(state / b) for star, state, b in parts]
+        told = {"friction": self._friction(y[0], sum(y[1 : 1 + count]))}
+        told |= {"slip_rate": s.star * math.exp(y[0]), "slip": s.lengths[0] * y[2 + count]}
+        told |= {"theta": thetas[0], "theta_1": thetas[0], "theta_2": thetas[-1]}
+        sigma = s.sigma * self._stress(t, y[1 + count], y[4 + count])[0]
+        return told | {"normal_stress": sigma, "pore_pressure": s.sigma * y[4 + count]}
+
+    def enter(self, y: State, velocity: float, sigma: float) -> State:
+        s, count = self.s, len(self.s.b)
+        ratio = sigma / s.sigma / self.imposed
+        self.load, self.imposed = velocity / s.star, sigma / s.sigma
+        parts = zip(y[1 : 1 + count], s.shares, strict=True)
+        states = [state - share * s.alpha * math.log(ratio) for state, share in parts]
+        # the slip rate with which friction carries the same stress
+        before = self._friction(y[0], sum(y[1 : 1 + count]))
+        x = y[0] if ratio == 1.0 else (before / ratio - s.mu - sum(states)) / s.a
+        return [x, *states, *y[1 + count :]]
+
+
+# ---- answers -------------------------------------------------------------------------------------
+
+
+def series(way: Any, unit: Any) -> list[dict[str, Any]]:
+    """What a way tells at the times of a problem; `unit` is its unit of time in s."""
+    s, t, y, rows = way.s, way.s.number(0), way.begin(), []
+    segments = s.segments()
+    ends = [begins for begins, *_others in segments[1:]]
+    asked = [s.number(str(time)) for time in s.problem["times"]]
+    for begins, velocity, sigma in segments:
+        y = way.enter(y, velocity, sigma)
+        end = ends.pop(0) if ends else max(asked) + 1
+        for time in [x for x in asked if begins <= x <= end and (x < end or x == max(asked))]:
+            y = way.steps.to(way.rates, t / unit, y, time / unit) if time > t else y
+            t = time
+            rows.append({"time": time, **way.now(t / unit, y)})
+        if end <= max(asked):
+            y = way.steps.to(way.rates, t / unit, y, end / unit) if end > t else y
+            t = end
+    return rows
+
+
+def peaks(way: Any, unit: Any) -> list[dict[str, Any]]:
+    """Maxima of slip rate, located by the secant method on the length of a step."""
+    s, y, rows = way.s, way.begin(), []
+    ((_begins, velocity, sigma),) = s.segments()
+    y = way.enter(y, velocity, sigma)
+    walk = way.steps.path(way.rates, s.number(0), y, s.number("1e300"), s.number(1) / unit)
+    t, before, h = next(walk)
+    for after_t, after, length in walk:
+        if way.growth(t, before) > 0 >= way.growth(after_t, after):
+            late, there = located(way, t, before, h)
+            told = way.now(t + late, there)
+            rows.append({"event": len(rows) + 1, "time": (t + late) * unit} | told)
+            if len(rows) == s.problem["count"]:
+                return rows
+        t, before, h = after_t, after, length
+    raise AssertionError
+
+
+def located(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[Any, State]:
+    """Where in a step slip rate is highest, or lowest: part of the step, and the state."""
+    first = way.rates(t, y)
+    low, high, side = h * 0, h, 0
+    at_low = sign * way.growth(t, y)
+    at_high = sign * way.growth(t + h, way.steps.step(way.rates, t, y, h, first)[0])
+    for _ in range(100):
+        middle = (low * at_high - high * at_low) / (at_high - at_low)
+        there = way.steps.step(way.rates, t, y, middle, first)[0]
+        value = sign * way.growth(t + middle, there)
+        if value == 0 or high - low <= 1e-17 * h or not low < middle < high:
+            break
+        if value > 0:
+            low, at_low, at_high = middle, value, at_high / (2 if side == 1 else 1)
+            side = 1
+        else:
+            high, at_high, at_low = middle, value, at_low / (2 if side == -1 else 1)
+            side = -1
+    return middle, there
+
+
+def by(way: type, problem: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of an answer by one of the two ways."""
+    made = way(problem)
+    unit = getattr(made, "unit", 1)
+    return (series if problem["report"] == "series" else peaks)(made, unit)
+
+
+def agrees(text: str, value: Any) -> bool:
+    """True if a number rounds to a text, or would if it were off by a tenth of the last digit."""
+    mantissa, _, exponent = text.partition("e")
+    place = mpmath.mpf(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    return bool(abs(mpmath.mpf(value) - mpmath.mpf(text)) <= mpmath.mpf("0.6") * place)

@@ -1,0 +1,363 @@
+"""The referee: its answers by their second way, what it says of other codes, and of ours."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from referee_answers import UNITS, by_second, columns
+from referee_ways import agrees, stated
+from running import call
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.referee import ours, theirs
+from rsfstudy.referee.problem import Problem, read, shipped
+from rsfstudy.referee.verdict import ENOUGH, Verdict, known, verdict
+
+NUMBERS = sorted(shipped())
+RSFMODEL = Path(__file__).with_name("rsfmodel")
+
+
+def of(number: int) -> Problem:
+    return read(shipped()[number])
+
+
+def answer_of(number: int) -> list[dict[str, str]]:
+    with shipped()[number].with_suffix(".csv").open() as file:
+        return [{k.split()[0]: v for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+@functools.cache
+def second_way(number: int) -> list[dict]:
+    return by_second(stated(shipped()[number]))
+
+
+# ---- answers -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_answers_are_those_of_a_second_way(number):
+    """To their last digit; and each digit of each column, changed by two, is not."""
+    problem, rows, others = of(number), answer_of(number), second_way(number)
+    assert [*rows[0]] == columns(stated(shipped()[number])) == [*problem.columns]
+    for name in problem.quantities:
+        both = [(row[name], other[name]) for row, other in zip(rows, others, strict=True)]
+        assert all(agrees(text, value) for text, value in both)
+        text, value = next(pair for pair in reversed(both) if pair[0] != "0")
+        places = [i for i, x in enumerate(text.partition("e")[0]) if x.isdigit()]
+        assert len(places) == problem.digits == 12
+        for place in places:
+            # by two: the last digit may be off by a half as it is
+            changed = text[:place] + str((int(text[place]) + 2) % 10) + text[place + 1 :]
+            assert not agrees(changed, value)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_files_of_problems_hold_all_that_they_are_asked_for(number):
+    problem = of(number)
+    text = shipped()[number].read_text()
+    assert problem.equations
+    assert problem.conventions
+    assert [f"{name} ({UNITS[name]})" for name in problem.columns] == problem.header
+    # in SI units, as the example takes them
+    units = re.findall(r'"[-+.e\d]+ ([^"]+)"', text)
+    assert {*units} <= {"Pa", "m/s", "m", "s", "Pa/m", "Pa s/m", "1/s"}
+
+
+# ---- ours ----------------------------------------------------------------------------------------
+
+
+def told_of(table: ours.Table) -> dict[str, theirs.Told]:
+    return {name: theirs.Told(values, 0.0) for name, values in table.items()}
+
+
+def digits_of_ours(number: int, rtol: float, engine: str) -> Verdict:
+    problem, answer = known(of(number), shipped()[number].with_suffix(".csv"))
+    table = ours.answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
+    return verdict(problem, answer, told_of(table), 1.0)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9, 1e-11])
+def test_ours_has_the_digits_it_promises(number, rtol):
+    """`rtol` is the accuracy of ln V, which these problems amplify by up to 2.5."""
+    assert digits_of_ours(number, rtol, COMPILED).digits >= -math.log10(4.0 * rtol)
+
+
+@pytest.mark.parametrize("engine", sorted({*ENGINES} - {COMPILED}))
+@pytest.mark.parametrize("number", [4, 12, 14, 17, 20])
+def test_every_engine_does(engine, number):
+    for rtol in (1e-5, 1e-8):
+        assert digits_of_ours(number, rtol, engine).digits >= -math.log10(4.0 * rtol)
+
+
+# ---- other codes ---------------------------------------------------------------------------------
+
+
+def write(path: Path, header: list[str], columns: list) -> Path:
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(header)
+        table.writerows(zip(*columns, strict=True))
+    return path
+
+
+def told_by_second_way(number: int) -> dict[str, np.ndarray]:
+    rows = second_way(number)
+    return {name: np.array([float(row[name]) for row in rows]) for name in of(number).columns}
+
+
+def filed(path: Path, number: int, **changes: np.ndarray) -> Path:
+    """What the second way tells, with changes, as a file of another code."""
+    told = told_by_second_way(number) | changes
+    return write(path, of(number).header, [told[name] for name in of(number).columns])
+
+
+#: Published curves by the problem that they answer, and what their columns are.
+_USUAL = "time=time (s), friction=friction, slip_rate=slider_velocity (um/s), "
+PUBLISHED = {
+    1: ("TestDeiterichOneStateVar.csv", _USUAL + "theta=state (s)"),
+    2: ("TestRuinaOneStateVar.csv", _USUAL + "theta=state (s)"),
+    3: ("TestPerrinOneStateVar.csv", _USUAL + "theta=state (s)"),
+    4: ("TestDeiterichTwoStateVar.csv", _USUAL + "theta_1=state1 (s), theta_2=state2 (s)"),
+}
+
+
+@pytest.mark.parametrize("number", PUBLISHED)
+def test_published_curves_pass_to_the_last_place_that_is_written(number):
+    """Eight decimals, of a file as it stands."""
+    name, columns = PUBLISHED[number]
+    ran = call("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    count = len(of(number).quantities)
+    assert ran.stdout.count("to the last place that is written") == count
+    assert "1 problem of 24, " in ran.stdout
+
+
+@pytest.mark.parametrize(
+    ("number", "wrong", "explanation"),
+    [
+        (1, lambda told, _p: {"friction": told["friction"] - 0.01 * math.log(2)}, "b ln 2"),
+        (2, lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6}, "1e+06 times as much"),
+        (
+            12,
+            lambda told, p: {
+                "friction": told["friction"] + p.damping * told["slip_rate"] / p.rig.normal_stress
+            },
+            "friction is that of the spring",
+        ),
+    ],
+)
+def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explanation, tmp_path):
+    told = told_by_second_way(number)
+    file = filed(tmp_path / f"{number:02d}.csv", number, **wrong(told, of(number)))
+    ran = call("verify", file)
+    assert ran.returncode == 1
+    assert explanation in " ".join(ran.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("number", "changes", "explanation"),
+    [
+        (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
+        (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
+        (12, {"theta": "100 s"}, "theta_0 is D_c/V_*, and not as stated"),
+        (12, {"theta": "1e5 s"}, "theta_0 is D_c/V(0)"),
+        (11, {"regularised": False}, "a logarithm for arcsinh"),
+        (15, {"alpha": 0.0}, "alpha is left out"),
+        (5, {"law": "slip"}, "the law is the slip law"),
+    ],
+)
+def test_conventions_of_the_problem_explain_a_difference(number, changes, explanation):
+    problem = of(number)
+    if "theta" in changes:
+        other = replace(problem, initial={**problem.initial, **changes})
+    elif "law" in changes:
+        other = replace(problem, **changes)
+    else:
+        other = replace(problem, parameters={**problem.parameters, **changes})
+    table = ours.answer(other, Accuracy(1e-8, engine=COMPILED))
+    found = verdict(*known(problem, shipped()[number].with_suffix(".csv")), told_of(table), ENOUGH)
+    assert not found.passes
+    assert explanation in found.explanation
+
+
+def test_where_they_part_is_told(tmp_path):
+    rate = told_by_second_way(1)["slip_rate"]
+    rate[25:] *= 1.001
+    ran = call("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
+    said = " ".join(ran.stdout.split())
+    pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 "
+    assert re.search(pattern, said)
+    assert "no usual difference of conventions explains it" in said
+    assert "0 problems of 24" in said
+    assert ran.returncode == 1
+
+
+def test_other_units_and_other_quantities_are_converted(tmp_path):
+    told = told_by_second_way(12)
+    p = of(12)
+    tau = p.rig.normal_stress * told["friction"] + p.damping * told["slip_rate"]
+    header = ["t", "tau", "logV", "theta", "u"]
+    columns = [told["time"] / 60.0, tau / 1e6, np.log10(told["slip_rate"]), told["theta"] / 3600.0]
+    file = write(tmp_path / "mine.csv", header, [*columns, told["slip"] * 1e6])
+    mapped = (
+        "time=t (min), shear_stress=tau (MPa), log10_slip_rate=logV, theta=theta (h), slip=u (um)"
+    )
+    ran = call("verify", file, "--problem", "12", "--columns", mapped)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert "1 problem of 24, 1" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error"),
+    [
+        (lambda h, c: (["time (s)", "mu (1)", *h[2:]], c), "column = 'friction': is missing"),
+        (lambda h, c: ([h[0], h[1], "slip_rate (MPa)", *h[3:]], c), "slip_rate"),
+        (lambda h, c: ([h[0], h[1], "slip_rate (1)", *h[3:]], c), "has no units"),
+        (lambda h, c: (["time", *h[1:]], c), "names no column with its units"),
+        (lambda h, c: (h, [x[:-1] for x in c]), "number of rows = 40"),
+        (lambda h, c: (h, [c[0] + 0.5, *c[1:]]), "time = 0.5: must be 0 s"),
+        (lambda h, c: (h, [c[0], ["", *c[1][1:]], *c[2:]]), "line 2, column 2: friction = nan"),
+        (lambda h, c: (h, [c[0], ["nan", *c[1][1:]], *c[2:]]), "must be finite"),
+        (lambda h, c: (h, [c[0], ["0,6", *c[1][1:]], *c[2:]]), "is no number"),
+    ],
+)
+def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
+    told = told_by_second_way(1)
+    header, columns = spoil(of(1).header, [told[name] for name in of(1).columns])
+    file = write(tmp_path / "01.csv", header, columns)
+    with pytest.raises(InvalidValue, match=re.escape(error)):
+        theirs.read(file, of(1))
+
+
+# ---- problems of one's own -----------------------------------------------------------------------
+
+#: Scenes of two other codes, which state all of this in SI.
+STICK_SLIP = """
+title = "Stick-slip of another code"
+law = "slip"
+report = "peaks"
+quantities = ["time", "slip_rate"]
+count = 2
+[parameters]
+a = 0.011
+b = 0.016
+D_c = "1e-4 m"
+normal_stress = "3e7 Pa"
+stiffness = "1.2e9 Pa/m"
+radiation_damping = "4.41e6 Pa s/m"
+V_star = "1e-6 m/s"
+mu_star = 0.6
+[initial]
+slip_rate = "2e-7 m/s"
+theta = "300 s"
+[[loading]]
+velocity = "1e-6 m/s"
+"""
+STEP = """
+title = "Velocity step of another code"
+law = "slowness"
+quantities = ["friction", "slip_rate", "theta"]
+times = [1, 2, 5, 10, 20, 50]
+[parameters]
+a = 0.01
+b = 0.014
+D_c = "20 um"
+normal_stress = "5 MPa"
+stiffness = "0.003 MPa/um"
+radiation_damping = "4.41e6 Pa s/m"
+V_star = "1 um/s"
+mu_star = 0.6
+[initial]
+slip_rate = "3 um/s"
+theta = "4 s"
+[[loading]]
+velocity = "10 um/s"
+"""
+TWO_STATES = (
+    STEP.replace('"slowness"', '"two_slowness_states"')
+    .replace('D_c = "20 um"', 'D_c = "20 um"\nb_2 = 0.002\nD_c_2 = "60 um"')
+    .replace('"4 s"', '["4 s", "50 s"]')
+    .replace('"theta"]', '"theta_1", "theta_2"]')
+)
+
+
+@pytest.mark.parametrize("text", [STICK_SLIP, STEP, TWO_STATES])
+def test_a_problem_of_ones_own(text, tmp_path):
+    """Held against another formulation, which knows of nothing but SI units."""
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    plain = text.replace('"20 um"', '"2e-5 m"').replace('"60 um"', '"6e-5 m"')
+    plain = plain.replace('"5 MPa"', '"5e6 Pa"').replace('"0.003 MPa/um"', '"3e9 Pa/m"')
+    plain = re.sub(r'"(\d+) um/s"', r'"\1e-6 m/s"', plain)
+    (tmp_path / "plain.toml").write_text(plain)
+    rows = by_second({"times": [], "report": "series", **stated(tmp_path / "plain.toml")})
+    problem = read(path)
+    told = [[row[name] for row in rows] for name in problem.columns]
+    file = write(tmp_path / "mine.csv", problem.header, told)
+    ran = call("verify", file, "--problem", path)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert re.search(r"1 problem of one's own, (8|9|10|11|12) digits", ran.stdout)
+    given = {"slip_rate": rows[0]["slip_rate"] * 1.01}
+    spoilt = [[{**row, **given}[name] for row in rows] for name in problem.columns]
+    assert call("verify", write(file, problem.header, spoilt), "--problem", path).returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        ("a = 0.01\n", "", "must state a"),
+        ('theta = "4 s"', "", "must state slip_rate and theta"),
+        ('"4 s"', '["4 s", "5 s"]', "must state 1, one for each b"),
+        ('"4 s"', '"4 m"', "theta"),
+        ("times = [1, 2, 5, 10, 20, 50]", "", "must list the times"),
+        ('"friction"', '"colour"', "is unknown"),
+        ('"slowness"', '"sloth"', "is unknown"),
+        ("[initial]", "[begin]", "is unknown"),
+    ],
+)
+def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(STEP.replace(old, new, 1))
+    with pytest.raises(InvalidValue, match=re.escape(error)):
+        read(path)
+
+
+# ---- what is written -----------------------------------------------------------------------------
+
+
+def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
+    """Run as a stranger runs it; and all answers pass, with a figure."""
+    place = tmp_path / "referee"
+    assert call("problems", place).returncode == 0
+    text = (place / "example.py").read_text()
+    assert "rsfstudy" not in text
+    ran = subprocess.run([sys.executable, "example.py"], cwd=place, capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    mine = sorted((place / "mine").iterdir())
+    assert 3 * len(mine) >= len(NUMBERS)
+    ran = call("verify", *mine, "--figure", tmp_path / "figure.png")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert re.search(rf"{len(mine)} problems of 24, (7|8|9) to 1[012] digits", ran.stdout)
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    ran = call("verify", *sorted((place / "answers").iterdir()))
+    assert "24 problems of 24, 12 digits" in ran.stdout
+    templates = sorted((place / "templates").iterdir())
+    assert [t.name for t in templates] == [a.name for a in sorted((place / "answers").iterdir())]
+    assert call("verify", templates[0]).returncode == 2
+    again = call("problems", place)
+    assert (again.returncode, " ".join(again.stderr.split())[-42:]) == (
+        2,
+        "there already. Name a new one: nothing is replaced."[-42:],
+    )
