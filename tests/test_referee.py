@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from referee_answers import UNITS, by_second, columns
+from referee_page import MARK, PAGE, parts
 from referee_ways import agrees, stated
 from running import call
 
@@ -343,9 +344,11 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     assert call("problems", place).returncode == 0
     text = (place / "example.py").read_text()
     assert "rsfstudy" not in text
+    lines = [line for line in text.splitlines() if line and "import" not in line]
+    assert len(lines) - 1 <= 30  # and one that says what it is
     ran = subprocess.run([sys.executable, "example.py"], cwd=place, capture_output=True, text=True)
     assert (ran.returncode, ran.stderr) == (0, "")
-    mine = sorted((place / "mine").iterdir())
+    mine = sorted(place.glob("*.csv"))
     assert 3 * len(mine) >= len(NUMBERS)
     ran = call("verify", *mine, "--figure", tmp_path / "figure.png")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -361,3 +364,9 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
         2,
         "there already. Name a new one: nothing is replaced."[-42:],
     )
+
+
+def test_the_page_tells_of_every_problem_what_its_file_does():
+    assert PAGE.read_text().partition(MARK)[2] == "\n" + parts()
+    for number in NUMBERS:
+        assert f"### {number}. {of(number).title}" in PAGE.read_text()

@@ -1,0 +1,63 @@
+"""``python tests/referee_page.py`` writes what the page of the referee says of each problem."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from referee_ways import PROBLEMS, stated
+
+PAGE = Path(__file__).parent.parent / "studies" / "pages" / "referee.md"
+MARK = "<!-- problems: written by tests/referee_page.py -->\n"
+
+
+def part(number: int, problem: dict[str, Any]) -> str:
+    """What a problem is, as a part of the page."""
+    told = [f"{name} = {_plain(value)}" for name, value in problem["parameters"].items()]
+    initial = problem.get("initial")
+    begins = [f"{n}(0) = {_plain(value)}" for n, value in (initial or {}).items()]
+    lines = [
+        f"### {number}. {problem['title']}",
+        "",
+        *(f"    {line}" for line in problem["equations"].splitlines()),
+        "",
+        " ".join(problem["conventions"].split()),
+        "",
+        f"- Parameters: {', '.join(told)}.",
+        f"- Beginning: {', '.join(begins) or 'steady sliding at V_*'}.",
+    ]
+    if "loading" in problem:
+        lines.append(f"- Load point: {'; then '.join(map(_segment, problem['loading']))}.")
+    return "\n".join([*lines, f"- Report: {_report(problem)}.", ""])
+
+
+def _plain(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, list) else str(value)
+
+
+def _segment(segment: dict[str, str]) -> str:
+    text = f"V_0 = {segment['velocity']}"
+    if "normal_stress" in segment:
+        text += f", normal stress {segment['normal_stress']}"
+    return text + (f" for {segment['duration']}" if "duration" in segment else "")
+
+
+def _report(problem: dict[str, Any]) -> str:
+    names = ", ".join(problem["quantities"])
+    if problem["report"] == "series":
+        times = problem["times"]
+        return f"{names} at {len(times)} times from {times[0]:g} to {times[-1]:g} s"
+    if problem["report"] == "peaks":
+        return f"{names} of the first {problem['count']} maxima of slip rate"
+    return names
+
+
+def parts() -> str:
+    """All of them."""
+    files = sorted(PROBLEMS.glob("*.toml"))
+    return "\n".join(part(int(file.name[:2]), stated(file)) for file in files)
+
+
+if __name__ == "__main__":
+    before = PAGE.read_text().partition(MARK)[0]
+    PAGE.write_text(before + MARK + "\n" + parts())
