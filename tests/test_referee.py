@@ -209,7 +209,7 @@ def test_other_units_and_other_quantities_are_converted(tmp_path):
     told = told_by_second_way(12)
     p = of(12)
     tau = p.rig.normal_stress * told["friction"] + p.damping * told["slip_rate"]
-    header = ["t", "tau", "logV", "theta", "u"]
+    header = ["t (min)", "tau", "logV", "theta", "u (um)"]
     columns = [told["time"] / 60.0, tau / 1e6, np.log10(told["slip_rate"]), told["theta"] / 3600.0]
     file = write(tmp_path / "mine.csv", header, [*columns, told["slip"] * 1e6])
     mapped = (
@@ -294,13 +294,20 @@ TWO_STATES = (
 )
 
 
-@pytest.mark.parametrize("text", [STICK_SLIP, STEP, TWO_STATES])
+#: With mass; and where stress takes from each of two states its share.
+MASS = STICK_SLIP.replace('radiation_damping = "4.41e6 Pa s/m"', 'period = "100 s"')
+_UNDAMPED = TWO_STATES.replace('radiation_damping = "4.41e6 Pa s/m"\n', "")
+NAGATA = _UNDAMPED.replace("mu_star", "stress_dependence = 0.5\nmu_star")
+STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress = "5.2 MPa"'
+
+
+@pytest.mark.parametrize("text", [STICK_SLIP, STEP, TWO_STATES, MASS, NAGATA, STRESSED])
 def test_a_problem_of_ones_own(text, tmp_path):
     """Held against another formulation, which knows of nothing but SI units."""
     path = tmp_path / "mine.toml"
     path.write_text(text)
     plain = text.replace('"20 um"', '"2e-5 m"').replace('"60 um"', '"6e-5 m"')
-    plain = plain.replace('"5 MPa"', '"5e6 Pa"').replace('"0.003 MPa/um"', '"3e9 Pa/m"')
+    plain = plain.replace(" MPa", "e6 Pa").replace("0.003e6 Pa/um", "3e9 Pa/m")
     plain = re.sub(r'"(\d+) um/s"', r'"\1e-6 m/s"', plain)
     (tmp_path / "plain.toml").write_text(plain)
     rows = by_second({"times": [], "report": "series", **stated(tmp_path / "plain.toml")})

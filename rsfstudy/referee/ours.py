@@ -49,12 +49,11 @@ def _series(problem: Problem, accuracy: Accuracy) -> Table:
         pass
     seen = recording.seen(scene)
     told = dict(zip(OBSERVED, seen.T, strict=False))
-    sigma = rig.normal_stress
-    states = told["state_variable"][:, None] if len(problem.b) == 1 else seen[:, STATES:]
-    thetas = [
-        star * np.exp(state / b)
-        for star, state, b in zip(problem.theta_star, states.T, problem.b, strict=False)
-    ]
+    sigma, b = rig.normal_stress, np.array(problem.b)
+    states = seen[:, STATES : STATES + len(b)]
+    taken = states.sum(axis=1) - told["state_variable"]
+    states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
+    thetas = (np.array(problem.theta_star) * np.exp(states / b)).T
     return {
         "time": np.array(problem.times),
         "friction": told["frictional_stress"] / told["normal_stress_ratio"],

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from operator import add
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,9 @@ from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.regimes import at_rate, on_slow_manifold
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import in_si
-from rsfstudy.slider.equations import steady_states_of
+from rsfstudy.slider import registry
+from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 
 #: Where the problems stand, each beside its answer.
@@ -37,9 +40,19 @@ NUMBERS = {
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
 REPORTS = {"series": SERIES, "peaks": PEAKS, "numbers": NUMBERS}
-#: Parameters of a rig by their names here, and units of those that no field of a scene holds.
-_RIG = {"normal_stress": "normal_stress", "D_c": "slip_distance", "V_star": "reference_velocity"}
-_UNITS = {"radiation_damping": "Pa s/m", "V_c": "m/s", "D_c_2": "m", "V_unstable": "m/s"}
+#: What must be stated, and what a laboratory calls that, or what else it may be told.
+_STATED = {"normal_stress": "normal_stress", "D_c": "slip_distance", "V_star": "reference_velocity"}
+_RIG = {**_STATED, "stiffness": "stiffness", "period": "period", "mass": "mass"}
+#: Units of parameters that no field of a scene holds.
+_UNITS = {
+    "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
+    "V_unstable": "m/s",
+}  # fmt: skip
+#: Laws whose theta goes as exp(Theta/b).
+_LAWS = (
+    "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
+    "two_slowness_states",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,11 +113,17 @@ class Problem:
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
         if self.report == "peaks" and self.count < 1:
             raise InvalidValue("count", self.count, "must be 1 or more: how many peaks to tell")
-        for name in ("a", "b", *_RIG):
+        if self.law not in _LAWS:
+            raise InvalidValue("law", self.law, "is unknown", choices=_LAWS)
+        two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
+        for name in ("a", "b", *two, *_STATED):
             if name not in self.parameters:
                 raise InvalidValue("parameters", [*self.parameters], f"must state {name}")
         if self.initial and self.initial.keys() != {"slip_rate", "theta"}:
             rule = "must state slip_rate and theta, or nothing"
+            raise InvalidValue("initial", [*self.initial], rule)
+        if self.initial and "phi" in self.parameters:
+            rule = "has no meaning beside phi: it begins with normal_stress, in steady sliding"
             raise InvalidValue("initial", [*self.initial], rule)
 
     @property
@@ -140,77 +159,12 @@ class Problem:
     @cached_property
     def rig(self) -> Laboratory:
         """The scales of the problem, and its spring and mass."""
-        stated = {_RIG.get(n, n): v for n, v in self.parameters.items()}
-        known = [f.name for f in fields(Laboratory)]
-        return Laboratory(**{name: stated[name] for name in known if name in stated})
-
-    @cached_property
-    def scene(self) -> Scene:
-        """The scene that the problem states."""
-        rig, own = self.rig, {*_RIG, *_UNITS, "a", "b", "b_2", "stiffness", "period"}
-        rest = {n: v for n, v in self.parameters.items() if n not in own}
-        given = {n: self.si(n, unit) for n, unit in _UNITS.items() if n in self.parameters}
-        a, b = (float(self.parameters[name]) for name in "ab")
-        rest |= {"law": self.law, "a": a}
-        if "b_2" in self.parameters:
-            ratio = given["D_c_2"] / rig.slip_distance
-            both = {"b1_over_a": b / a, "b2_over_a": self.parameters["b_2"] / a}
-            rest |= both | {"length_ratio": ratio}
-        else:
-            rest["b_over_a"] = b / a
-        if "phi" in rest:
-            rest["normal_stress"] = "variable"
-        if self.damping:
-            rest["radiation_damping"] = self.damping * rig.reference_velocity
-        if "V_c" in given:
-            rest["cutoff_velocity_ratio"] = given["V_c"] / rig.reference_velocity
-        if "V_unstable" in given:
-            period = rest.setdefault("period", 5.0) / (2.0 * math.pi)
-            rest["instability_norm"] = given["V_unstable"] * period / rig.slip_distance
-        if self.loading:
-            rest["loading"] = rig.protocol(self.loading)
-        if self.initial and len(self._states) == 1:
-            stress = self._stress * rig.normal_stress
-            rest |= {"initial_stress": stress, "initial_state": self._states[0]}
-        return rig.scene(**rest)
-
-    @cached_property
-    def theta_star(self) -> tuple[float, ...]:
-        """theta in steady sliding at V_star, of each state, in s."""
-        scale = {"perrin_rice_zheng": 2.0}.get(self.law, 1.0)
-        if self.law == "composite":
-            healing = math.exp(-self.rig.reference_velocity / self.si("V_c", "m/s"))
-            scale = math.exp(lambertw(healing).real)
-        lengths = [self.si(n, "m") for n in ("D_c", "D_c_2") if n in self.parameters]
-        return tuple(scale * length / self.rig.reference_velocity for length in lengths)
-
-    @property
-    def theta_at_rest(self) -> tuple[float, ...]:
-        """theta in steady sliding at the slip rate of the beginning."""
-        return tuple(theta * math.exp(-self._log_rate) for theta in self.theta_star)
+        return Laboratory(**{_RIG[n]: v for n, v in self.parameters.items() if n in _RIG})
 
     @cached_property
     def b(self) -> tuple[float, ...]:
         """Evolution effect of each state."""
-        return tuple(float(self.parameters[n]) for n in ("b", "b_2") if n in self.parameters)
-
-    @cached_property
-    def _states(self) -> tuple[float, ...]:
-        """State variables at the beginning, 0 in steady sliding at V_star."""
-        stated = self.initial["theta"]
-        thetas = stated if isinstance(stated, list) else [stated]
-        if len(thetas) != len(self.b):
-            rule = f"must state {len(self.b)}, one for each b"
-            raise InvalidValue("theta", stated, rule)
-        return tuple(
-            b * math.log(in_si("theta", theta, "s") / star)
-            for b, theta, star in zip(self.b, thetas, self.theta_star, strict=True)
-        )
-
-    @cached_property
-    def _log_rate(self) -> float:
-        rate = in_si("slip_rate", self.initial["slip_rate"], "m/s")
-        return math.log(rate / self.rig.reference_velocity)
+        return tuple(self.si(name, "1") for name in ("b", "b_2") if name in self.parameters)
 
     @property
     def damping(self) -> float:
@@ -219,26 +173,76 @@ class Problem:
         return self.si("radiation_damping", "Pa s/m") if known else 0.0
 
     @cached_property
-    def _stress(self) -> float:
-        """Spring stress at the beginning over normal stress, above that of steady sliding."""
-        a, mu_star = float(self.parameters["a"]), float(self.parameters["mu_star"])
-        excess = a * self._log_rate + sum(self._states)
-        if self.parameters.get("regularised"):
-            excess = a * math.asinh(0.5 * math.exp((mu_star + excess) / a)) - mu_star
-        radiated = self.damping * self.rig.reference_velocity / self.rig.normal_stress
-        return float(excess + radiated * math.expm1(self._log_rate))
+    def scene(self) -> Scene:
+        """The scene that the problem states, but for how it begins."""
+        rig, a = self.rig, self.si("a", "1")
+        rest = {n: v for n, v in self.parameters.items() if n not in {*_RIG, *_UNITS}}
+        given = {n: self.si(n, unit) for n, unit in _UNITS.items() if n in self.parameters}
+        rest |= {"law": self.law, "a": a}
+        if len(self.b) == 1:
+            rest["b_over_a"] = self.b[0] / a
+        else:
+            rest |= {f"b{i}_over_a": b / a for i, b in enumerate(self.b, start=1)}
+            rest["length_ratio"] = given["D_c_2"] / rig.slip_distance
+        if "phi" in rest:
+            rest["normal_stress"] = "variable"
+        if self.damping:
+            rest["radiation_damping"] = self.damping * rig.reference_velocity
+        if "V_c" in given:
+            rest["cutoff_velocity_ratio"] = given["V_c"] / rig.reference_velocity
+        if "V_unstable" in given:
+            period = rig.period or registry.defaults()["period"]
+            norm = given["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
+            rest["instability_norm"] = norm
+        if self.loading:
+            rest["loading"] = rig.protocol(self.loading)
+        return rig.scene(**rest)
+
+    @cached_property
+    def theta_star(self) -> tuple[float, ...]:
+        """theta in steady sliding at V_star, of each state, in s."""
+        scale = 2.0 if self.law == "perrin_rice_zheng" else 1.0
+        if self.law == "composite":
+            healing = math.exp(-self.rig.reference_velocity / self.si("V_c", "m/s"))
+            scale = math.exp(lambertw(healing).real)
+        lengths = [self.si(name, "m") for name in ("D_c", "D_c_2") if name in self.parameters]
+        return tuple(scale * length / self.rig.reference_velocity for length in lengths)
+
+    @cached_property
+    def log_rate(self) -> float:
+        """ln(V/V_star) at the beginning."""
+        rate = in_si("slip_rate", self.initial["slip_rate"], "m/s")
+        return math.log(rate / self.rig.reference_velocity)
 
     @property
     def since(self) -> Event | None:
-        """The beginning of a motion of two states, which no field of a scene holds; else None."""
-        if not self.initial or len(self._states) == 1:
+        """The beginning of the motion, where that is stated: a stress of the spring with which slip
+        rate is the one stated, before any step.
+        """
+        if not self.initial:
             return None
-        scene = self.scene
-        others = steady_states_of(scene, 0.0, 0.0)[2:]
-        psis = (*self._states, *(scene.parts.loading.beginning or others))
-        point = on_slow_manifold(scene, self._stress + scene.spring_stress_step, psis)
-        point = at_rate(scene, point, self._log_rate) if scene.has_mass else point
+        scene, x, states = self.scene, self.log_rate, self._states()
+        acting, before = scene.chains[0][0], scene.under(Segment(1.0))
+        friction = scene.a * x + sum(states)
+        if scene.parts.law.regularised:
+            above = (scene.mu_star + friction) / scene.a
+            friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
+        taken = steady_states_of(before, 0.0, relation_of(before)(friction)[2])
+        psis = (*map(add, states, taken), *taken[len(states) :], *scene.parts.loading.beginning)
+        radiated = before.dynamics.radiated(x)
+        point = on_slow_manifold(acting, friction + radiated + acting.spring_stress_step, psis)
+        point = at_rate(acting, point, x) if scene.has_mass else point
         return Event(Kind.START, None, 0.0, 0.0, point, "", 0, 0.0)
+
+    def _states(self) -> tuple[float, ...]:
+        """State variables at the beginning, 0 in steady sliding at V_star."""
+        stated = self.initial["theta"]
+        thetas = stated if isinstance(stated, list) else [stated]
+        if len(thetas) != len(self.b):
+            rule = f"must state {len(self.b)}, one for each b"
+            raise InvalidValue("theta", stated, rule)
+        known = zip(self.b, thetas, self.theta_star, strict=True)
+        return tuple(b * math.log(in_si("theta", x, "s") / star) for b, x, star in known)
 
 
 def read(path: Path) -> Problem:
@@ -266,7 +270,7 @@ def read(path: Path) -> Problem:
                 raise InvalidValue("problem", [*stated], f"must state {name}")
         number = int(path.name[:2]) if path.parent == SHIPPED else 0
         problem = Problem(**stated, number=number)
-        _ = problem.scene
+        _ = problem.scene, problem.since
         return problem
     except InvalidValue as error:
         raise error.at(str(path)) from error
