@@ -122,8 +122,11 @@ ENOUGH = {
         "case": ["imposed, alpha = 0", "imposed, alpha = 0.56", "inclined, alpha = 0.56"],
         "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
     },
+    # the first samples are a sample still
+    "uncertain_recurrence": {"sample": list(range(64))},
     "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
     "wave_triggering": {"cycle_phase": [0.5, 0.8, 0.9]},
+    "what_matters": {"sample": list(range(5 * 64))},
     "two_states": {
         "stiffness_ratio": [0.84, 0.8531, 0.8567, 0.8655, 0.8659, 0.8663, 0.8667, 0.9, 0.95, 1.02]
     },
@@ -145,8 +148,10 @@ LEFT_TO_COMPILED = (
     "stress_drop",
     "triggering",
     "two_states",
+    "uncertain_recurrence",
     "velocity_steps",
     "wave_triggering",
+    "what_matters",
 )
 
 

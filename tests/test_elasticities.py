@@ -14,6 +14,7 @@ from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.elasticities import Elasticities
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
@@ -163,3 +164,18 @@ def test_what_has_no_elasticities():
     ):
         with pytest.raises(InvalidValue, match=message):
             Elasticities(**given)
+
+
+def test_the_elasticities_that_uncertain_recurrence_states():
+    """Of the interval in s on a machine whose stiffness is held: by a and b each with the other
+    held, and by D_c, with which k D_c/sigma_*, V_*/D_c and the unit of time go. Stated to 3 digits.
+    """
+    from rsfstudy.named_studies import uncertain_recurrence as stated
+
+    names = ("a", "b_over_a", "stiffness", "reference_rate")
+    measure = Elasticities(LimitCycle(phases=2), parameters=names)
+    found, _outcome = told(measure, stated.base)
+    a, ratio, stiffness, rate = (elasticity for elasticity, _error in found.values())
+    exact = {"a": a - ratio, "b": ratio, "slip_distance": 1.0 + stiffness - rate}
+    for name, value in stated.ELASTICITIES.items():
+        assert value == pytest.approx(exact[name], rel=2e-3, abs=0.01)

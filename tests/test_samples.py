@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import run
+from running import call, run
 from scipy.stats import lognorm, norm, truncnorm, uniform
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy import Axis, Laboratory, Scene, Study, plots
 from rsfstudy.compute import cells
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import restore
@@ -405,3 +405,47 @@ def test_sobol_indices_are_refused():
     reduced(whole.isel(draw=slice(0, 160)), of)  # 32 points are a sample still
     with pytest.raises(InvalidValue, match="over = 'sample': is no dimension of y"):
         reduced(whole, (SobolIndices("share", "y"),))
+
+
+# ---- figures ------------------------------------------------------------------------------------
+
+
+def test_samples_are_drawn_as_histograms_and_scatters(tmp_path):
+    """A square of what was measured and of the fields, with few ticks however many samples: never a
+    name for each.
+    """
+    laws = Axis("law", ["slip", "slowness"])
+    found = run(study(laws, Axis.samples(LOGS, 256, 3, fields=FIELDS)), engine="compiled")
+    drawn = plots.figure(found)
+    names = ("critical_stiffness", "a", "b_over_a")
+    assert len(drawn.axes) == len(names) ** 2
+    for place, axes in enumerate(drawn.axes):
+        x, y = names[place % 3], names[place // 3]
+        assert max(len(axes.get_xticks()), len(axes.get_yticks())) < 8
+        if x == y:
+            bars = sum(bar.get_height() for bar in axes.patches)
+            assert bars == 256 * (2 if x == "critical_stiffness" else 1)
+        else:
+            line = axes.lines[-1]
+            np.testing.assert_array_equal(line.get_xdata(), found[x].values.ravel()[-256:])
+            np.testing.assert_array_equal(line.get_ydata(), found[y].values.ravel()[-256:])
+    other = plots.figure(found, variable="steady_friction")
+    assert other.axes[0].get_xlabel() != drawn.axes[0].get_xlabel()
+    plots.save(found, tmp_path / "samples.svg")
+
+
+def test_a_single_case_is_drawn():
+    assert plots.figure(run(study(Axis.cases({"a": [0.01], "b_over_a": [1.5]})))).axes
+
+
+# ---- the command line ---------------------------------------------------------------------------
+
+
+def test_fewer_samples_from_the_command_line():
+    shown = call("show", "uncertain_recurrence", "--set", "sample=0:7:8").stdout
+    assert "axis sample (8)" in shown
+    refused = call("show", "uncertain_recurrence", "--set", "sample=300")
+    assert refused.returncode == 2
+    assert "sample = 300.0: is no point of the axis: they are numbered from 0 to 255" in (
+        refused.stderr.replace("\n", " ")
+    )

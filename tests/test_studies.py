@@ -69,6 +69,8 @@ WIDE = {
     "stability_map C1": "half of a bracket, which holds the boundary anywhere",
     "wave_triggering W1": "one bound of second order for all; of slow waves it nearly vanishes",
     "stress_drop C15": "the paper says whole multiples",
+    "uncertain_recurrence U1": "what sampling leaves, of which the seed makes more or less",
+    "what_matters W3": "what sampling leaves, of which the seed makes more or less",
 }
 
 
@@ -199,6 +201,8 @@ def test_what_is_reduced_carries_the_errors_of_its_cells(result):
     dataset, path = result
     for reduction in catalogue.load(path.stem).reductions:
         if reduction.name not in dataset or f"{reduction.of}_error" not in dataset:
+            continue
+        if reduction.of_failures:  # a count of statuses
             continue
         error = dataset[f"{reduction.name}_error"]
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name

@@ -105,7 +105,7 @@ def coordinates(study: Study) -> dict[Any, Any]:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
         elif axis.is_numbered:
-            about = {"long_name": f"number of the {axis.dimension.replace('_', ' ')}"}
+            about = {"units": "1", "long_name": f"number of the {axis.dimension.replace('_', ' ')}"}
             about |= {"drawn": json.dumps(axis.drawn)} if axis.drawn else {}
             coords[axis.dimension] = (axis.dimension, np.arange(len(axis), dtype=np.int32), about)
         # an axis shows its own values, even where its first cells make no use of them

@@ -208,7 +208,7 @@ class StatusShares(Reduction):
         return (
             Quantity(self.name, "", "1", "share of samples that ended so"),
             Quantity(f"{self.name}_stderr", "", "1", f"standard error, by sampling, of {name}"),
-            Quantity("ended", "", "1", "status with which a sample ended"),
+            Quantity("ended", "", "", "status with which a sample ended"),
         )
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:

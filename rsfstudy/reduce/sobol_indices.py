@@ -51,7 +51,7 @@ class SobolIndices(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        about = Quantity("input", "", "1", "sampled quantity")
+        about = Quantity("input", "", "", "sampled quantity")
         return (about, *(Quantity(n, "", "1", text) for n, text in self._texts()))
 
     def _texts(self) -> Iterator[tuple[str, str]]:
