@@ -14,7 +14,7 @@ from rsfstudy import Axis, Laboratory, Scene, Study
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.rig import lattice
 
@@ -284,6 +284,30 @@ def test_each_cell_is_converted_by_its_own_scales(cycles):
     assert "load_velocity_ratio" not in found
     rates = 1e-3 * 60.0 * 10.0 ** cycles["max_log10_slip_rate"]
     assert found["max_slip_rate"].values == pytest.approx(rates.values, rel=1e-13)
+
+
+def test_a_slip_rate_in_units_tells_slow_slip_from_stick_slip(cycles):
+    """By the peak in um/s of each cell, from results as they are and in other units."""
+    peaks = cycles.rsf.in_units()["max_slip_rate"].values
+    between = float(np.sqrt(peaks.min() * peaks.max()))
+    for results in (cycles, cycles.rsf.in_units(length="mm")):
+        modes = results.rsf.slip_mode(f"{between} um/s")
+        assert modes.values.tolist() == np.where(peaks >= between, 3.0, 2.0).tolist()
+        assert modes.attrs["flag_meanings"].split()[2:] == ["slow_slip", "stick_slip"]
+    assert 0 < int((modes == 3.0).sum()) < modes.size
+    settled = cycles.assign(slip_mode=xr.zeros_like(cycles["slip_mode"]))
+    assert not settled.rsf.slip_mode(1e-9).any()
+    with pytest.raises(InvalidValue, match="has units of another kind than m/s"):
+        cycles.rsf.slip_mode("1 mm")
+
+
+def test_a_map_of_flags_names_them():
+    plane = RIG.axis("stiffness", "1:3:4 kPa/um"), RIG.axis("load_velocity", "1:100:4:log um/s")
+    mapped = study(*plane, measure=LimitCycle(phases=2), period="5 ms", inertia=True)
+    drawn = rsfstudy.plot(run(mapped, engine="compiled", rtol=1e-3), "slip_mode")
+    (bar,) = [axes for axes in drawn.axes if len(axes.get_yticklabels()) == len(SLIP_MODES)]
+    names = [text.get_text() for text in bar.get_yticklabels()]
+    assert names == [mode.replace("_", " ") for mode in SLIP_MODES]
 
 
 def test_a_cycle_is_that_of_its_own_rig(cycles):

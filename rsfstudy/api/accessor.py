@@ -183,6 +183,41 @@ class Accessor:
         return of_motion(self._dataset, slip_rate, lambda: self.scene)
 
     @door
+    def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
+        """What sliders do in the end, where stick-slip begins at a slip rate in units.
+
+        Parameters
+        ----------
+        stick_slip_from : quantity
+            Peak slip rate from which a cycle is stick-slip and below which it is slow slip, as in
+            ``"1 mm/s"``, or a number in m/s; `LimitCycle` says what it is otherwise.
+
+        Returns
+        -------
+        xarray.DataArray
+            `slip_mode` of the dataset, each cell by its own V_*: of results of a rig, or of a limit
+            cycle in its units.
+
+        Raises
+        ------
+        InvalidValue
+            For what is no slip rate, and for a dataset that does not tell its scales.
+        DataError
+            For a dataset without limit cycles.
+        """
+        from rsfstudy.measures.limit_cycle import SLIP_MODES
+        from rsfstudy.rig.units import factor, in_si
+
+        least = in_si("stick_slip_from", stick_slip_from, "m/s")
+        if "slip_mode" not in self._dataset:
+            raise DataError("slip_mode is not there: the dataset is of no limit cycles")
+        there = self._dataset if "max_slip_rate" in self._dataset else self.to_si()
+        peak = there["max_slip_rate"]
+        fast = peak * float(factor("max_slip_rate", peak.attrs["units"], "m/s")) >= least
+        modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
+        return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
+
+    @door
     def to_dataframe(self) -> pd.DataFrame:
         """A table without columns that never change.
 

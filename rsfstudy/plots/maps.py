@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection, QuadMesh
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import BoundaryNorm, LogNorm, Normalize
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -45,9 +45,11 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     the two; none where there are no two.
     """
     names = measured(dataset)[:1] if variable is None else [variable]
-    if not names or names[0] not in dataset or not is_number(dataset[names[0]]):
+    if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
+    if not (is_number(values) or _meanings(values)):
+        return []
     plane, cells = _plane(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
         return []
@@ -56,7 +58,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     panel = partial(
         Panel,
         x=plane[1],
-        marks=[partial(draw_map, names[0], plane, _scale(values.values.astype(float)))],
+        marks=[partial(draw_map, names[0], plane, _scale(values))],
         y_label=label(quantity(plane[0], stated_by(dataset)), 200),
         title=None if others else pretty(dataset.attrs.get("title", "")),
     )
@@ -87,10 +89,12 @@ def draw_map(
     at = _edges(x, is_log_spaced(x)), _edges(y, is_log_spaced(y))
     axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if is_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    if found := scale or _scale(values.values):
+    if found := scale or _scale(dataset[name]):
         drawn = _colours(axes, at, values.values, norm=found[0])
         bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
         bar.set_label(label(quantity(name, stated_by(dataset)), 34))
+        if meanings := _meanings(dataset[name]):
+            bar.set_ticks([*meanings], labels=[*meanings.values()])
         contours(axes, values, found[1])
     status = dataset["status"].squeeze()
     if set(status.dims) == set(plane):
@@ -98,10 +102,19 @@ def draw_map(
         _statuses(axes, at, status.transpose(*plane).values, unknown)
 
 
-def _scale(values: np.ndarray) -> tuple[Normalize, Sequence[float]] | None:
+def _meanings(values: xr.DataArray) -> dict[float, str]:
+    """What the flags mean that a variable holds, in words; empty for one of numbers."""
+    words = [word.replace("_", " ") for word in str(values.attrs.get("flag_meanings", "")).split()]
+    return dict(zip(np.ravel(values.attrs.get("flag_values", [])).tolist(), words, strict=True))
+
+
+def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """A scale of colours, and where contours are on it; none where nothing is known."""
+    values = data.values.astype(float)
     if not np.isfinite(values).any():
         return None
+    if meanings := _meanings(data):
+        return BoundaryNorm(_edges(np.array([*meanings])), 256), ()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if is_wide(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
