@@ -21,8 +21,8 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 Values = Mapping[str, float]
-#: Step over the size of a parameter; places and weights.
-Differences = tuple[float, tuple[tuple[int, float], ...]]
+#: Step over the size of a parameter, and order.
+Differences = tuple[float, int]
 
 #: What may be fitted.
 PARAMETERS = {
@@ -59,12 +59,15 @@ INSTEAD = {
 }
 #: Those whose logarithm is looked for.
 LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
-#: Central differences of fourth order: places and weights; and those of second order. Friction is
-#: smooth to 1e-11 in the accuracy of a fit: at these steps both lose less than 1e-6.
-FINE: Differences = (0.01, ((1, 2.0 / 3.0), (2, -1.0 / 12.0)))
-QUICK: Differences = (1e-3, ((1, 0.5),))
-#: Differences of fourth order to one side.
-_AHEAD = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
+#: Step over the size of a parameter, and order of central differences. Friction repeats to 1e-11
+#: and better: those of second order then lose 1e-5 where motions are far from unstable, those of fourth
+#: order less than 1e-6 everywhere.
+QUICK, FINE = (3e-4, 2), (5e-3, 4)
+#: Differences over a step and over two must be alike to this part of the largest, else the step
+#: shrinks, so often at most: the square of it is what fourth order loses.
+_ALIKE, _SHRUNK = 2e-4, 4
+#: Beyond these a parameter has no meaning: derivatives there are those at a step from them.
+_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
 #: time in which the load point moves by a micrometre.
 _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
@@ -194,12 +197,30 @@ class Model:
             return np.asarray(self.displacement ** int(name[5:]))
         if self.is_linear(name):
             return np.ones(len(self.time))
-        part, weights = differences
-        step = part * self._size(name, values)
-        found = np.zeros(len(self.time))
-        for place, weight in _inside(name, values[name], step, weights):
-            found += weight / step * self.curve(shifted(values, name, place * step))
-        return found
+        (part, order), size = differences, self._size(name, values)
+        if order == 2:
+            return self._central(values, name, part * size, refined=False)
+        best, least = np.full(len(self.time), math.nan), math.inf
+        for _ in range(_SHRUNK):
+            near, far = (self._central(values, name, n * part * size) for n in (1.0, 2.0))
+            largest = float(np.abs(near).max()) or 1.0
+            apart = float(np.abs(far - near).max()) / largest
+            if apart >= least:  # the last digits of friction are told
+                break
+            if math.isfinite(apart):
+                best, least = (4.0 * near - far) / 3.0, apart
+            if least < _ALIKE:
+                break
+            part *= max(0.8 * math.sqrt(_ALIKE / least), 0.03) if least < math.inf else 0.1
+        return best
+
+    def _central(
+        self, values: Values, name: str, step: float, *, refined: bool = True
+    ) -> np.ndarray:
+        low, high = _DOMAINS.get(name, (-math.inf, math.inf))
+        middle = {**values, name: min(max(values[name], low + step), high - step)}
+        up, down = (self.curve(shifted(middle, name, by), refined=refined) for by in (step, -step))
+        return np.asarray((up - down) / (2.0 * step))
 
     def _size(self, name: str, values: Values) -> float:
         if name in LOGARITHMIC:
@@ -209,19 +230,6 @@ class Model:
         if name.startswith("b"):
             return max(values["a"], abs(values[name]))
         return _SIZES.get(name, 1.0 / self.reference)
-
-
-def _inside(
-    name: str, value: float, step: float, weights: Sequence[tuple[int, float]]
-) -> Sequence[tuple[int, float]]:
-    """Places and weights of differences, of which none leaves the range of an exponent."""
-    if name == "law_exponent":
-        reach = max(place for place, _weight in weights) * step
-        if value < reach:
-            return _AHEAD
-        if value > 1.0 - reach:
-            return [(-place, -weight) for place, weight in _AHEAD]
-    return [(s * place, s * weight) for place, weight in weights for s in (1, -1)]
 
 
 def shifted(values: Values, name: str, by: float) -> dict[str, float]:

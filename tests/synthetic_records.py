@@ -1,0 +1,106 @@
+"""Records made by other code than the package's: the equations of one state and their derivatives,
+integrated by SciPy.
+
+With psi = ln(theta V_0/D_c), w = ln(V/V_0) = (mu - mu_* - b psi)/a and u = psi + w,
+
+    mu' = k (V_l - V),    psi' = (V/D_c) h(u),    S' = (df/dy) S + df/dp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+#: A velocity step up from 1 to 10 um/s after 40 um: parameters in um and s.
+TRUTH = {"a": 0.010, "b": 0.013, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 3e-3}
+STEP = ((0.0, 1.0), (40.0, 10.0))
+#: A step down, and a hold between sliding.
+DOWN = ((0.0, 10.0), (4.0, 1.0))
+HOLD = ((0.0, 1.0), (40.0, 0.0), (140.0, 1.0))
+#: Parameters of which augmented equations tell derivatives; of the last two, by their logarithms.
+SENSITIVE = ("a", "b", "stiffness", "slip_distance")
+
+Law = Callable[[float], tuple[float, float]]
+#: h(u) and dh/du, by names of the package.
+LAWS: dict[str, Law] = {
+    "slip": lambda u: (-u, -1.0),
+    "slowness": lambda u: (math.expm1(-u), -math.exp(-u)),
+    "perrin_rice_zheng": lambda u: (-math.sinh(u), -math.cosh(u)),
+    "family": lambda u: (math.expm1(-0.5 * u) / 0.5, -math.exp(-0.5 * u)),
+}
+
+
+def rows(loading: Sequence[tuple[float, float]], ends: float, count: int) -> np.ndarray:
+    """Times at which a load point has moved evenly; half of them in its holds, if any."""
+    times = np.linspace(loading[0][0], ends, 20 * count + 1)
+    moved = load_point(loading, times)
+    share = moved / moved[-1]
+    if any(speed == 0.0 for _begins, speed in loading):
+        share = 0.5 * (share + times / times[-1])
+    return np.interp(np.linspace(0.0, 1.0, count), share, times)
+
+
+def end(loading: Sequence[tuple[float, float]]) -> float:
+    """Time at which the load point has moved by 100 um in the last piece of loading."""
+    begins, speed = loading[-1]
+    return begins + 100.0 / speed
+
+
+def load_point(loading: Sequence[tuple[float, float]], times: np.ndarray) -> np.ndarray:
+    """Its displacement at times: pieces of loading are (begins in s, velocity in um/s)."""
+    begins, speeds = np.array(loading).T
+    knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
+    piece = np.searchsorted(begins, times, side="right") - 1
+    return np.asarray(knots[piece] + speeds[piece] * (times - begins[piece]))
+
+
+def motion(
+    law: str,
+    times: np.ndarray,
+    loading: Sequence[tuple[float, float]] = STEP,
+    truth: Mapping[str, float] = TRUTH,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Friction at times, and its derivatives by `SENSITIVE`, shape (times, parameters)."""
+    h, first = LAWS[law], loading[0][1]
+    a, b, distance = truth["a"], truth["b"], truth["slip_distance"]
+    k, mu_star = truth["stiffness"], truth["mu_star"]
+
+    def rates(_t: float, y: np.ndarray, load: float) -> np.ndarray:
+        mu, psi, s_mu, s_psi = y[0], y[1], y[2:6], y[6:10]
+        w = (mu - mu_star - b * psi) / a
+        speed, (change, slope) = first * math.exp(w), h(psi + w)
+        of_a, of_b, of_k, of_distance = np.eye(4)
+        dw = (s_mu - b * s_psi - of_a * w - of_b * psi) / a
+        d_mu = -k * speed * dw + of_k * k * (load - speed)
+        d_psi = change * dw + slope * (s_psi + dw) - of_distance * change
+        scale = speed / distance
+        return np.concatenate([[k * (load - speed), scale * change], d_mu, scale * d_psi])
+
+    state, found = np.array([mu_star, *np.zeros(9)]), np.empty((len(times), 10))
+    ends = [*(begins for begins, _speed in loading[1:]), math.inf]
+    for (begins, load), end in zip(loading, ends, strict=True):
+        here = (times >= begins) & (times < end)
+        last = end if end < math.inf else times[-1]
+        solved = solve_ivp(
+            rates,
+            (begins, last),
+            state,
+            "DOP853",
+            np.unique([*times[here], last]),
+            args=(load,),
+            rtol=1e-12,
+            atol=1e-14,
+        )
+        found[here], state = solved.y.T[: int(here.sum())], solved.y[:, -1]
+    return found[:, 0], found[:, 2:6]
+
+
+def correlated(count: int, rho: float, size: float, seed: int) -> np.ndarray:
+    """Noise of first order, or white noise."""
+    drawn = np.random.default_rng(seed).standard_normal(count)
+    for row in range(1, count):
+        drawn[row] = rho * drawn[row - 1] + math.sqrt(1.0 - rho * rho) * drawn[row]
+    return size * drawn

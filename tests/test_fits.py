@@ -1,0 +1,78 @@
+"""Fits of records: derivatives, estimates, errors and what is said where there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+from synthetic_records import DOWN, HOLD, LAWS, SENSITIVE, STEP, TRUTH
+
+from rsfstudy import Scene
+from rsfstudy.analysis.fitting.model import FINE, QUICK, Model
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+
+ENOUGH = 10**9
+
+
+def scene_of(law: str, **fields: Any) -> Scene:
+    """A scene of a law, with numbers that a fit replaces."""
+    fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6, **fields}
+    return Scene(law=law, a=0.01, b_over_a=1.3, **fields)
+
+
+def model_of(
+    law: str, loading: Sequence[tuple[float, float]], times: np.ndarray, friction: np.ndarray
+) -> Model:
+    """A model of a record."""
+    pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
+    accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
+    moved = synthetic.load_point(loading, times)
+    return Model(scene_of(law), times, moved, friction, pieces, accuracy, Meter(ENOUGH))
+
+
+@pytest.mark.parametrize(
+    ("law", "loading", "changes"),
+    [
+        *((law, STEP, {}) for law in LAWS),
+        ("slip", STEP, {"stiffness": 1e-3}),  # a threefold critical stiffness: nearly unstable
+        ("perrin_rice_zheng", STEP, {"stiffness": 1e-3}),
+        ("slowness", DOWN, {"stiffness": 0.05}),  # stiff: steps are those that stability allows
+        ("slowness", DOWN, {"b": -0.004}),
+        ("slip", HOLD, {}),
+        ("slowness", HOLD, {"stiffness": 1e-3}),
+    ],
+)
+def test_derivatives_are_those_of_the_augmented_equations(
+    law: str, loading: Sequence[tuple[float, float]], changes: Mapping[str, float]
+) -> None:
+    truth = {**TRUTH, **changes}
+    times = synthetic.rows(loading, synthetic.end(loading), 200)
+    friction, exact = synthetic.motion(law, times, loading, truth)
+    model = model_of(law, loading, times, friction)
+    # friction to ten times the accuracy asked for, which local errors of order eight stay below
+    assert np.abs(model.curve(truth) - friction).max() < 1e-8 * truth["a"]
+    largest = np.abs(exact).max(axis=0)
+    fine = np.abs(model.jacobian(truth, SENSITIVE, FINE) - exact).max(axis=0) / largest
+    assert (fine < 1e-6).all(), fine
+    quick = np.abs(model.jacobian(truth, SENSITIVE, QUICK) - exact).max(axis=0) / largest
+    assert (quick < 2e-3).all(), quick  # enough to go downhill by
+
+
+def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
+    times = synthetic.rows(STEP, 50.0, 202)[1:]
+    friction, _exact = synthetic.motion("slip", times)
+    model = model_of("slip", STEP, times, friction)
+    found = model.jacobian(TRUTH | {"step_time": 0.0}, ("mu_star", "trend2", "step_time"))
+    assert (found[:, 0] == 1.0).all()
+    np.testing.assert_allclose(found[:, 1], synthetic.load_point(STEP, times) ** 2, rtol=1e-15)
+    # a motion that comes late is the motion of some time before
+    late = 1e-3
+    ahead, behind = (synthetic.motion("slip", times + s * late)[0] for s in (1.0, -1.0))
+    exact = -(ahead - behind) / (2.0 * late)
+    away = np.abs(times - 40.0) > 0.03  # friction has a kink at the step
+    off = np.abs(found[:, 2] - exact)[away].max() / np.abs(exact).max()
+    assert off < 2e-5  # second order in `late` over D_c/V = 1 s of the peak: some 1e-6 times ten
