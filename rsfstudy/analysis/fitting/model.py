@@ -59,9 +59,9 @@ INSTEAD = {
 }
 #: Those whose logarithm is looked for.
 LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
-#: Step over the size of a parameter, and order of central differences. Friction repeats to 1e-11
-#: and better: those of second order then lose 1e-5 where motions are far from unstable, those of fourth
-#: order less than 1e-6 everywhere.
+#: Step over the size of a parameter, and order of central differences. Friction repeats to 1e-11:
+#: those of second order then lose 1e-5 where motions are far from unstable, those of fourth order
+#: less than 1e-6 everywhere.
 QUICK, FINE = (3e-4, 2), (5e-3, 4)
 #: Differences over a step and over two must be alike to this part of the largest, else the step
 #: shrinks, so often at most: the square of it is what fourth order loses.

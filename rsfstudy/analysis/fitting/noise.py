@@ -28,8 +28,8 @@ HIGHEST, _SAMPLES = 12, 10
 #: Largest partial correlation, and slope of what REML minimises at which the search ends.
 _LARGEST, _ENOUGH = 0.999, 0.02
 #: Sampling intervals that differ by less than this factor are one; fewer samples than so many at
-#: another do not tell a process of their own.
-_ALIKE, _RARE = 2.0, 300
+#: another, or in runs shorter than so many, do not tell a process of their own: clocks are uneven.
+_ALIKE, _RARE, _SHORT = 2.0, 300, 30
 
 
 def check_noise(name: str) -> None:
@@ -146,6 +146,8 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
         return products.misfit(noise(x))
 
     x = np.append(np.arctanh(begin.ravel() / _LARGEST), np.log(sizes[1:] / sizes[0]))
+    if not math.isfinite(misfit(x)):  # nothing is left
+        return noise(x)
     found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
 
@@ -174,9 +176,10 @@ class _Products:
     ) -> None:
         self.runs, self.order = runs, order
         self.rows, self.parameters = len(columns), columns.shape[1] - 1
-        self.sizes = np.linalg.norm(columns, axis=0)
-        self.sizes[self.sizes == 0.0] = 1.0
-        columns = columns / self.sizes
+        # derivatives may be next to dependent: those of the same span are as good, up to a constant
+        base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]
+        left = left - base @ (base.T @ left)
+        columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
         self.sums = np.zeros((count, order + 1, order + 1, width, width))
         self.early = [columns[first : min(first + order, last)] for first, last, _n in runs]
@@ -270,10 +273,11 @@ def _kinds(time: np.ndarray) -> np.ndarray:
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     kinds = np.rint(np.log(gaps / np.median(gaps)) / math.log(_ALIKE))
-    _names, kinds, counts = np.unique(
-        np.append(kinds[:1], kinds), return_inverse=True, return_counts=True
-    )
-    rows = np.flatnonzero(counts[kinds] >= _RARE)
+    kinds = np.append(kinds[:1], kinds)
+    lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
+    steady = np.repeat(lasts, lasts) >= _SHORT
+    names, counts = np.unique(kinds[steady], return_counts=True)
+    rows = np.flatnonzero(steady & np.isin(kinds, names[counts >= _RARE]))
     if not len(rows):
         return np.zeros(len(time), dtype=int)
     nearest = np.minimum(np.searchsorted(rows, np.arange(len(time))), len(rows) - 1)
