@@ -18,7 +18,7 @@ _FEWEST, _DIFFERS, _MOVES = 5, 0.2, 10.0
 _WORTH = 12.0
 #: Part of the faster velocity below which the load point is held.
 _HELD = 0.01
-#: Part of both neighbours that a piece between two velocities lasts at most, where it is a ramp.
+#: Part of the piece before and of the rest behind that pieces of a ramp last at most.
 _SHORT = 0.05
 #: Standard deviation over the median of absolute deviations of Gaussian noise.
 _NORMAL = 1.4826
@@ -67,11 +67,12 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
     knots = _merged(sums, sorted(_parted(sums, 0, len(t), variance)), t, variance)
     lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
-        _meeting(lines[n], lines[n + 1], t[k - 1] - t0, t[k] - t0)
+        _meeting(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
         for n, k in enumerate(knots[1:-1])
     ]
     if every > 1:
-        meets = [_refined(time - t0, displacement - x0, at, 2 * every) for at in meets]
+        moved, variance = displacement - x0, _noise(time, displacement)
+        meets = [_refined(time - t0, moved, at, 2 * every, variance) for at in meets]
     times = [t0 + at for at in meets]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [line[1] if abs(line[1]) > _HELD * fastest else 0.0 for line in lines]
@@ -133,8 +134,8 @@ def _merged(sums: _Sums, knots: list[int], t: np.ndarray, variance: float) -> li
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
         speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
-        left = sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1]
-        left = math.sqrt(max(left, variance))
+        squares = sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1]
+        left = math.sqrt(max(squares, variance))
         change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*knots[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
         differs = change / (_DIFFERS * np.maximum(faster, _HELD * np.abs(speeds).max()))
@@ -147,16 +148,20 @@ def _merged(sums: _Sums, knots: list[int], t: np.ndarray, variance: float) -> li
     return knots
 
 
-def _meeting(one: _Line, other: _Line, last: float, first: float) -> float:
-    """Time at which two lines meet; between the last sample of one and the first of the other, as
-    far as that is near.
+def _meeting(one: _Line, other: _Line, between: tuple[float, float], variance: float) -> float:
+    """Time at which two lines meet, near the times of the last sample of one and the first of the
+    other: where samples part best is told by noise to (variance gap/change**2)**(1/3).
     """
-    middle, reach = 0.5 * (last + first), 3.0 * (first - last)
-    meet = (one[0] - other[0]) / (other[1] - one[1])
+    (last, first), change = between, other[1] - one[1]
+    middle, gap = 0.5 * (last + first), first - last
+    reach = max(3.0 * gap, 5.0 * math.cbrt(variance * gap / change**2))
+    meet = (one[0] - other[0]) / change
     return float(min(max(meet, middle - reach), middle + reach))
 
 
-def _refined(time: np.ndarray, displacement: np.ndarray, at: float, reach: int) -> float:
+def _refined(
+    time: np.ndarray, displacement: np.ndarray, at: float, reach: int, variance: float
+) -> float:
     """The meeting of two lines found anew among all rows near it."""
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
@@ -164,20 +169,21 @@ def _refined(time: np.ndarray, displacement: np.ndarray, at: float, reach: int) 
     sums, places = _Sums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
     both = sums.left(0, places) + sums.left(places, j - i)
     best = int(places[np.argmin(both)])
-    return at + _meeting(sums.line(0, best), sums.line(best, j - i), t[best - 1], t[best])
+    lines = sums.line(0, best), sums.line(best, j - i)
+    return at + _meeting(*lines, (t[best - 1], t[best]), variance)
 
 
 def _steps(times: list[float], speeds: list[float], ends: tuple[float, float]) -> list[Step]:
-    """Steps at the times between pieces; a short piece between two others is a ramp."""
-    bounds, found, n = [ends[0], *times, ends[1]], [], 0
+    """Steps at the times between pieces; short pieces on the way from one to another are a ramp."""
+    changes, found, n = np.sign(np.diff(speeds)), [], 0
     while n < len(times):
-        lasts = bounds[n + 2] - bounds[n + 1]
-        around = min(bounds[n + 1] - bounds[n], bounds[-1] - bounds[n + 2])
-        inner = (
-            n + 2 < len(speeds)
-            and (speeds[n + 1] - speeds[n]) * (speeds[n + 2] - speeds[n + 1]) > 0.0
-        )
-        ramp = inner and lasts < _SHORT * around
-        found.append(Step(times[n], times[n + ramp], speeds[n], speeds[n + 1 + ramp]))
-        n += 1 + ramp
+        last, before = n, times[n] - (times[n - 1] if n else ends[0])
+        while (
+            last + 1 < len(times)
+            and changes[last + 1] == changes[n]
+            and times[last + 1] - times[n] < _SHORT * min(before, ends[1] - times[last + 1])
+        ):
+            last += 1
+        found.append(Step(times[n], times[last], speeds[n], speeds[last + 1]))
+        n = last + 1
     return found

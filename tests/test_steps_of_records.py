@@ -1,0 +1,82 @@
+"""Steps of load point velocity as records show them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+
+from rsfstudy.analysis.fitting.steps import Step, steps_of
+
+UP = ((0.0, 1.0), (60.0, 10.0))
+MANY = ((0.0, 1.0), (60.0, 10.0), (70.0, 1.0), (130.0, 0.0), (200.0, 1.0), (260.0, 3.0))
+
+
+def noisy(
+    loading: Sequence[tuple[float, float]], ends: float, apart: float, rho: float, size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """A record of a load point, with noise in um."""
+    time = np.arange(0.0, ends, apart) + 0.3 * apart
+    moved = synthetic.load_point(loading, time)
+    return time, moved + synthetic.correlated(len(time), rho, size, seed=7)
+
+
+@pytest.mark.parametrize("loading", [UP, MANY, ((0.0, 10.0), (20.0, 1.0)), ((0, 3.0), (40, 0.0))])
+@pytest.mark.parametrize(("rho", "size"), [(0.0, 0.0), (0.0, 0.02), (0.9, 0.05)])
+def test_steps_are_found(loading: Sequence[tuple[float, float]], rho: float, size: float) -> None:
+    ends = loading[-1][0] + 60.0
+    found = steps_of(*noisy(loading, ends, 0.05, rho, size))
+    assert len(found) == len(loading) - 1
+    for step, (one, other) in zip(found, itertools.pairwise(loading), strict=True):
+        # lines through hundreds of rows meet within two or so, at this much noise
+        assert step.begins == pytest.approx(other[0], abs=1e-6 if not size else 0.15)
+        assert step.ends == step.begins
+        assert step.before == pytest.approx(one[1], rel=0.03)
+        assert step.after == pytest.approx(other[1], rel=0.03)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9, 0.99])
+def test_none_is_invented(rho: float) -> None:
+    for seed in range(34):
+        time = 0.1 * np.arange(2_000.0)
+        moved = 3.0 * time + synthetic.correlated(2_000, rho, 0.3, seed)
+        assert steps_of(time, moved) == ()
+
+
+def test_a_ramp_over_samples_is_a_ramp() -> None:
+    time = 0.01 * np.arange(12_000.0)
+    speed = np.interp(time, [60.0, 60.3], [1.0, 10.0])
+    moved = np.concatenate([[0.0], np.cumsum(0.01 * speed[:-1])])
+    (step,) = steps_of(time, moved + synthetic.correlated(len(time), 0.0, 1e-3, 1))
+    assert (step.before, step.after) == pytest.approx((1.0, 10.0), rel=0.01)
+    assert 59.9 < step.begins < step.ends < 60.4
+
+
+def test_sparse_and_dense_parts_of_a_record() -> None:
+    time = np.concatenate([np.arange(0.0, 59.0, 0.1), np.arange(59.0, 75.0, 0.01)])
+    moved = synthetic.load_point(UP, time) + synthetic.correlated(len(time), 0.5, 0.01, 2)
+    (step,) = steps_of(time, moved)
+    assert step.begins == pytest.approx(60.0, abs=0.02)
+    assert (step.before, step.after) == pytest.approx((1.0, 10.0), rel=0.01)
+
+
+def test_a_million_rows() -> None:
+    time = 0.001 * np.arange(1_000_000.0)
+    loading = ((0.0, 1.0), (400.0, 10.0), (500.0, 0.0), (700.0, 1.0))
+    moved = synthetic.load_point(loading, time)
+    moved += np.random.default_rng(8).normal(size=len(time)) * 0.02
+    found = steps_of(time, moved)
+    assert [step.begins for step in found] == pytest.approx([400.0, 500.0, 700.0], abs=0.01)
+    assert [step.after for step in found] == pytest.approx([10.0, 0.0, 1.0], rel=1e-3)
+
+
+@pytest.mark.parametrize("moved", [np.zeros(100), np.arange(100.0), -np.arange(100.0)])
+def test_a_load_point_that_rests_or_keeps_moving(moved: np.ndarray) -> None:
+    assert steps_of(np.arange(100.0), moved) == ()
+
+
+def test_a_step_has_fields() -> None:
+    assert Step._fields == ("begins", "ends", "before", "after")
