@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 from collections.abc import Mapping
@@ -16,6 +17,8 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.units import number
 
 _HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
+#: What numbers without surprises are made of.
+_PLAIN = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE = "velocity (um/s), distance (um)"
 
 
@@ -77,32 +80,55 @@ def read_table(
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             between = _delimiter(file.readline())
             file.seek(0)
-            read = csv.reader(file, delimiter=between, skipinitialspace=between == " ")
-            rows = [(n, row) for n, row in enumerate(read, start=1) if any(row)]
+            text = file.read()
+        read = csv.reader(io.StringIO(text), delimiter=between, skipinitialspace=between == " ")
+        line, header = next(((n, row) for n, row in enumerate(read, start=1) if any(row)), (1, []))
+        headings = [name.strip() for name in header]
+        values, lines = _fast(text, between, line, len(header))
+        if values is None:
+            rows = [(n, row) for n, row in enumerate(read, start=line + 1) if any(row)]
     except (OSError, UnicodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV ({error})") from error
-    if not rows:
+    if not header:
         remedy = f"Its first line reads, for instance, {_EXAMPLE}."
         raise InvalidValue("table", str(path), "has no header", remedy=remedy)
-    (line, header), *body = rows
-    for n, row in body:
-        if len(row) != len(header):
-            rule = f"has {len(row)} fields, and the header {len(header)}"
-            raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
-    headings = [text.strip() for text in header]
+    if values is None:
+        for n, row in rows:
+            if len(row) != len(header):
+                rule = f"has {len(row)} fields, and the header {len(header)}"
+                raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
+        lines = np.array([n for n, _row in rows], dtype=int)
     wanted = _as_headed(headings, f"{path}, line {line}") if columns is None else columns
-    lines = np.array([n for n, _row in body], dtype=int)
     found = {}
     for name, (heading, units) in wanted.items():
         if headings.count(heading) != 1:
             rule = f"heads {headings.count(heading)} columns, and must head one"
             raise InvalidValue("column", heading, rule, choices=headings).at(f"{path}, line {line}")
         place = headings.index(heading)
-        column = Column(np.empty(len(body)), units, place + 1, lines, str(path))
-        for n, (_line, row) in enumerate(body):
-            column.values[n] = _number(name, row[place], column, n)
+        column = Column(np.empty(len(lines)), units, place + 1, lines, str(path))
+        if values is None:
+            for n, (_line, row) in enumerate(rows):
+                column.values[n] = _number(name, row[place], column, n)
+        else:
+            column.values[:] = values[:, place]
         found[name] = column
     return found
+
+
+def _fast(text: str, between: str, line: int, width: int) -> tuple[np.ndarray | None, np.ndarray]:
+    """Numbers of a plain table behind the line of its header, and their lines; None where a field
+    is no finite number, or where they stand is to be looked for line by line.
+    """
+    body = "".join(text.split("\n", line)[line:])
+    lines = line + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
+    if between == " " or not body.strip() or not set(body) <= _PLAIN | {between}:
+        return None, lines
+    try:
+        found = np.loadtxt(io.StringIO(body), delimiter=between, comments=None, ndmin=2)
+    except ValueError:
+        return None, lines
+    plain = found.shape == (len(lines), width) and bool(np.isfinite(found).all())
+    return (found if plain else None), lines
 
 
 def _delimiter(header: str) -> str:
