@@ -264,6 +264,10 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
     return like.with_(**fields)
 
 
+# Numba looks for a package of this name, and finds this file where Python runs in this directory
+if __name__ == "coverage":
+    raise ImportError("this is a study, and not the package coverage")
+
 DYNAMICS: dict[str, dict[str, bool | float]] = {
     "quasi-static": {"inertia": False},
     # how much is drawn with the scene

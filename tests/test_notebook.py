@@ -1,4 +1,4 @@
-"""The analysis notebook runs as it stands, on files alone."""
+"""The notebooks run as they stand: that of analysis on files alone, that of fits on its record."""
 
 import re
 import shutil
@@ -9,7 +9,8 @@ import pytest
 from nbclient import NotebookClient
 from running import HANGS, named_results
 
-NOTEBOOK = Path(__file__).parent.parent / "studies" / "analysis.ipynb"
+HERE = Path(__file__).parent.parent / "studies"
+NOTEBOOK, FITTING = HERE / "analysis.ipynb", HERE / "fitting.ipynb"
 STUDIES = (
     "linear_stability",
     "rigid_response",
@@ -20,6 +21,25 @@ STUDIES = (
     "limit_cycles",
     "stress_drop",
 )
+
+
+#: What the text of the notebook says of its numbers.
+CONCLUDED = """
+assert errors["ratio"].loc[["a", "b", "slip_distance", "mu_star", "trend1"]].between(2.0, 2.5).all()
+ratios = [float(fixed[f"{n}_stderr"][0] / fixed_white[f"{n}_stderr"][0]) for n in FREE[:5]]
+assert 4.0 < min(ratios) and max(ratios) < 6.0
+assert float(fixed.a[0]) < 2 / 3 * float(honest.a)
+assert float(fixed.criterion[0] - honest.criterion) > 100
+assert abs(float(fit.criterion[0] - fit.criterion[1])) < 10
+slip, slowness = fit.slip_distance.values
+assert 1.25 < slip / slowness < 1.45
+assert slip - slowness > float(fit.slip_distance_stderr.sum())
+assert (-2.0 < fit.a_minus_b / fit.a_minus_b_stderr).all() and (fit.a_minus_b < 0).all()
+assert float(naive.a_minus_b) < -3.0 * usual
+assert 2.0 * float(sampled.std()) < alone
+assert abs(float(other.slip_distance[0]) - slip) < float(other.slip_distance_stderr[0])
+assert (fit.status == 0).all()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +72,24 @@ def test_no_cell_complains(executed):
             assert output.get("name") != "stderr", output["text"]
 
 
+def test_fits_tell_what_their_notebook_says():
+    """In the directory of studies, where a user opens it."""
+    notebook = nbformat.read(FITTING, as_version=4)
+    assert notebook.cells[-1].source.startswith("mine = ")
+    notebook.cells.append(nbformat.v4.new_code_cell(CONCLUDED))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MPLBACKEND", raising=False)
+        client = NotebookClient(notebook, timeout=HANGS, resources={"metadata": {"path": HERE}})
+        cells = client.execute().cells
+    outputs = [output for cell in cells for output in cell.get("outputs", [])]
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
+    assert not any(output.get("name") == "stderr" for output in outputs)
+
+
+def test_the_record_has_its_licence_beside_it():
+    assert (HERE / "records" / "LICENSE").read_text().startswith("MIT License")
+
+
 def test_results_need_nothing_of_ours_to_be_read():
     """What is imported of rsfstudy makes motions to be fitted, behind all that reads files."""
     cells = [c.source for c in nbformat.read(NOTEBOOK, as_version=4).cells if c.cell_type == "code"]
@@ -60,6 +98,7 @@ def test_results_need_nothing_of_ours_to_be_read():
     assert not any("results(" in text for text in cells[imports[0] :])
 
 
-def test_it_is_kept_without_its_output():
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+@pytest.mark.parametrize("path", [NOTEBOOK, FITTING], ids=lambda path: path.stem)
+def test_it_is_kept_without_its_output(path):
+    notebook = nbformat.read(path, as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
