@@ -100,6 +100,7 @@ ENOUGH = {
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
     "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
+    "injection": {"record": ["1000", "2000"]},
     "instability_norm": {
         "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
         "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
@@ -140,6 +141,7 @@ LEFT_TO_COMPILED = (
     "dilatant_cycles",
     "dilatant_steps",
     "displacement_boundary",
+    "injection",
     "normal_stress_steps",
     "rate_step_lattice",
     "resonance",

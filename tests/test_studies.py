@@ -56,6 +56,7 @@ WIDE = {
     "dilatancy D1": "eight decimals are given",
     "dilatancy D3": "truncation of differences, which is not the same at every place",
     "displacement_boundary C10": "the paper says 'a few percents'",
+    "injection I1": "one bound for all: how far pressure goes in 2 D_c/V_*",
     "laws L1": "truncation of differences; laws that are nearly straight have less of it",
     "laws_cycles L10": "the paper says a whole multiple",
     "linear_stability C1": "truncation of differences, which is not the same at every place",
