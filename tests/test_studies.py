@@ -20,6 +20,7 @@ from running import enough, named_results
 import rsfstudy
 from rsfstudy import plots, vocabulary
 from rsfstudy.declare import catalogue, names
+from rsfstudy.files import restore
 from rsfstudy.status import Status
 
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
@@ -40,6 +41,12 @@ def test_every_cell_is_answered(result):
     dataset, _path = result
     assert (dataset.status < int(Status.WORK_BUDGET_SPENT)).all()
     assert dataset.attrs["completeness"] == "complete"
+
+
+def test_its_file_tells_the_study(result):
+    """Loadings of its own included."""
+    dataset, _path = result
+    assert restore.study_of(dataset).dimensions == dataset.status.dims
 
 
 def test_every_verdict_is_the_expected_one(result):

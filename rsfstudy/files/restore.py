@@ -43,9 +43,11 @@ _NAME_IT = "Name the file that declares it: --study FILE (study=)."
 
 def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
     """The study that made a dataset, from the declaration in it; where it uses code of the user,
-    from the file that declares the study.
+    from the file that declares the study. Parts of a named study's own are those of rsfstudy.
     """
     declared = contents.declaration(results)
+    if file is None and declared.name in names() and contents.own_part(declared):
+        file = declared.name
     for axis in declared.axes:
         points = results.sizes.get(axis["dimension"])
         declared_points = len(contents.rows_of(axis))
