@@ -32,6 +32,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.referee.problem import shipped
 
 JUNK = [
     None, True, -1, 0, 3, 1.5, float("nan"), float("inf"), 10**400, 1j, "", "other", "\0", "\udcff",
@@ -258,6 +259,8 @@ def commands(place: Path) -> dict[str, list[str]]:
         "rerun": [file, "--serial", "--quiet", "--cell", "law=slip", "--cell", "b_over_a=2"],
         "export": [file, "--csv", "--output", f"{file}.csv"],
         "simulate": ["--duration", "0.1", "--engine", "compiled", "--rtol", "0.01"],
+        "problems": ["referee"],
+        "verify": [str(shipped()[19].with_suffix(".csv"))],
     }
 
 

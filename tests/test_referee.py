@@ -198,7 +198,7 @@ def test_where_they_part_is_told(tmp_path):
     rate[25:] *= 1.001
     ran = call("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
     said = " ".join(ran.stdout.split())
-    pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 "
+    pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 s"
     assert re.search(pattern, said)
     assert "no usual difference of conventions explains it" in said
     assert "0 problems of 24" in said
@@ -224,6 +224,7 @@ def test_other_units_and_other_quantities_are_converted(tmp_path):
     ("spoil", "error"),
     [
         (lambda h, c: (["time (s)", "mu (1)", *h[2:]], c), "column = 'friction': is missing"),
+        (lambda h, c: ([h[0], "shear_stress (MPa)", "v (m/s)", h[3]], c), "column = 'slip_rate'"),
         (lambda h, c: ([h[0], h[1], "slip_rate (MPa)", *h[3:]], c), "slip_rate"),
         (lambda h, c: ([h[0], h[1], "slip_rate (1)", *h[3:]], c), "has no units"),
         (lambda h, c: (["time", *h[1:]], c), "names no column with its units"),

@@ -12,7 +12,7 @@ from rsfstudy.cli import terminal
 from rsfstudy.cli.console import console
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.referee import theirs, writing
-from rsfstudy.referee.problem import read, shipped
+from rsfstudy.referee.problem import Problem, read, shipped
 from rsfstudy.referee.verdict import Verdict, known, verdict
 
 
@@ -62,10 +62,11 @@ def _verdict(
 
 
 def _tell(file: Path, one: Verdict) -> None:
+    """Print how far each quantity agrees, and what would explain it."""
     problem = one.problem
-    name = f"problem {problem.number}" if problem.number else "own problem"
+    name = f"problem {problem.number}" if problem.number else f"known to {problem.digits} digits"
     outcome = "passed" if one.passes else "not passed"
-    console.print(f"{file}: {name}, {problem.title}: {outcome}", style="bold")
+    console.print(f"{file}: {problem.title} ({name}): {outcome}", style="bold")
     for agreement in one.agreements:
         text = f"  {agreement.quantity:20s} {agreement.digits:4.1f} digits"
         if agreement.to_the_last_place:
@@ -73,26 +74,28 @@ def _tell(file: Path, one: Verdict) -> None:
         elif agreement.digits == problem.digits:
             text += ", all that are known"
         elif problem.key:
-            at = problem.rows[agreement.row]
-            text += f", fewest at {problem.key} = {at:g} {problem.units[problem.key]}".removesuffix(
-                " 1"
-            )
+            text += f", fewest at {_place(problem, agreement.row)}"
         if agreement.parts is not None and problem.key:
-            text += f"; they part at {problem.key} = {problem.rows[agreement.parts]:g}"
+            text += f"; they part at {_place(problem, agreement.parts)}"
         console.print(text)
     if not one.passes:
         console.print(f"  {one.explanation or 'no usual difference of conventions explains it'}")
 
 
+def _place(problem: Problem, row: int) -> str:
+    units = {"time": " s"}.get(problem.key, "")
+    return f"{problem.key} = {problem.rows[row]:g}{units}"
+
+
 def _to_quote(found: list[Verdict]) -> str:
     """One line to quote."""
-    passed = [math.floor(one.digits) for one in found if one.passes]
+    passed = {one.problem.title: math.floor(one.digits) for one in found if one.passes}
     own = all(one.problem.number == 0 for one in found)
     of = "one's own" if own else f"{len(shipped())}"
     text = f"{len(passed)} problem{'s' * (len(passed) != 1)} of {of}"
     if not passed:
         return text
-    low, high = min(passed), max(passed)
+    low, high = min(passed.values()), max(passed.values())
     return f"{text}, {low} to {high} digits" if low < high else f"{text}, {low} digits"
 
 

@@ -61,17 +61,18 @@ def read(
     asked = {*problem.columns, *_UNITS}
     found = {key: _plain(key, column, problem) for key, column in table.items() if key in asked}
     for name, (other, _units) in _INSTEAD.items():
-        if name not in found and other in found:
+        # what waves carry away takes a slip rate
+        waits = name == "friction" and problem.damping and "slip_rate" not in found
+        if name not in found and other in found and not waits:
             found[name] = Told(_instead(name, problem, found), 0.0)
-    for name in problem.columns:
+    for name in reversed(problem.columns):
         if name not in found:
             remedy = f"Head it {name} ({problem.units[name]}), or say --columns '{name}=...'."
-            rule = "is missing"
-            raise InvalidValue("column", name, rule, choices=table, remedy=remedy).at(str(path))
-    rows = problem.rows
-    if len(found[problem.columns[0]].values) != len(rows):
-        count = len(found[problem.columns[0]].values)
-        rule = f"is not what problem {problem.number} asks for, which is {len(rows)}"
+            wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
+            raise wrong.at(str(path))
+    rows, count = problem.rows, len(found[problem.columns[0]].values)
+    if count != len(rows):
+        rule = f"must be {len(rows)}: nothing is interpolated"
         raise InvalidValue("number of rows", count, rule).at(str(path))
     if problem.key:
         _check_rows(table[problem.key], found[problem.key].values, rows, problem)
