@@ -334,6 +334,15 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ('"friction"', '"colour"', "is unknown"),
         ('"slowness"', '"sloth"', "is unknown"),
         ("[initial]", "[begin]", "is unknown"),
+        ('"4 s"', '"0 s"', "must be positive"),
+        ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
+        ("[1, 2, 5,", '["one", 2, 5,', "cannot be posed"),
+        ("[[loading]]", "[loading]", "must be a list of segments"),
+        ("a = 0.01", "a = true", "a = True"),
+        ("a = 0.01", "a = -1", "must be greater than 0"),
+        ('"slowness"', '"two_slip_states"', "must state b_2"),
+        ("mu_star", "colour = 1\nmu_star", "is not a field of a scene"),
+        ("mu_star", "phi = 60.0\nmu_star", "has no meaning beside phi"),
     ],
 )
 def test_what_is_no_problem_is_refused(old, new, error, tmp_path):

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.special import lambertw
 
-from rsfstudy.doors import check_file
+from rsfstudy.doors import check_file, in_words
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.events import Event, Kind
+from rsfstudy.motion.meter import Halt
 from rsfstudy.motion.regimes import at_rate, on_slow_manifold
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import in_si
@@ -109,8 +110,11 @@ class Problem:
         for name in self.quantities:
             if name not in self.units:
                 raise InvalidValue("quantities", name, "is unknown", choices=self.units)
-        if self.report == "series" and not self.times:
+        times = np.array(self.times, dtype=float)
+        if self.report == "series" and not (len(times) and np.isfinite(times).all()):
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
+        if (np.diff(times, prepend=-1e-300) <= 0.0).any():
+            raise InvalidValue("times", self.times, "must increase, from 0 or later")
         if self.report == "peaks" and self.count < 1:
             raise InvalidValue("count", self.count, "must be 1 or more: how many peaks to tell")
         if self.law not in _LAWS:
@@ -211,7 +215,7 @@ class Problem:
     @cached_property
     def log_rate(self) -> float:
         """ln(V/V_star) at the beginning."""
-        rate = in_si("slip_rate", self.initial["slip_rate"], "m/s")
+        rate = _positive("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
 
     @property
@@ -242,7 +246,14 @@ class Problem:
             rule = f"must state {len(self.b)}, one for each b"
             raise InvalidValue("theta", stated, rule)
         known = zip(self.b, thetas, self.theta_star, strict=True)
-        return tuple(b * math.log(in_si("theta", x, "s") / star) for b, x, star in known)
+        return tuple(b * math.log(_positive("theta", x, "s") / star) for b, x, star in known)
+
+
+def _positive(name: str, value: Any, units: str) -> float:
+    found = in_si(name, value, units)
+    if not found > 0.0:
+        raise InvalidValue(name, value, "must be positive")
+    return found
 
 
 def read(path: Path) -> Problem:
@@ -274,6 +285,10 @@ def read(path: Path) -> Problem:
         return problem
     except InvalidValue as error:
         raise error.at(str(path)) from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, Halt) as error:
+        rule = f"cannot be posed ({in_words(error)})"
+        remedy = "rsfstudy problems DIR writes files of problems to begin with."
+        raise InvalidValue("problem", str(path), rule, remedy=remedy) from error
 
 
 def shipped() -> dict[int, Path]:
