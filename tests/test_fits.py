@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -76,3 +77,25 @@ def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
     away = np.abs(times - 40.0) > 0.03  # friction has a kink at the step
     off = np.abs(found[:, 2] - exact)[away].max() / np.abs(exact).max()
     assert off < 2e-5  # second order in `late` over D_c/V = 1 s of the peak: some 1e-6 times ten
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.012, 1.0])
+def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
+    """By a difference of sixth order of motions by SciPy, that goes beyond the ends."""
+    times = synthetic.rows(STEP, 46.0, 60)
+    truth = TRUTH | {"law_exponent": exponent}
+    model = model_of("family", STEP, times, times)
+
+    def friction(at: float) -> np.ndarray:
+        synthetic.LAWS["any"] = lambda u: (
+            (math.expm1(-at * u) / at, -math.exp(-at * u)) if at else (-u, -1.0)
+        )
+        return synthetic.motion("any", times)[0]
+
+    moved = {n: friction(exponent + 0.02 * n) for n in (-3, -2, -1, 1, 2, 3)}
+    del synthetic.LAWS["any"]
+    weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
+    exact = sum(w / 0.02 * (moved[n] - moved[-n]) for n, w in weights.items())
+    found = model.jacobian(truth, ("law_exponent",), FINE)[:, 0]
+    # to one side the third order of the step, .005, is what is left
+    assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()

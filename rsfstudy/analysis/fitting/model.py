@@ -66,7 +66,7 @@ QUICK, FINE = (3e-4, 2), (5e-3, 4)
 #: Differences over a step and over two must be alike to this part of the largest, else the step
 #: shrinks, so often at most: the square of it is what fourth order loses.
 _ALIKE, _SHRUNK = 2e-4, 4
-#: Beyond these a parameter has no meaning: derivatives there are those at a step from them.
+#: Beyond these a parameter has no meaning: differences next to them are to one side.
 _DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
 #: time in which the load point moves by a micrometre.
@@ -199,10 +199,12 @@ class Model:
             return np.ones(len(self.time))
         (part, order), size = differences, self._size(name, values)
         if order == 2:
-            return self._central(values, name, part * size, refined=False)
+            return self._difference(values, name, part * size, 2.0, refined=False)
         best, least = np.full(len(self.time), math.nan), math.inf
         for _ in range(_SHRUNK):
-            near, far = (self._central(values, name, n * part * size) for n in (1.0, 2.0))
+            near, far = (
+                self._difference(values, name, n * part * size, 4.0 / n) for n in (1.0, 2.0)
+            )
             largest = float(np.abs(near).max()) or 1.0
             apart = float(np.abs(far - near).max()) / largest
             if apart >= least:  # the last digits of friction are told
@@ -214,13 +216,22 @@ class Model:
             part *= max(0.8 * math.sqrt(_ALIKE / least), 0.03) if least < math.inf else 0.1
         return best
 
-    def _central(
-        self, values: Values, name: str, step: float, *, refined: bool = True
+    def _difference(
+        self, values: Values, name: str, step: float, reach: float, *, refined: bool = True
     ) -> np.ndarray:
+        """Derivative by a difference of second order; to one side where a parameter is within so
+        many steps of the end of its domain.
+        """
         low, high = _DOMAINS.get(name, (-math.inf, math.inf))
-        middle = {**values, name: min(max(values[name], low + step), high - step)}
-        up, down = (self.curve(shifted(middle, name, by), refined=refined) for by in (step, -step))
-        return np.asarray((up - down) / (2.0 * step))
+        weights = {1.0: 0.5, -1.0: -0.5}
+        if not low + reach * step <= values[name] <= high - reach * step:
+            side = 1.0 if values[name] < low + reach * step else -1.0
+            weights = {0.0: -1.5 * side, side: 2.0 * side, 2.0 * side: -0.5 * side}
+        found = np.zeros(len(self.time))
+        for place, weight in weights.items():
+            moved = shifted(values, name, place * step)
+            found += weight / step * self.curve(moved, refined=refined)
+        return found
 
     def _size(self, name: str, values: Values) -> float:
         if name in LOGARITHMIC:
