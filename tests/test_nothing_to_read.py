@@ -3,13 +3,17 @@
 import importlib
 import math
 import pkgutil
+from typing import Any
 
 import numpy as np
 import pytest
 from test_readings import PLAIN, read, recorded
 
 from rsfstudy import Scene, measures, named_studies, protocol, simulate, vocabulary
+from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
+from rsfstudy.measures.elasticities import Elasticities
+from rsfstudy.measures.fit import Fit
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.velocity_step import VelocityStep
@@ -142,6 +146,13 @@ def test_one_step_of_the_integrator_may_hold_a_peak_and_what_is_on_either_side(e
         assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"] + exact[f"{name}_error"]
 
 
+NOTHING = Record({name: np.arange(3.0) for name in ("time", "displacement", "friction")})
+#: What measures need to be asked with.
+ASKED: dict[type, list[Any]] = {Fit: [(NOTHING,)], Elasticities: [VelocityStep()]}
+#: What fits look for bears the names that it has in scenes and rigs.
+SHARED = {"a", "mu_star", "slip_distance"}
+
+
 def every_measure() -> list[Measure]:
     """Those of rsfstudy, as they are without an argument."""
     for package in (measures, named_studies):
@@ -152,7 +163,8 @@ def every_measure() -> list[Measure]:
         return [kind, *(one for derived in kind.__subclasses__() for one in below(derived))]
 
     ours = (kind for kind in below(Measure) if kind.__module__.startswith("rsfstudy."))
-    return [kind() for kind in ours if isinstance(getattr(kind, "name", None), str)]
+    named = [kind for kind in ours if isinstance(getattr(kind, "name", None), str)]
+    return [kind(*ASKED.get(kind, ())) for kind in named]
 
 
 @pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
@@ -162,7 +174,7 @@ def test_each_number_is_described_once(measure):
     """
     own = {about.name: about for about in measure.quantities}
     assert len(own) == len(measure.quantities)
-    assert not own.keys() & vocabulary.QUANTITIES.keys()
+    assert own.keys() & vocabulary.QUANTITIES.keys() <= SHARED
     for name in (*measure.variables, *measure.inner_coordinates):
         nothing_said = Quantity(name, "", "1", name.replace("_", " "))
         assert vocabulary.quantity(name, own) != nothing_said

@@ -228,9 +228,19 @@ class Fit(Measure):
         return {"parameter": names, "other_parameter": names, "row": rows}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The parameter itself, or many of its standard errors."""
+        """The parameter itself, many of its standard errors, or a size that matters where it is 0:
+        records may be without noise.
+        """
+        extent = abs(values["window_ends"] - values["window_begins"])
+        sizes = dict.fromkeys(("b", "b1", "b2"), values.get("a", scene.a))
+        sizes |= {"alpha": 1.0, "law_exponent": 1.0}
+        sizes |= {"step_time": extent / values["velocity_before"]}
+        sizes |= {f"trend{n}": scene.mu_star / extent**n for n in range(1, 6)}
         return {
-            name: abs(values[name]) + _SMALL * values[f"{name}_stderr"] for name in self.parameters
+            name: abs(values[name])
+            + _SMALL * values[f"{name}_stderr"]
+            + sizes.get(plain(name), 0.0)
+            for name in self.parameters
         }
 
     def describe(self) -> dict[str, Any]:

@@ -129,7 +129,8 @@ class SyntheticFit(Measure):
         """By parameter, how far off it is and how far it may be; and what laws are compared by."""
         by = [Output(n, "", "1", text, dims=("parameter",)) for n, text in _OF_PARAMETER]
         text = "Akaike's criterion, in which the noise counts"
-        return (*by, Output("criterion", "", "1", text), Output("noise_order"))
+        order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
+        return (*by, Output("criterion", "", "1", text), order)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:

@@ -1,0 +1,305 @@
+"""Do fits give back the parameters of records without noise? Every law of one state, and more."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+from scipy.integrate import solve_ivp
+from scipy.special import lambertw
+
+from rsfstudy.analysis.fitting.joint import Joint
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values
+from rsfstudy.analysis.fitting.search import Search
+from rsfstudy.declare.axis import Axis
+from rsfstudy.declare.claims import Claim
+from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.study import Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+from rsfstudy.quantity import Output, Quantity
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Slip distance in um, rows of a record, and the accuracy of its motion.
+DISTANCE, ROWS, SMOOTH = 10.0, 300, 1e-9
+#: How long all slides steadily before the record begins, in s: loading may come as late.
+EARLIER = 5.0
+#: Loading by name: times in s, load point velocities in um/s, normal stress over the first and its
+#: rate in 1/s; and when the record ends.
+LOADINGS = {
+    "step up": (((0.0, 1.0, 1.0, 0.0), (40.0, 10.0, 1.0, 0.0)), 55.0),
+    "step down": (((0.0, 10.0, 1.0, 0.0), (4.0, 1.0, 1.0, 0.0)), 154.0),
+    "normal stress step": (
+        (
+            (0.0, 1.0, 1.0, 0.0),
+            (40.0, 1.0, 1.0, 0.2),
+            (40.5, 1.0, 1.1, 0.0),
+            (120.0, 10.0, 1.1, 0.0),
+        ),
+        135.0,
+    ),
+}
+#: Searches begin so far from the truth: over it, and beside it.
+OFF = {"a": 1.2, "b": 0.8, "slip_distance": 1.5, "stiffness": 1.3}
+BESIDE = {"alpha": 0.1, "law_exponent": 0.2}
+#: Where records are from, and by how much parameters may be off: what rounding and the end of the
+#: search leave; and some hundred times 1e-10, the errors of both motions over the 5e-3 by which a
+#: slip distance moves friction.
+LEAVES = {"the model": 1e-8, "other code": 1e-6}
+
+
+@dataclass(frozen=True)
+class Recovered(Measure):
+    """Deviations of the parameters of a fit from those of the record, which has no noise.
+
+    Parameters
+    ----------
+    loading_of_record : str
+        One of `LOADINGS`.
+    looked_for : str
+        Parameters that are free, parted by blanks.
+    record_by : {"the model", "other code"}
+        What makes the record: the model that is fitted, or equations in friction and ln(theta) by
+        an integrator of SciPy.
+    """
+
+    loading_of_record: str = "step up"
+    looked_for: str = "a b slip_distance mu_star trend1"
+    record_by: str = "the model"
+    name: ClassVar[str] = "recovered"
+    headline = "largest_deviation"
+    typical_work = 200_000
+    dimensions = (
+        Quantity("parameter", "", "", "parameter that is fitted"),
+        Quantity("loading_of_record", "", "", "what the load point does"),
+        Quantity("looked_for", "", "", "parameters that are fitted"),
+        Quantity("record_by", "", "", "what makes the record"),
+    )
+    outputs = (
+        Output("largest_deviation", "", "1", "largest deviation of a parameter, over its size"),
+        Output(
+            "deviation", "", "1", "parameter less the true one, over its size", dims=("parameter",)
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        if self.loading_of_record not in LOADINGS:
+            name, value = "loading_of_record", self.loading_of_record
+            raise InvalidValue(name, value, "is unknown", choices=LOADINGS)
+        if self.record_by not in LEAVES:
+            raise InvalidValue("record_by", self.record_by, "is unknown", choices=LEAVES)
+        for name in self.looked_for.split():
+            if name not in PARAMETERS:
+                raise InvalidValue("looked_for", name, "is no parameter", choices=PARAMETERS)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """All parameters."""
+        return {"parameter": np.array([*PARAMETERS], dtype=object)}
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Make a record, and fit it."""
+        free, true = self.looked_for.split(), _true(scene)
+        true |= {name: 0.0 for name in free if name not in true}
+        smooth = replace(accuracy, rtol=min(accuracy.rtol, SMOOTH))
+        model = self._model(scene, smooth, meter)
+        made = model.curve(true) if self.record_by == "the model" else _by_scipy(model, true)
+        model = replace(model, friction=made)
+        first = {
+            n: v * OFF.get(n, 1.0) + BESIDE.get(n, 0.0) if n in free else v for n, v in true.items()
+        }
+        found = Search(Joint((model,)), first, free, "white").run()
+        off = {name: _deviation(name, found.values, true) for name in free}
+        every = np.array([off.get(name, math.nan) for name in PARAMETERS])
+        values: dict[str, Value] = {
+            "largest_deviation": max(map(abs, off.values())),
+            "deviation": every,
+        }
+        return Outcome(Status.OK, values)
+
+    def _model(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Model:
+        """The model of the record, rows evenly spaced in displacement."""
+        pieces, ends = LOADINGS[self.loading_of_record]
+        loading = np.array(pieces)
+        begins, knots = loading[:, 0], [*loading[:, 0], ends]
+        moved = np.concatenate([[0.0], np.cumsum(np.diff(knots) * loading[:, 1])])
+        at = np.linspace(0.0, moved[-1], ROWS)
+        time = np.interp(at, moved, knots)
+        step = moved[np.argmax(begins > 0.0)]
+        loading[0, 0] -= EARLIER
+        return Model(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
+
+
+def _true(scene: Scene) -> dict[str, float]:
+    """The parameters of a scene, in um."""
+    stated = scene.as_dict()
+    true = {
+        "a": scene.a,
+        "b": scene.b,
+        "slip_distance": DISTANCE,
+        "mu_star": scene.mu_star,
+        "stiffness": scene.stiffness / DISTANCE,
+    }
+    return true | {n: stated[n] for n in BESIDE if stated.get(n) is not None}
+
+
+def _by_scipy(model: Model, true: Values) -> np.ndarray:
+    """Friction by other code: with w = ln(V/V_0), sigma over its first value, and Psi = ln(theta)
+    + (alpha/b) ln(sigma), each over its first value,
+
+        (sigma mu)' = k (V_l - V),    Psi' = (V/D_c) h(ln(theta) + w).
+    """
+    a, b, k, distance = (true[n] for n in ("a", "b", "stiffness", "slip_distance"))
+    law, first, alpha = model.scene.law, model.reference, true.get("alpha", 0.0)
+    cutoff = float(model.scene.as_dict().get("cutoff_velocity_ratio") or 1.0)
+    ahead = float(lambertw(math.exp(-1.0 / cutoff)).real)
+
+    def change(u: float, speed: float) -> float:
+        power = true.get("law_exponent", 1.0)
+        return {
+            "slip": -u,
+            "perrin_rice_zheng": -math.sinh(u),
+            "composite": math.exp(-speed / cutoff - u - ahead) - u - ahead,
+        }.get(law, math.expm1(-power * u) / power)
+
+    def state(psi: float) -> float:
+        if law == "cut_off":
+            return b * (math.log1p(cutoff * math.exp(psi)) - math.log1p(cutoff))
+        return b * psi
+
+    def rates(t: float, y: np.ndarray, piece: np.ndarray) -> list[float]:
+        stress = piece[2] + piece[3] * (t - piece[0])
+        psi = y[1] - alpha / b * math.log(stress)
+        w = (y[0] / stress - true["mu_star"] - state(psi)) / a
+        speed = math.exp(w)
+        return [k * (piece[1] - first * speed), first * speed / distance * change(psi + w, speed)]
+
+    time, y = model.time - true.get("step_time", 0.0), np.array([true["mu_star"], 0.0])
+    found, ends = np.empty(len(time)), [*model.loading[1:, 0], time[-1]]
+    for piece, end in zip(model.loading, ends, strict=True):
+        rows = (time >= piece[0]) & (time <= end)
+        at = np.unique([*time[rows], end])
+        solved = solve_ivp(
+            rates, (piece[0], end), y, "DOP853", at, args=(piece,), rtol=1e-11, atol=1e-13
+        )
+        stress, y = piece[2] + piece[3] * (time[rows] - piece[0]), solved.y[:, -1]
+        found[rows] = solved.y[0, : rows.sum()] / stress
+    return found
+
+
+def _deviation(name: str, found: Values, true: Values) -> float:
+    """Deviation of a parameter or its logarithm; of a or b over the larger, of a trend by what it
+    makes of the window, of others themselves.
+    """
+    if name in LOGARITHMIC:
+        return math.log(found[name] / true[name])
+    size = max(true["a"], abs(true["b"])) if name in ("a", "b") else 1.0
+    extent = 15.0 * DISTANCE if name == "trend1" else 1.0
+    return (found[name] - true[name]) * extent / size
+
+
+CASES = {
+    "slip": {"law": "slip"},
+    "slowness": {"law": "slowness"},
+    "Perrin-Rice-Zheng": {"law": "perrin_rice_zheng"},
+    "composite": {"law": "composite"},
+    "cut-off": {"law": "cut_off"},
+    "family": {"law": "family", "law_exponent": 0.3},
+    "exponent free": {
+        "law": "family",
+        "law_exponent": 0.3,
+        "looked_for": "a b slip_distance mu_star law_exponent",
+    },
+    "stiffness free": {"law": "slip", "looked_for": "a b slip_distance mu_star stiffness"},
+    "time of step free": {"law": "slip", "looked_for": "a b slip_distance mu_star step_time"},
+    "step down": {"law": "slowness", "loading_of_record": "step down"},
+    "b < 0": {"law": "slowness", "b_over_a": -0.4},
+    "b < 0, slip": {"law": "slip", "b_over_a": -0.4},
+    "alpha": {
+        "law": "slip",
+        "normal_stress": "imposed",
+        "alpha": 0.3,
+        "loading_of_record": "normal stress step",
+        "looked_for": "a b slip_distance mu_star alpha",
+    },
+    "alpha, slowness": {
+        "law": "slowness",
+        "normal_stress": "imposed",
+        "alpha": 0.3,
+        "loading_of_record": "normal stress step",
+        "looked_for": "a b slip_distance mu_star alpha",
+    },
+}
+
+
+def mark_deviations(dataset: xr.Dataset, axes: Axes) -> None:
+    """Largest deviation of each case, by what made the record."""
+    from rsfstudy.plots import look, marker
+
+    places = np.arange(dataset.sizes["case"])
+    for number, source in enumerate(dataset["record_by"].values):
+        off = np.maximum(dataset["largest_deviation"].sel(record_by=source), 1e-16)
+        style = {"marker": marker(number), "color": look(number)["color"], "linestyle": ""}
+        axes.plot(off, places, label=str(source), **style)
+        axes.axvline(LEAVES[str(source)], color=style["color"], linestyle="--", linewidth=0.8)
+    axes.set_yticks(places, [str(name) for name in dataset["case"].values])
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+
+
+figure = Figure(
+    [
+        Panel(
+            marks=[mark_deviations],
+            x_label="Largest deviation of a parameter",
+        )
+    ]
+)
+
+
+def comes_back(case: str, source: str) -> Claim:
+    """F4: the parameters of the record are those of the fit."""
+    reasons = {
+        "the model": "what the end of the search leaves, and rounding",
+        "other code": "a hundred times the errors of both motions, 1e-11, over the 5e-3 by which a "
+        "slip distance moves friction: parameters trade off",
+    }
+    return Claim(
+        id="F4",
+        statement=f"{case}: the parameters of a record by {source} come back",
+        source="identity of model and record",
+        variable="largest_deviation",
+        where={"case": case, "record_by": source},
+        relation="below",
+        published=LEAVES[source],
+        tolerance=0.0,
+        reason=reasons[source],
+    )
+
+
+study = Study(
+    name="fit_recovery",
+    title="Deviations of fitted parameters from those of records without noise",
+    summary=(
+        "Records without noise, of every law of one state, with a rate-strengthening b, with "
+        "stiffness, alpha, the exponent of the law or the time of the step free: searches that "
+        "begin a fifth to a half off end at the parameters of the record, which the model that "
+        "is fitted has made, or other equations by an integrator of SciPy. "
+        "Dashed lines are what the claims allow."
+    ),
+    base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, mu_star=0.6, stiffness=0.03),
+    axes=[
+        Axis("case", CASES),
+        Axis("record_by", list(LEAVES)),
+    ],
+    measure=Recovered(),
+    claims=[comes_back(case, source) for case in CASES for source in LEAVES],
+    plot=figure,
+    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
+)
