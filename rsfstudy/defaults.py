@@ -14,3 +14,5 @@ FORMATS = ("netcdf", "zarr")
 FIGURES = ("png", "pdf", "svg")
 #: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
 TIME_LIMIT = 600.0
+#: Right-hand sides that a fit of a record may evaluate.
+FIT_BUDGET = 50_000_000

@@ -4,6 +4,9 @@ of records are named.
 
 import math
 import re
+import shlex
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from rsfstudy.api import fit_results
 from rsfstudy.cli.commands_fit import with_error
 from rsfstudy.errors import DataError, InvalidValue
 
+PAGES = Path(__file__).parent.parent / "studies" / "pages"
 #: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
 TRUE = {"a": 0.010, "b": 0.013, "slip_distance": 12.0, "mu_star": 0.6, "trend1": -5e-6}
 STIFFNESS = 2e-3
@@ -215,8 +219,10 @@ def test_a_number_has_the_digits_that_its_error_gives_it():
     assert told(1234.5, 120.0) == "1234 +- 120"
     assert told(-5.29e-6, 3.7e-7) == "(-5.29 +- 0.37)e-06"
     assert told(1e-9, 4e-7) == "(0.0 +- 4.0)e-07"
-    assert told(3.0, math.inf) == "3 +- inf"
+    assert told(3.0, math.inf) == "not told"
+    assert told(3.0, 0.0) == "3 +- 0"
     assert told(math.nan, math.nan) == "-"
+    assert told(1e-4, 1e7) == "not told"
 
 
 def test_the_figure_shows_each_record_and_says_what_panels_show(written):
@@ -239,6 +245,45 @@ def test_the_figure_shows_each_record_and_says_what_panels_show(written):
             for name in ("_left_title", "title")
         )
         assert letter.x1 <= title.x0 or not axes.get_title()
+
+
+#: A number and its error as they are printed, times a power of ten perhaps.
+NUMBER = re.compile(r"\(?(-?[\d.]+) \+- ([\d.]+)\)?(?:e[+-]\d+)?")
+
+
+def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
+    """Numbers to a tenth of their errors: another machine may round the last digit otherwise."""
+    text = (PAGES / "fits.md").read_text()
+    block = text.split("<!-- fit command -->")[1]
+    command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
+    shutil.copy(PAGES / "step.csv", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    ran = call(*shlex.split(command)[1:])
+    assert ran.returncode == 0, ran.stderr
+    ours, theirs = (
+        [line.rstrip() for line in text.strip("\n").splitlines()] for text in (ran.stdout, told)
+    )
+    assert len(ours) == len(theirs)
+    for one, other in zip(ours, theirs, strict=True):
+        assert re.sub(r"[\d.]+", "", one) == re.sub(r"[\d.]+", "", other)
+        for (value, error), (said, beside) in zip(
+            NUMBER.findall(one), NUMBER.findall(other), strict=True
+        ):
+            assert float(value) == pytest.approx(float(said), abs=0.1 * float(beside))
+            assert float(error) == pytest.approx(float(beside), rel=0.1)
+
+
+def test_the_page_says_how_good_its_fit_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(PAGES)
+    record = rsfstudy.read_record("step.csv", normal_stress="20 MPa")
+    found = rsfstudy.fit(record, stiffness="0.04 MPa/um", steps=[1], after="200 um")
+    right, wrong = found.sel(law="slowness"), found.sel(law="slip")
+    at_step = TRUE["mu_star"] + 100.0 * TRUE["trend1"]
+    for name, true in (TRUE | {"mu_star": at_step}).items():
+        assert abs(float(right[name]) - true) < 2.0 * float(right[f"{name}_stderr"]), name
+    off = float(wrong.slip_distance) - TRUE["slip_distance"]
+    assert 7.0 < off / float(wrong.slip_distance_stderr) < 9.0
+    assert float(wrong.criterion - right.criterion) == pytest.approx(48.6, abs=0.5)
 
 
 def test_what_is_no_fit_says_so():

@@ -63,6 +63,8 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
         _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
         (tmp_path / "outputs").mkdir()
         shutil.copy(file, tmp_path / "outputs")
+    if '"step.csv"' in code:
+        shutil.copy(FILES[0].parent / "studies" / "pages" / "step.csv", tmp_path)
     monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
     names = {"__name__": "block"}
     exec(compile(code, f"block {number}", "exec"), names)

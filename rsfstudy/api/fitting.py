@@ -13,6 +13,7 @@ from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import runs
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.study import Study
+from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
@@ -24,15 +25,13 @@ from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene
 
-#: Right-hand sides a fit may evaluate.
-BUDGET = 50_000_000
 #: What is looked for unless something else is asked for.
 FREE = ("a", "b", "slip_distance", "mu_star", "trend1")
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
-#: First guesses of a scene: those of a record take their place.
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
+#: First guesses of a scene: those of a record take their place.
 _SCENE = {"a": 0.01, "b_over_a": 1.2, "mu_star": 0.6, "normal_stress": "constant"}
 _TWO = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.motion.engines import ENGINES
 
 
@@ -84,6 +85,14 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
     multiple=True,
     metavar="FIELD=VALUE",
     help="A field of the scene that is not looked for, as in a=0.01.",
+)
+@click.option(
+    "--budget",
+    type=click.IntRange(1),
+    metavar="N",
+    default=BUDGET,
+    show_default=True,
+    help="Right-hand sides that a fit may evaluate.",
 )
 @click.option(
     "--engine",

@@ -30,6 +30,8 @@ from rsfstudy.status import Status
 _BESIDE, _MOST_STEPS = 3, 24
 #: How fits end that have numbers.
 _ANSWERS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
+#: Error over the number beyond which neither is printed.
+_BOUNDLESS = 1e4
 #: Chance below which residuals are called correlated.
 _CHANCE = 0.01
 
@@ -174,6 +176,8 @@ def with_error(one: xr.Dataset, name: str) -> str:
     value, error = one[name].item(), one[f"{name}_stderr"].item()
     if not math.isfinite(value):
         return "-"
+    if error > _BOUNDLESS * abs(value) > 0.0:
+        return "not told"
     if not (math.isfinite(error) and error > 0.0):
         return f"{value:.6g} +- {error:g}"
     digits = 1 - math.floor(math.log10(error))
