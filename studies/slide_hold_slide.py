@@ -1,8 +1,6 @@
 """Slide-hold-slide: healing and relaxation against hold time and stiffness."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import xarray as xr
@@ -12,7 +10,7 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.healing import Healing
-from rsfstudy.reduce import LinearFit
+from rsfstudy.reduce import DecadeFit
 from rsfstudy.slider.scene import Scene
 
 SLIP, SLOWNESS, STRENGTHENING = "slip law", "slowness law", "slowness law, b < a"
@@ -29,24 +27,6 @@ LONG, LONGEST = (1e4, 1e8), 1e8
 base = Scene(normal_stress="constant", b_over_a=2.0, stiffness=0.0145)
 a, b = base.a, base.b
 FORMS = "stationary contact in closed form: slowness law, quasi-static"
-
-
-@dataclass(frozen=True)
-class DecadeFit(LinearFit):
-    """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
-    `on` is 0 or less are left out.
-    """
-
-    kind: ClassVar[str] = "decade_fit"
-
-    def law(self) -> str:
-        """The law in words."""
-        return f"{self.of} = constant + {self.name} * log10({self.on})"
-
-    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
-        """The decimal logarithm."""
-        logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
-        return logarithms
 
 
 def relaxes(ratio: float) -> Claim:

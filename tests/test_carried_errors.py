@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from rsfstudy.named_studies.rigid_response import Spread
-from rsfstudy.named_studies.slide_hold_slide import DecadeFit
 from running import command, ended, named_results
 
 from rsfstudy.files import store
 from rsfstudy.files.comparison import side_by_side
 from rsfstudy.reduce import (
     Boundary,
+    DecadeFit,
     Difference,
     Inverse,
     LinearFit,

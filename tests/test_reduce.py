@@ -7,7 +7,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import Parting
 from rsfstudy.named_studies.rigid_response import Spread
-from rsfstudy.named_studies.slide_hold_slide import DecadeFit
 from rsfstudy.named_studies.stability_map import CyclingEdge
 from scipy.stats import linregress
 
@@ -15,6 +14,7 @@ from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce import (
     Boundary,
+    DecadeFit,
     Difference,
     Inverse,
     LinearFit,

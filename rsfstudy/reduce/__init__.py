@@ -16,7 +16,7 @@ from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_fa
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference
-from rsfstudy.reduce.fits import LinearFit, ProportionalFit
+from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.reduce.sobol_indices import SobolIndices
 from rsfstudy.status import Status
@@ -24,6 +24,7 @@ from rsfstudy.vocabulary import coverage, quantity
 
 __all__ = [
     "Boundary",
+    "DecadeFit",
     "Difference",
     "Inverse",
     "LinearFit",

@@ -150,3 +150,21 @@ class LinearFit(_Fit):
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Less their mean, which takes care of the constant."""
         return values - values.mean(dimension)
+
+
+@dataclass(frozen=True)
+class DecadeFit(LinearFit):
+    """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
+    `on` is 0 or less are left out.
+    """
+
+    kind: ClassVar[str] = "decade_fit"
+
+    def law(self) -> str:
+        """The law in words."""
+        return f"{self.of} = constant + {self.name} * log10({self.on})"
+
+    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
+        """The decimal logarithm."""
+        logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
+        return logarithms
