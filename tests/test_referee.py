@@ -296,7 +296,7 @@ TWO_STATES = (
 
 
 #: With mass; and where stress takes from each of two states its share.
-MASS = STICK_SLIP.replace('radiation_damping = "4.41e6 Pa s/m"', 'period = "100 s"')
+MASS = STICK_SLIP.replace('radiation_damping = "4.41e6 Pa s/m"', 'period = "600 s"')
 _UNDAMPED = TWO_STATES.replace('radiation_damping = "4.41e6 Pa s/m"\n', "")
 NAGATA = _UNDAMPED.replace("mu_star", "stress_dependence = 0.5\nmu_star")
 STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress = "5.2 MPa"'
