@@ -244,6 +244,14 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
         theirs.read(file, of(1))
 
 
+def test_files_and_problems_that_are_not_there_are_said_so():
+    """With the status of each: a file that cannot be read, and words that name no problem."""
+    ran = call("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
+    assert (ran.returncode, "cannot be read" in ran.stderr) == (1, True)
+    ran = call("verify", "nowhere.csv")
+    assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
+
+
 # ---- problems of one's own -----------------------------------------------------------------------
 
 #: Scenes of two other codes, which state all of this in SI.

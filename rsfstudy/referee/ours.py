@@ -142,5 +142,5 @@ def off(name: str, theirs: np.ndarray, ours: np.ndarray, digits: int) -> np.ndar
     """
     size = np.abs(ours)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
-    scale = np.full(len(ours), size.max()) if name in FROM_ZERO else size
+    scale = np.full(len(ours), size.max() or 1.0) if name in FROM_ZERO else size
     return np.asarray(np.maximum(np.abs(theirs - ours) - rounded, 0.0) / scale)
