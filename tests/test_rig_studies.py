@@ -225,6 +225,30 @@ def test_overrides_in_units():
     assert (base.normal_stress_ramp, base.ramp_duration) == pytest.approx((0.2, 2.0), rel=EXACT)
 
 
+def test_what_states_the_same_takes_the_place_of_an_axis():
+    """A velocity of a ratio, a stiffness of its ratio, and back; with a rig and without."""
+    ratios = study(Axis("load_velocity_ratio", [2.0, 3.0]))
+    for given, points in (("10 um/s", [10.0]), (["1 um/s", "5 um/s"], [1.0, 5.0])):
+        (axis,) = ratios.with_(load_velocity=given).axes
+        assert [row["load_velocity"] for row in axis.rows] == points
+        assert axis.units == {"load_velocity": "um/s"}
+    velocities = study(RIG.axis("load_velocity", ["1 um/s"]))
+    (axis,) = velocities.with_(load_velocity_ratio=3.0).axes
+    assert axis == Axis("load_velocity_ratio", [3.0])
+    plain = Study(
+        name="plain", title="Plain", base=Scene(), measure=LimitCycle(),
+        axes=[Axis("stiffness_ratio", [0.5, 0.6])],
+    )  # fmt: skip
+    changed = plain.with_(stiffness=[0.01, 0.02])
+    assert changed.axes == (Axis("stiffness", [0.01, 0.02]),)
+    assert changed.scene(1).stiffness == 0.02
+    zipped = replace(plain, axes=[Axis("case", {"soft": {"stiffness_ratio": 0.5}})])
+    with pytest.raises(InvalidValue, match="stiffness = .*states what stiffness_ratio does"):
+        zipped.with_(stiffness=0.02)
+    with pytest.raises(InvalidValue, match="varies 'load_velocity_ratio', as"):
+        study(RIG.axis("load_velocity", ["1 um/s"]), Axis("load_velocity_ratio", [2.0]))
+
+
 def test_what_does_not_go_with_the_rig_is_refused_before_any_work():
     hold = RIG.axis("hold_time", ["10 s"])
     parts = {"name": "x", "title": "t", "measure": LinearStability()}

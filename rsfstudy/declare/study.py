@@ -28,7 +28,7 @@ from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig import lattice
 from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.quantities import FULL
+from rsfstudy.rig.quantities import ALSO, FULL
 from rsfstudy.slider.registry import (
     CALLERS,
     FIELDS,
@@ -122,7 +122,7 @@ class Study:
                 raise InvalidValue(name, value, f"must be plain data ({error})") from error
         taken: dict[str, str] = {}
         for axis in self.axes:
-            for name in {axis.dimension, *axis.fields}:
+            for name in {FULL.get(n, n) for n in (axis.dimension, *axis.fields)}:
                 if name in taken:
                     raise InvalidValue(
                         "axis", axis.dimension, f"varies {name!r}, as {taken[name]!r} does already"
@@ -328,6 +328,10 @@ class Study:
 
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
+        for index, axis in enumerate(self.axes):
+            if ALSO.get(name) in axis.fields and name not in axis.fields:
+                changed = self._stated_as(name, values, axis)
+                return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
         if changed_by_rig := lattice.override(self, name, value):
             return replace(self, **changed_by_rig)
         for index, axis in enumerate(self.axes):
@@ -349,6 +353,13 @@ class Study:
             changes = by_class({name: value}, self.own_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{name: value}))
+
+    def _stated_as(self, name: str, values: Sequence[Any], axis: Axis) -> Axis:
+        """An axis of a field that states what another one does, in its place."""
+        if axis.labels is not None:
+            rule = f"states what {ALSO[name]} does along {axis.dimension}"
+            raise InvalidValue(name, values, rule, remedy=f"Give {ALSO[name]}.")
+        return lattice.axis(name, values) if self.laboratory else Axis(name, values)
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""

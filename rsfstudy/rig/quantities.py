@@ -10,6 +10,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import in_si
+from rsfstudy.slider.numbers import SPRING
 from rsfstudy.slider.registry import QUANTITIES
 
 #: What a laboratory may state: SI units, and the range that is usual; beyond it, it warns.
@@ -41,6 +42,12 @@ FULL = {
     name.removesuffix("_ratio"): name
     for name, about in FIELDS.items()
     if about.scale == "V_*" and name.endswith("_ratio")
+}
+#: What states the same as another field does: of slip rates and of the spring.
+ALSO = {
+    **FULL,
+    **{ratio: name for name, ratio in FULL.items()},
+    **dict(zip(SPRING, SPRING[::-1], strict=True)),
 }
 
 
