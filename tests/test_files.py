@@ -293,7 +293,7 @@ def test_a_file_says_from_which_checkout_it_comes():
 def test_every_declaration_restores_its_study(name):
     study = catalogue.load(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = restore.from_declaration(contents.declaration_of(described))
+    restored = restore.from_declaration(contents.declaration_of(described), study.own_parts)
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
     # of thousands of cells some, which have all points of every axis
@@ -307,7 +307,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     asked = (
         "import json, sys; from rsfstudy.files import contents, restore\n"
         "for plain in json.load(sys.stdin):\n"
-        "    study = restore.from_declaration(contents.declaration_of(plain))\n"
+        "    study = restore.from_declaration(contents.declaration_of(plain), {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
     )
     ran = subprocess.run(

@@ -199,7 +199,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = restore.from_declaration(contents.declaration(rsfstudy.open(file)))
+    restored = restore.from_declaration(contents.declaration(rsfstudy.open(file)), {})
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
         xr.Dataset(coords=coordinates(restored)), xr.Dataset(coords=coordinates(BOTH))
