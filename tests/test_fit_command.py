@@ -149,6 +149,11 @@ def test_numbers_of_its_file_say_what_they_are(written):
         assert values.attrs["long_name"], name
 
 
+def test_a_file_that_is_not_there_is_told():
+    ran = call("fit", "nowhere.csv", *FIT)
+    assert (ran.returncode, ran.stderr.strip()) == (1, "error: there is no file nowhere.csv")
+
+
 def test_files_of_others_are_not_replaced(written, tmp_path):
     here, _said = written
     (tmp_path / "fit.nc").write_text("mine")
@@ -200,6 +205,18 @@ def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
     ]
     found = [float(one.mu_star[0]) for one in fits]
     assert found == pytest.approx([found[0]] * 4, rel=1e-12)
+
+
+def test_plain_numbers_are_in_units_of_records(written, tmp_path):
+    here, _said = written
+    said = []
+    for number, (stiffness, after) in enumerate((("0.002", "150"), ("2e-6 1/nm", "0.15 mm"))):
+        words = ("--stiffness", stiffness, "--after", after, "--step", "1", "--noise", "white")
+        file = str(tmp_path / f"{number}.png")
+        ran = call("fit", str(here / "record.csv"), *FIT, *words, "--output", file)
+        assert ran.returncode == 0, ran.stderr
+        said.append(ran.stdout.partition("wrote")[0])
+    assert said[0] == said[1]
 
 
 def test_laws_are_named_as_a_list(written):

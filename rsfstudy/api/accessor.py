@@ -254,8 +254,24 @@ class Accessor:
 
     @door
     def draw(self, n: int, seed: int = 0) -> xr.Dataset:
-        """Samples of the parameters of one fit, along ``draw``, as its errors let them be; see
-        `rsfstudy.api.fit_results.draw`.
+        """Samples of the parameters of one fit, as its errors let them be.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+        seed : int
+
+        Returns
+        -------
+        xarray.Dataset
+            Each parameter along ``draw``, in its units, by Student's t. Slip distances and
+            stiffness stay positive: their logarithms are drawn.
+
+        Raises
+        ------
+        InvalidValue
+            Where several fits are selected, or the record does not tell a parameter at all.
         """
         from rsfstudy.api import fit_results
 

@@ -227,7 +227,7 @@ def _stiffness(rig: Laboratory | None, stated: Any, free: Sequence[str], record:
         return float(rig.stiffness / rig.normal_stress * 1e-6)
     if "stiffness" in free:
         return 1e-3
-    remedy = "Give stiffness, as in '1.6e-3 1/um', or a rig that states it, or name it in free."
+    remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', or look for it: --free (free=)."
     raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
 
 
@@ -240,7 +240,7 @@ def _over_normal_stress(stated: Any, record: Record) -> float:
     stress = record.columns.get("normal_stress")
     found = in_si("stiffness", stated, "Pa/m") * 1e-6
     if stress is None:
-        remedy = "State normal_stress to read_record, or give it over normal stress, in 1/um."
+        remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
         raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
     return found / float(stress.mean())
 

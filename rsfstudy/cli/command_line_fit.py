@@ -16,6 +16,13 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
+def _quantity(_context: click.Context, _option: click.Parameter, text: str | None) -> Any:
+    """A number in units of records, or a text with units."""
+    from rsfstudy.cli import assignments
+
+    return None if text is None else assignments.number_or_text(text)
+
+
 @click.command()
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
@@ -26,8 +33,12 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
     "and normal_stress are others.  [default: by headings that are known]",
 )
 @click.option("--normal-stress", help="As in '20 MPa', where the record does not hold it.")
-@click.option("--stiffness", help="Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
-@click.option("--slip-distance", help="First guess of D_c, as in '10 um'.")
+@click.option(
+    "--stiffness",
+    callback=_quantity,
+    help="Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.",
+)
+@click.option("--slip-distance", callback=_quantity, help="First guess of D_c, as in '10 um'.")
 @click.option(
     "--law",
     "laws",
@@ -51,12 +62,16 @@ def _listed(_context: click.Context, _option: click.Parameter, text: str | None)
 )
 @click.option(
     "--before",
+    callback=_quantity,
     default="0 um",
     help="Load point displacement that is fitted before a step.  [default: half the way back to "
     "the step before]",
 )
 @click.option(
-    "--after", default="0 um", help="That after it, as in '250 um'.  [default: up to the next step]"
+    "--after",
+    callback=_quantity,
+    default="0 um",
+    help="That after it, as in '250 um'.  [default: up to the next step]",
 )
 @click.option(
     "--windows",

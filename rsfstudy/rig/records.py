@@ -69,17 +69,26 @@ def read_record(
     Returns
     -------
     Record
+        ``columns`` (arrays in s, um, 1 and Pa), ``steps()`` of the load point, ``window(begins,
+        ends)``, ``with_steps(...)`` to state steps, and ``to_dataset()``.
 
     Raises
     ------
     DataError
         Where there is no such file.
     InvalidValue
-        For missing columns or units, a field that is no number, with its line and column, and for
-        what `Record` refuses.
+        For missing columns or units, a field that is no number, with its line and column, a clock
+        that stands still or runs back, and normal stress that is not positive.
+
+    Examples
+    --------
+    >>> record = rsfstudy.read_record("run.csv", normal_stress="20 MPa")
+    >>> record.steps().to_dataframe()
     """
     if isinstance(source, str | Path):
         check_file("record", source)
+        if not Path(source).exists():
+            raise DataError(f"there is no file {source}")
         binary = _is_binary(Path(source))
         found = _of_xlook(Path(source), columns) if binary else _of_text(Path(source), columns)
     elif isinstance(source, Mapping):
@@ -127,7 +136,7 @@ def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Rec
             raise InvalidValue("record", [*values], rule)
         stress = values.get("normal_stress")
         if stress is None:
-            remedy = "Give normal_stress, as in '20 MPa'."
+            remedy = "Give --normal-stress (normal_stress=), as in '20 MPa'."
             raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
         if not (stress > 0.0).all():
             row = int(np.argmax(~(stress > 0.0)))
@@ -173,8 +182,9 @@ def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str]:
     match = _HEADING.fullmatch(told)
     units = (match[2] or "").strip() if match else ""
     if not units and key != "friction":
-        remedy = f"Write them behind it, as in {told} ({_USUAL.get(key, 'MPa')})."
-        remedy += " Where the file does not, give columns."
+        whole = f"{told} ({_USUAL.get(key, 'MPa')})"
+        remedy = f"Write them in the file, as in {whole}, or here: --columns '{key}={whole},...' "
+        remedy += f"(columns={{'{key}': '{whole}', ...}})."
         raise InvalidValue("heading", told, "states no units", remedy=remedy)
     return told if told in headings or not match else match[1], units
 
