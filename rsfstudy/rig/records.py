@@ -219,7 +219,7 @@ def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Col
         begin += 4 * count
     if columns is None:
         names = ", ".join(f"{n}: {h} ({u})" for n, (h, u, _v) in enumerate(headings, start=1))
-        remedy = f"Name them by columns=. It holds {names}."
+        remedy = f"Name them by --columns (columns=). It holds {names}."
         raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
     known = [heading for heading, _units, _values in headings]
     for key, told in columns.items():

@@ -243,7 +243,8 @@ class Search:
         off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [_slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        band = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+        variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
+        band = np.sqrt(np.maximum(variances, 0.0))  # rounding, where a parameter is not told
         return Fitted(
             values=values,
             free=self.free,
