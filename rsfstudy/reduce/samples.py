@@ -105,7 +105,7 @@ class Mean(_Statistic):
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """1/n."""
-        has = dataset[self.of].notnull()
+        has = _of(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
 
 
@@ -125,7 +125,7 @@ class StandardDeviation(_Statistic):
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """(y - mean)/((n - 1) sd)."""
-        of = dataset[self.of]
+        of = _of(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
         by = (of - of.mean(self.over)) / (freedom * of.std(self.over, ddof=1))
         return [(by.fillna(0.0), {})]
@@ -171,7 +171,7 @@ class Quantile(_Statistic):
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """The weights of the two samples beside it."""
-        of = dataset[self.of]
+        of = _of(self, dataset)
         return [(_weights(of, self.over, xr.DataArray(self.level)), {})]
 
 
@@ -218,7 +218,7 @@ class StatusShares(Reduction):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Count along the dimension of the samples."""
         _of(self, dataset)
-        status = dataset["status"]
+        status = dataset["status"].reset_coords(drop=True)
         statuses = [status for status in Status if status is not Status.PENDING]
         codes = xr.DataArray(
             [int(each) for each in statuses], {"ended": [s.label for s in statuses]}, "ended"
@@ -250,9 +250,9 @@ class Logarithm(Reduction):
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
 
 
-def _of(reduction: Mean | _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
-    """What is reduced."""
-    of = dataset[reduction.of]
+def _of(reduction: _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
+    """What is reduced, without the coordinates beside its dimensions, which sums would carry."""
+    of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:
         rule = f"is no dimension of {reduction.of}"
         raise InvalidValue("over", reduction.over, rule, choices=map(str, of.dims))
