@@ -81,7 +81,13 @@ class Recovered(Measure):
         Quantity("record_by", "", "", "what makes the record"),
     )
     outputs = (
-        Output("largest_deviation", "", "1", "largest deviation of a parameter, over its size"),
+        Output(
+            "largest_deviation",
+            "",
+            "1",
+            "largest deviation of a parameter, over its size",
+            error=True,
+        ),
         Output(
             "deviation", "", "1", "parameter less the true one, over its size", dims=("parameter",)
         ),
@@ -118,6 +124,7 @@ class Recovered(Measure):
         every = np.array([off.get(name, math.nan) for name in PARAMETERS])
         values: dict[str, Value] = {
             "largest_deviation": max(map(abs, off.values())),
+            "largest_deviation_error": max(found.errors[n] / _size(n, true) for n in free),
             "deviation": every,
         }
         return Outcome(Status.OK, values)
@@ -193,14 +200,19 @@ def _by_scipy(model: Model, true: Values) -> np.ndarray:
 
 
 def _deviation(name: str, found: Values, true: Values) -> float:
-    """Deviation of a parameter or its logarithm; of a or b over the larger, of a trend by what it
-    makes of the window, of others themselves.
-    """
+    """Deviation of a parameter over its size, or of its logarithm."""
     if name in LOGARITHMIC:
         return math.log(found[name] / true[name])
-    size = max(true["a"], abs(true["b"])) if name in ("a", "b") else 1.0
-    extent = 15.0 * DISTANCE if name == "trend1" else 1.0
-    return (found[name] - true[name]) * extent / size
+    return (found[name] - true[name]) / _size(name, true)
+
+
+def _size(name: str, true: Values) -> float:
+    """Size of a parameter: of a or b the larger, of a trend by what it makes of the window."""
+    if name in LOGARITHMIC:
+        return true[name]
+    if name in ("a", "b"):
+        return max(true["a"], abs(true["b"]))
+    return 1.0 / (15.0 * DISTANCE) if name == "trend1" else 1.0
 
 
 CASES = {

@@ -18,6 +18,9 @@ from rsfstudy.slider.registry import Own
 _SAMPLE = ("sample", "time, load point velocity, fall and rate of normal stress")
 _SEGMENT = ("segment", "load point velocity and step, duration, and normal stress above sigma_star")
 
+#: What tells of which kind samples are.
+_OF = ("of_stress", "of_pressure")
+
 
 def variables(parts: Iterable[Own]) -> dict[str, xr.Variable]:
     """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
@@ -35,9 +38,10 @@ def variables(parts: Iterable[Own]) -> dict[str, xr.Variable]:
             "long_name": f"{columns} of a loading",
             "units": "1",
             "loading": part.name,
+            "coverage_content_type": "auxiliaryInformation",
         }
         if isinstance(part, History):
-            about["of_stress"] = int(part.of_stress)
+            about |= {name: int(getattr(part, name)) for name in _OF}
         dims = (f"{part.name}_{row}", f"{part.name}_column")
         found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
     return found
@@ -59,7 +63,8 @@ def held(results: xr.Dataset) -> Mapping[str, Stated]:
         if values.dtype.kind != "f" or values.ndim != 2 or values.shape[1] != RISING + 1:
             raise refused(str(key), f"holds no loading of {RISING + 1} columns")
         if "of_stress" in values.attrs:
-            found[name] = of_samples(values.values, bool(values.attrs["of_stress"]), name)
+            of = {key: bool(values.attrs.get(key, False)) for key in _OF}
+            found[name] = of_samples(values.values, name=name, **of)
         else:
             found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
     return found

@@ -127,7 +127,10 @@ class SyntheticFit(Measure):
     @property
     def outputs(self) -> Sequence[Output]:
         """By parameter, how far off it is and how far it may be; and what laws are compared by."""
-        by = [Output(n, "", "1", text, dims=("parameter",)) for n, text in _OF_PARAMETER]
+        by = [
+            Output(name, "", "1", text, dims=("parameter",), error=name == self.headline)
+            for name, text in _OF_PARAMETER
+        ]
         text = "Akaike's criterion, in which the noise counts"
         order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
         return (*by, Output("criterion", "", "1", text), order)
@@ -229,11 +232,13 @@ class SyntheticFit(Measure):
             for v in (found.values, true)
         )
         spread = np.sqrt(np.diag(found.covariance))
+        slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in self._free])
         off = at - truth
         one, two = (student.isf(0.5 * (1.0 - p), found.degrees) * spread for p in (ONE, TWO))
         values = {
             "estimate": at,
             "deviation": off,
+            "deviation_error": np.array([found.errors[n] for n in self._free]) / slopes,
             "spread": spread,
             "inside_one": (np.abs(off) <= one).astype(float),
             "inside_two": (np.abs(off) <= two).astype(float),
