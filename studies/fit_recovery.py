@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -108,6 +108,10 @@ class Recovered(Measure):
         """All parameters."""
         return {"parameter": np.array([*PARAMETERS], dtype=object)}
 
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Sizes of parameters: deviations are told over those."""
+        return {"largest_deviation": 1.0}
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Make a record, and fit it."""
         free, true = self.looked_for.split(), _true(scene)
@@ -120,12 +124,12 @@ class Recovered(Measure):
             n: v * OFF.get(n, 1.0) + BESIDE.get(n, 0.0) if n in free else v for n, v in true.items()
         }
         found = Search(Joint((model,)), first, free, "white").run()
-        off = {name: _deviation(name, found.values, true) for name in free}
-        every = np.array([off.get(name, math.nan) for name in PARAMETERS])
+        sizes = {name: _size(name, true) for name in free}
+        off = {name: (found.values[name] - true[name]) / sizes[name] for name in free}
         values: dict[str, Value] = {
             "largest_deviation": max(map(abs, off.values())),
-            "largest_deviation_error": max(found.errors[n] / _size(n, true) for n in free),
-            "deviation": every,
+            "largest_deviation_error": max(found.errors[name] / sizes[name] for name in free),
+            "deviation": np.array([off.get(name, math.nan) for name in PARAMETERS]),
         }
         return Outcome(Status.OK, values)
 
@@ -199,20 +203,14 @@ def _by_scipy(model: Model, true: Values) -> np.ndarray:
     return found
 
 
-def _deviation(name: str, found: Values, true: Values) -> float:
-    """Deviation of a parameter over its size, or of its logarithm."""
-    if name in LOGARITHMIC:
-        return math.log(found[name] / true[name])
-    return (found[name] - true[name]) / _size(name, true)
-
-
 def _size(name: str, true: Values) -> float:
-    """Size of a parameter: of a or b the larger, of a trend by what it makes of the window."""
+    """What deviations are told over: the larger of a and b, a trend that moves the window by 1, and
+    numbers of order one.
+    """
     if name in LOGARITHMIC:
         return true[name]
-    if name in ("a", "b"):
-        return max(true["a"], abs(true["b"]))
-    return 1.0 / (15.0 * DISTANCE) if name == "trend1" else 1.0
+    sizes = dict.fromkeys(("a", "b"), max(true["a"], abs(true["b"])))
+    return (sizes | {"trend1": 1.0 / (15.0 * DISTANCE)}).get(name, 1.0)
 
 
 CASES = {
@@ -232,14 +230,14 @@ CASES = {
     "step down": {"law": "slowness", "loading_of_record": "step down"},
     "b < 0": {"law": "slowness", "b_over_a": -0.4},
     "b < 0, slip": {"law": "slip", "b_over_a": -0.4},
-    "alpha": {
+    "normal stress step": {
         "law": "slip",
         "normal_stress": "imposed",
         "alpha": 0.3,
         "loading_of_record": "normal stress step",
         "looked_for": "a b slip_distance mu_star alpha",
     },
-    "alpha, slowness": {
+    "the same, slowness": {
         "law": "slowness",
         "normal_stress": "imposed",
         "alpha": 0.3,
@@ -268,6 +266,7 @@ figure = Figure(
     [
         Panel(
             marks=[mark_deviations],
+            y_label="Record",
             x_label="Largest deviation of a parameter",
         )
     ]

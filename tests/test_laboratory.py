@@ -63,6 +63,7 @@ VALUES = {
 CALLS: dict[str, dict] = {
     "displacement_between_steps": {"velocity_steps": 2},
     "oscillation_period": {"oscillation_amplitude": 0.01},
+    "oscillation_begin": {"oscillation_amplitude": 0.01},
     "ramp_duration": {"normal_stress_ramp": 0.01},
     "velocity_ramp_duration": {"velocity_ramp": 2.0},
     "load_velocity_ratio": {},
