@@ -1,0 +1,362 @@
+"""What the pages of the site say from the code: each line ``<!-- made: NAME -->`` of a page is
+followed by the text of that name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
+from typing import Any
+
+import click
+
+import rsfstudy
+from rsfstudy import measures, reduce
+from rsfstudy.cli.command_line import cli
+from rsfstudy.declare import catalogue, names
+from rsfstudy.measures import Measure
+from rsfstudy.quantity import Output, Quantity
+from rsfstudy.quantity import symbol as in_html
+from rsfstudy.quantity import unit as unit_in_html
+from rsfstudy.reduce import Reduction
+from rsfstudy.rig import quantities
+from rsfstudy.slider import registry
+from rsfstudy.slider.parts import Part, names_of
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import QUANTITIES, quantity
+
+#: Where classes stand that parts, measures and studies of one's own are derived from or made of.
+CLASSES = {
+    "Law": "rsfstudy.slider.laws",
+    "LawOfStates": "rsfstudy.slider.laws",
+    "NormalStress": "rsfstudy.slider.normal_stress",
+    "Fluid": "rsfstudy.slider.fluid",
+    "Dynamics": "rsfstudy.slider.dynamics",
+    "Loading": "rsfstudy.slider.loading",
+    "Measure": "rsfstudy.measures",
+    "Outcome": "rsfstudy.measures",
+    "Output": "rsfstudy.quantity",
+    "Accuracy": "rsfstudy.motion.accuracy",
+    "Reduction": "rsfstudy.reduce",
+    "Stepper": "rsfstudy.motion.steppers",
+    "Figure": "rsfstudy.declare.figure",
+    "Panel": "rsfstudy.declare.figure",
+    "Claim": "rsfstudy.declare.claims",
+}
+
+
+def filled(text: str) -> str:
+    """A page with what is made.
+
+    Raises
+    ------
+    KeyError
+        For a name that nothing here makes.
+    """
+    return re.sub(r"<!-- made: (\w+) -->", lambda found: MADE[found[1]](), text)
+
+
+def escaped(text: str) -> str:
+    """A page on which the asterisk of V_* begins no emphasis: code is left as it is."""
+    parts = re.split(
+        r"((?:^    [^\n]*\n)+|^```.*?^```|`[^`\n]+(?:\n[^`\n]+)*`)",
+        text,
+        flags=re.MULTILINE | re.DOTALL,
+    )
+    return "".join(part if n % 2 else part.replace("_*", "_\\*") for n, part in enumerate(parts))
+
+
+def table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown; empty without rows."""
+    lines = [[_cell(value) for value in row] for row in rows]
+    head = list(headings)
+    texts = [head, ["---"] * len(head), *lines] if lines else []
+    return "\n".join(f"| {' | '.join(line)} |" for line in texts)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return re.sub(r"\s+", " ", text).replace("|", "\\|")
+
+
+def plain(text: str) -> str:
+    """A text without meaning to Markdown but what stands in ``double`` or `single` quotes."""
+    parts = re.split(r"(``.+?``|`.+?`)", text, flags=re.DOTALL)
+    return "".join(
+        part if n % 2 else re.sub(r"([*_<\[])", r"\\\1", part) for n, part in enumerate(parts)
+    )
+
+
+def symbol(formula: str) -> str:
+    """A symbol in HTML that Markdown leaves alone."""
+    return in_html(formula).replace("*", "&ast;")
+
+
+def unit(about: Quantity) -> str:
+    """A unit in HTML that Markdown leaves alone."""
+    return unit_in_html(about).replace("*", "&ast;")
+
+
+def summary(thing: object) -> str:
+    """The first paragraph of a docstring."""
+    return plain((inspect.getdoc(thing) or "").split("\n\n")[0])
+
+
+# ---- the slider ----------------------------------------------------------------------------------
+
+
+def scene_fields() -> str:
+    """Every field of a scene, in the order of its parts."""
+    abouts = {about.name: about for about in registry.QUANTITIES}
+    defaults = registry.defaults()
+    rows = (
+        (f"`{name}`", symbol(about.symbol), unit(about), _default(name, defaults), _rule(name),
+         plain(about.long_name), _parts_with(name))
+        for name, about in ((name, abouts[name]) for name in registry.FIELDS)
+    )  # fmt: skip
+    return table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
+
+
+def _default(name: str, defaults: Mapping[str, Any]) -> object:
+    value = defaults[name]
+    return f"`{value}`" if isinstance(value, str) else value
+
+
+def _rule(name: str) -> str:
+    owner = registry.OWNERS.get(name)
+    if owner is None:
+        return ""
+    return (
+        str(owner.__dataclass_fields__[name].metadata["rule"])
+        .removeprefix("must ")
+        .removeprefix("be ")
+    )
+
+
+def _parts_with(name: str) -> str:
+    """The parts that bring a field to a scene: nothing where every scene has it."""
+    owners = [
+        f"`{part.name}`"
+        for slot in registry.SLOTS
+        for part in slot.choices.values()
+        if name in names_of(part)
+    ]
+    return ", ".join(owners)
+
+
+def parts() -> str:
+    """Every choice of each slot."""
+    return "\n\n".join(_slot(slot) for slot in registry.SLOTS)
+
+
+def _slot(slot: registry.Slot) -> str:
+    rows = (
+        (f"`{name}`" + (" (default)" if name == slot.default else ""), summary(part),
+         equation(part), ", ".join(f"`{own}`" for own in names_of(part)))
+        for name, part in slot.choices.items()
+    )  # fmt: skip
+    made = table(("choice", "what it is", "equation", "its fields"), rows)
+    called = "" if slot.is_named else " A field of the choice, stated, calls for it."
+    return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
+
+
+def equation(part: type[Part]) -> str:
+    """The equations that the functions of a part state in their docstrings."""
+    functions = [value.__func__ for value in vars(part).values() if isinstance(value, staticmethod)]
+    texts = [inspect.getdoc(one) or "" for one in functions]
+    first = [text.split("\n\nParameters\n")[0] for text in texts]
+    found = [one for text in first for one in re.findall(r"``([^`]+=[^`]+)``", text)]
+    return ", ".join(f"`{' '.join(one.split())}`" for one in dict.fromkeys(found))
+
+
+def rig() -> str:
+    """The quantities of a rig."""
+    must = {name: name in quantities.SCALES for name in quantities.STATED}
+    rows = (
+        (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
+        for name, (units, least, most) in quantities.STATED.items()
+    )
+    return table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
+
+
+# ---- measures, reductions, statuses --------------------------------------------------------------
+
+
+def kinds() -> dict[str, type[Measure]]:
+    """The measures of rsfstudy, by name."""
+    found: dict[str, type[Measure]] = {}
+    for module in sorted(m.name for m in pkgutil.iter_modules(measures.__path__)):
+        home = importlib.import_module(f"{measures.__name__}.{module}")
+        own = (
+            v for v in vars(home).values() if isinstance(v, type) and v.__module__ == home.__name__
+        )
+        found |= {
+            kind.name: kind for kind in own if issubclass(kind, Measure) and "name" in vars(kind)
+        }
+    return found
+
+
+def _examples() -> dict[type[Measure], Measure]:
+    """A measure of each kind: as it is without fields, or as a named study states it."""
+    stated = {type(m): m for m in (catalogue.load(name).measure for name in names.names())}
+    for kind in kinds().values():
+        if all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(kind)):
+            stated[kind] = kind()
+    return stated
+
+
+def every_measure() -> str:
+    """Every measure: what it finds, its fields, its numbers."""
+    examples = _examples()
+    return "\n\n".join(_measure(kind, examples.get(kind)) for kind in kinds().values())
+
+
+def _measure(kind: type[Measure], example: Measure | None) -> str:
+    taken = table(("field", "default", "meaning"), _taken(kind))
+    given = table(
+        ("number", "symbol", "unit", "error estimate", "over", "meaning"),
+        map(_output, example.outputs if example else ()),
+    )
+    headline = f"Headline: `{example.headline}`." if example else "Its numbers follow its fields."
+    home = f"`from {kind.__module__} import {kind.__name__}`"
+    return "\n\n".join(
+        filter(None, (f"### {kind.__name__}", f"{summary(kind)} {headline} {home}", taken, given))
+    )
+
+
+def _taken(kind: type[Any]) -> Iterator[tuple[object, ...]]:
+    """Fields of a measure or a reduction, with what its docstring says of them."""
+    told = parameters(kind)
+    for one in fields(kind):
+        if one.init:
+            value = one.default if one.default is not MISSING else "must be stated"
+            shown = f"`{value!r}`" if one.default is not MISSING else value
+            yield f"`{one.name}`", shown, told.get(one.name, "")
+
+
+def parameters(kind: type[Any]) -> dict[str, str]:
+    """What the docstrings of a class and its bases say of each parameter."""
+    told: dict[str, str] = {}
+    for one in reversed(kind.__mro__):
+        text = inspect.cleandoc(vars(one).get("__doc__") or "")
+        section = re.search(r"Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", text, re.DOTALL)
+        entries = (
+            re.findall(r"^(\S.*) : .*\n((?:    .*\n?|\n)+)", section[1] + "\n", re.M)
+            if section
+            else []
+        )
+        for named, meaning in entries:
+            told |= {name.strip(): plain(" ".join(meaning.split())) for name in named.split(",")}
+    return told
+
+
+def _output(output: Output) -> tuple[object, ...]:
+    about: Quantity = output if output.long_name else quantity(output.name)
+    return (f"`{output.name}`", symbol(about.symbol), unit(about), output.error,
+            ", ".join(output.dims), plain(about.long_name))  # fmt: skip
+
+
+def reductions() -> str:
+    """Every reduction, with its fields."""
+    kinds = (getattr(reduce, name) for name in reduce.__all__)
+    own = (
+        k for k in kinds if isinstance(k, type) and issubclass(k, Reduction) and k is not Reduction
+    )
+    return "\n\n".join(
+        f"### {kind.__name__}\n\n{summary(kind)}\n\n"
+        + table(("field", "default", "meaning"), _taken(kind))
+        for kind in own
+    )
+
+
+def statuses() -> str:
+    """Every status of a cell."""
+    return table(
+        ("status", "flag", "kind", "meaning"),
+        ((f"`{s.label}`", int(s), "answer" if s.is_answer else "failure", plain(s.meaning))
+         for s in Status),
+    )  # fmt: skip
+
+
+def vocabulary() -> str:
+    """Every number of datasets that several studies share, but for fields of scenes."""
+    rows = (
+        (f"`{about.name}`", symbol(about.symbol), unit(about), plain(about.long_name))
+        for about in QUANTITIES.values()
+        if about.name not in registry.FIELDS
+    )
+    return table(("name", "symbol", "unit", "meaning"), rows)
+
+
+# ---- the command line, and Python ----------------------------------------------------------------
+
+
+def commands() -> str:
+    """Every command with its arguments and options."""
+    return "\n\n".join(_command(name, command) for name, command in cli.commands.items())
+
+
+def _command(name: str, command: click.Command) -> str:
+    taken = " ".join(p.make_metavar(click.Context(command)) for p in command.params
+                     if isinstance(p, click.Argument))  # fmt: skip
+    rows = (
+        (", ".join(f"`{text}`" for text in (*option.opts, *option.secondary_opts)), _given(option),
+         plain(option.help or ""))
+        for option in command.params
+        if isinstance(option, click.Option) and not option.hidden
+    )  # fmt: skip
+    words = plain(inspect.cleandoc((command.help or "").split("\f")[0]).replace("\b\n", ""))
+    made = table(("option", "default", "meaning"), rows)
+    return f"### rsfstudy {name}\n\n`rsfstudy {name} {taken}`\n\n{words}\n\n{made}"
+
+
+def _given(option: click.Option) -> str:
+    if option.is_flag or option.default in (None, (), []) or callable(option.default):
+        return ""
+    return "" if type(option.default).__name__ == "Sentinel" else f"`{option.default}`"
+
+
+def python() -> str:
+    """Entries of the public names, for autodoc."""
+    return "\n\n".join(map(_entry, rsfstudy.__all__))
+
+
+def accessor() -> str:
+    """Entry of ``dataset.rsf``."""
+    return _rst("autoclass:: rsfstudy.api.accessor.Accessor", "members:")
+
+
+def classes() -> str:
+    """Entries of what is derived from, or handed over, by studies of one's own."""
+    return "\n\n".join(
+        f"### {name}\n\n" + _rst(f"autoclass:: {home}.{name}", "members:", "show-inheritance:")
+        for name, home in CLASSES.items()
+    )
+
+
+def _entry(name: str) -> str:
+    kind = "class" if isinstance(getattr(rsfstudy, name), type) else "function"
+    return f"### {name}\n\n" + _rst(
+        f"auto{kind}:: rsfstudy.{name}", *["members:"] * (kind == "class")
+    )
+
+
+def _rst(directive: str, *options: str) -> str:
+    lines = "".join(f"   :{option}\n" for option in options)
+    return f"```{{eval-rst}}\n.. {directive}\n{lines}```"
+
+
+#: What makes the text of each name.
+MADE: dict[str, Callable[[], str]] = {
+    one.__name__: one
+    for one in (scene_fields, parts, rig, every_measure, reductions, statuses, vocabulary,
+                commands, python, accessor, classes)
+}  # fmt: skip

@@ -1,0 +1,101 @@
+"""How the site is built, from the README, the pages, the notebook and the docstrings:
+
+    sphinx-build -W --keep-going -c studies/pages . outputs/site
+
+Tables of the page of names, and the entries of the page of Python, are made from the code.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import _made  # type: ignore[import-not-found]  # noqa: E402 (it stands beside this file)
+
+project = "rsfstudy"
+author = copyright = "The rsfstudy developers"
+version = release = metadata.version("rsfstudy")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
+
+root_doc = "README"
+source_suffix = {".md": "markdown", ".ipynb": "markdown"}
+include_patterns = [
+    "README.md",
+    "studies/*.md",
+    "studies/*.ipynb",
+    "studies/pages/*.md",
+    "studies/clusters/*.md",
+]
+exclude_patterns = [".*", "build", "outputs", "rsfstudy", "tests"]
+
+myst_heading_anchors = 3
+default_role = "code"
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+
+html_theme = "furo"
+html_title = project
+html_copy_source = False
+html_show_sphinx = False
+#: Pages in the order of the contents, under studies/, by caption; those of no caption come last.
+CONTENTS = {
+    "Use": ["pages/rig", "pages/studies", "pages/running", "pages/own_studies", "clusters/README"],
+    "Notebooks": sorted(file.stem for file in HERE.parent.glob("*.ipynb")),
+    "Look up": ["pages/reference", "pages/python", "pages/numbers"],
+}
+
+
+def _contents() -> str:
+    """The contents of the site, as the first page has them."""
+    named = {page for pages in CONTENTS.values() for page in pages}
+    others = {f"pages/{file.stem}" for file in HERE.glob("*.md")} - named
+    rooms = CONTENTS | {"More": [*sorted(others), "MISPRINTS"]}
+    return "".join(
+        f"\n\n```{{toctree}}\n:hidden:\n:caption: {caption}\n"
+        + "".join(f"studies/{page}\n" for page in pages)
+        + "```"
+        for caption, pages in rooms.items()
+    )
+
+
+def _source(app: Any, page: str, text: list[str]) -> None:
+    """Fill in what is made; a notebook becomes Markdown, and the first page has the contents."""
+    if str(app.env.doc2path(page)).endswith(".ipynb"):
+        text[0] = _markdown(text[0])
+    text[0] = _made.filled(_made.escaped(text[0]))
+    if page == root_doc:
+        text[0] += _contents()
+
+
+def _markdown(notebook: str) -> str:
+    """The texts and the code of a notebook, which is kept without its output."""
+    cells = ((cell["cell_type"], "".join(cell["source"])) for cell in json.loads(notebook)["cells"])
+    return "\n\n".join(
+        re.sub(r"\$[^$]+\$", lambda formula: _made.symbol(formula[0]), text)
+        if kind == "markdown"
+        else f"```python\n{text}\n```"
+        for kind, text in cells
+    )
+
+
+def _entrance(app: Any, error: Exception | None) -> None:
+    """Send who opens the folder to the first page."""
+    if error is None:
+        to_first = f'<meta http-equiv="refresh" content="0; url={root_doc}.html">'
+        Path(app.outdir, "index.html").write_text(
+            f"<!doctype html><title>{project}</title>{to_first}"
+        )
+
+
+def setup(app: Any) -> None:
+    """Have Sphinx ask for the source of each page, and tell when it has ended."""
+    app.connect("source-read", _source)
+    app.connect("build-finished", _entrance)

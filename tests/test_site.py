@@ -1,0 +1,150 @@
+"""The site is built strictly, leads nowhere that is not there, asks for nothing on the net, and
+names all that there is to name.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import rsfstudy
+from rsfstudy import reduce
+from rsfstudy.api.accessor import Accessor
+from rsfstudy.cli.command_line import cli
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import QUANTITIES
+
+ROOT = Path(__file__).parent.parent
+SLIDER, MEASURES = (ROOT / "rsfstudy" / folder for folder in ("slider", "measures"))
+SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading")
+
+
+class Page(HTMLParser):
+    """Links, anchors and loaded files of a page, and its text."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.anchors: set[str] = set()
+        self.text = ""
+        self.feed(file.read_text())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        self.anchors |= {given[name] for name in ("id", "name") if name in given}
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        elif tag in ("link", "script", "img", "source", "iframe"):
+            self.loaded += [given[name] for name in ("href", "src") if name in given]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    """The site, built with no proxy that leads anywhere: what it needs is here."""
+    made = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "studies/pages"]
+    nowhere = dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9")
+    built = subprocess.run(
+        [*command, ".", str(made)],
+        cwd=ROOT,
+        env=os.environ | nowhere,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    return made
+
+
+@pytest.fixture(scope="module")
+def pages(site) -> dict[Path, Page]:
+    return {file: Page(file) for file in sorted(site.rglob("*.html"))}
+
+
+def text_of(pages: dict[Path, Page], name: str) -> str:
+    return next(page.text for file, page in pages.items() if file.name == f"{name}.html")
+
+
+def words_in(text: str) -> set[str]:
+    return set(re.findall(r"--[\w-]+|\w+", text))
+
+
+def test_every_page_and_every_notebook_is_there(pages):
+    kept = [file for end in ("*.ipynb", "pages/*.md") for file in (ROOT / "studies").glob(end)]
+    needed = {"index", "README", *(file.stem for file in kept)}
+    assert needed <= {file.stem for file in pages}
+
+
+def test_links_lead_somewhere(pages):
+    for file, page in pages.items():
+        for link in (*page.links, *page.loaded):
+            parts = urlsplit(link)
+            if parts.scheme in ("http", "https", "mailto", "data") or link == "#":
+                continue
+            target = (file.parent / unquote(parts.path)).resolve() if parts.path else file
+            assert target.is_file(), (file.name, link)
+            if parts.fragment and target in pages:
+                assert unquote(parts.fragment) in pages[target].anchors, (file.name, link)
+
+
+def test_nothing_is_loaded_from_the_net(pages):
+    for file, page in pages.items():
+        assert not [link for link in page.loaded if urlsplit(link).netloc], file.name
+
+
+def test_nothing_is_left_to_be_made(pages):
+    assert not [file.name for file in pages if "<!-- made:" in file.read_text()]
+
+
+def test_no_symbol_is_taken_for_emphasis(pages):
+    """As of ``sigma_*, slip rate in V_*``, where asterisks are to be escaped."""
+    for file in pages:
+        taken = re.findall(r"<em>([^<]*_)</em>", file.read_text())
+        assert not taken, (file.name, taken)
+
+
+def names() -> Iterator[tuple[str, list[str]]]:
+    """What must stand on the page of names: from the signature that editors complete, the folders,
+    and what the code declares.
+    """
+    yield "fields", [*rsfstudy.Scene().as_dict()]
+    kept = [file.stem for slot in SLOTS for file in (SLIDER / slot).glob("[!_]*.py")]
+    yield "parts", kept
+    yield "measures", [file.stem for file in MEASURES.glob("[!_]*.py")]
+    yield "outputs", [about.name for about in LimitCycle().outputs]
+    kinds = [n for n in reduce.__all__ if isinstance(getattr(reduce, n), type) and n != "Reduction"]
+    yield "reductions", kinds
+    yield "statuses", [status.label for status in Status]
+    yield "numbers", [*QUANTITIES]
+    params = [param for command in cli.commands.values() for param in command.params]
+    yield "commands", [*cli.commands, *(o for p in params for o in p.opts if o.startswith("--"))]
+
+
+NAMES = dict(names())
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_every_name_is_there(pages, kind):
+    assert NAMES[kind]
+    assert set(NAMES[kind]) <= words_in(text_of(pages, "reference"))
+
+
+def test_every_public_name_has_an_entry(pages):
+    page = next(page for file, page in pages.items() if file.name == "python.html")
+    assert {f"rsfstudy.{name}" for name in rsfstudy.__all__} <= page.anchors
+    members = {name for name in vars(Accessor) if not name.startswith("_")}
+    assert {f"{Accessor.__module__}.Accessor.{name}" for name in members} <= page.anchors
+    assert {"Law", "Measure", "Loading", "Reduction", "Stepper"} <= words_in(page.text)
