@@ -15,7 +15,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Reduction
+from rsfstudy.reduce.base import Derivatives, Reduction
 from rsfstudy.slider.scene import Scene
 
 RECORDS, DISTANCE = 4, 10.0
@@ -57,6 +57,12 @@ class Kept(Reduction):
             {self.name: found, f"{self.name}_off": (found - 1.0) * np.sqrt(2.0 * records)}
         )
 
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """By each deviation: that over what is promised, over the mean and the number of all."""
+        over = dataset[self.of] / dataset["promised_spread"] ** 2
+        records = dataset.sizes["seed"] * dataset.sizes["design"]
+        return [(over / (records * dataset[self.name]), {})]
+
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The ratio, and how far it is from 1."""
@@ -77,9 +83,10 @@ def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
         label = MODEL[name].symbol
         label = rf"$\ln$ {label}" if name in LOGARITHMIC else label
         style = look(number) | {"marker": marker(number), "label": label}
-        axes.plot(range(len(DESIGNS)), one, **style)
-    axes.set_yscale("log")
-    axes.set_xticks(range(len(DESIGNS)), list(DESIGNS), rotation=30, ha="right")
+        axes.plot(one, range(len(DESIGNS)), **style)
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(DESIGNS)), list(DESIGNS))
+    axes.invert_yaxis()
 
 
 def machine(dataset: xr.Dataset) -> str:
@@ -93,8 +100,8 @@ figure = Figure(
             each=["stiffness"],
             marks=[mark_promises],
             title=machine,
-            y_label="Standard error promised",
-            alike="error",
+            x_label="Standard error promised",
+            y_label="Experiment",
         )
     ]
 )

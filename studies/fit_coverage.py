@@ -87,6 +87,7 @@ figure = Figure(
         Panel(
             each=["law"],
             marks=[mark_shares],
+            x_label="Parameter",
             y_label="Truth inside 68.3 % interval (%)",
             y_limits=(0.0, 100.0),
             alike="share",

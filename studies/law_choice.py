@@ -85,7 +85,15 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 figure = Figure(
-    [Panel(each=["law"], marks=[mark_shares], x_label="Records (%)", y_label="")], columns=1
+    [
+        Panel(
+            each=["law"],
+            marks=[mark_shares],
+            x_label="Records (%)",
+            y_label="Steps that are fitted",
+        )
+    ],
+    columns=1,
 )
 
 

@@ -13,7 +13,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Reduction
+from rsfstudy.reduce.base import Derivatives, Reduction
 from rsfstudy.slider.scene import Scene
 
 RECORDS = 12
@@ -51,6 +51,11 @@ class ScatterOverPromise(Reduction):
         off = (found - 1.0) * np.sqrt(2.0 * dataset.sizes["seed"])
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """By each deviation: that over what is promised, over the mean and the number of all."""
+        over = dataset[self.of] / dataset["promised_spread"] ** 2
+        return [(over / (dataset.sizes["seed"] * dataset[self.name]), {})]
+
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The scatter, and how far it is from 1."""
@@ -82,7 +87,15 @@ def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
 
 EXPONENT = 0.5
 figure = Figure(
-    [Panel(marks=[mark_estimates], y_label="Exponent of the law", y_limits=(0.0, 1.0))], columns=1
+    [
+        Panel(
+            marks=[mark_estimates],
+            x_label="Steps that are fitted",
+            y_label="Exponent of the law",
+            y_limits=(0.0, 1.0),
+        )
+    ],
+    columns=1,
 )
 
 

@@ -396,7 +396,8 @@ class Compiles(Measure):
         return Outcome(Status.OK, {"answer": 42.0})
 
 
-@pytest.mark.parametrize("name", LEFT_TO_COMPILED)
+# waves are compared with the same motion without them, which is another's equations
+@pytest.mark.parametrize("name", [name for name in LEFT_TO_COMPILED if name != "wave_triggering"])
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     """By what their measure says of time."""
     wanted, addresses = list[tuple[str, ...]](), machine.addresses

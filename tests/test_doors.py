@@ -26,7 +26,8 @@ import xarray as xr
 from running import SMALL, call, run
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy import Axis, Laboratory, Scene, Study, read_record
+from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.cli import command_line
 from rsfstudy.declare.claims import Claim
 from rsfstudy.doors import door
@@ -55,6 +56,9 @@ def place(tmp_path_factory) -> Path:
     run(LATTICE, output=place)
     (place / "circle").symlink_to("circle")
     (place / "protocol.csv").write_text("velocity (V_*), duration (D_c/V_*)\n2, 1\n")
+    rows = zip(*record().columns.values(), strict=True)
+    lines = ["time (s), displacement (um), friction", *(f"{t}, {x}, {mu}" for t, x, mu in rows)]
+    (place / "record.csv").write_text("\n".join(lines))
     os.mkfifo(place / "pipe")
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
@@ -76,6 +80,17 @@ def answered(ask) -> None:
     assert 0 < len(text) < 6000
 
 
+FIT = (("laws", ["slip"]), ("free", ["a", "mu_star"]), ("noise", "white"), ("slip_distance", 10.0))
+
+
+def record() -> Record:
+    """A step of a load point in 40 rows."""
+    time = np.arange(40.0)
+    moved = np.where(time < 20.0, time, 20.0 + 10.0 * (time - 20.0))
+    friction = 0.6 + np.where(time < 20.0, 0.0, 0.01 * np.exp(-(time - 20.0)))
+    return read_record({"time": time, "displacement": moved, "friction": friction})
+
+
 # ---- calls --------------------------------------------------------------------------------------
 
 
@@ -92,6 +107,8 @@ def calls(place: Path) -> dict[str, dict]:
         "critical_step": {"scene": scene, "rtol": 1e-2, "engine": "compiled"},
         "events": {"time": np.arange(400.0), "shear_stress": np.zeros(400)},
         "limit_cycle": {"scene": cycling, "rtol": 1e-2, "engine": "compiled"},
+        "fit": {"record": record(), "stiffness": 3e-3, **dict(FIT)},
+        "read_record": {"source": place / "record.csv"},
         "open": {"name": place / "lattice.nc"},
         "plot": {"dataset": dataset},
         "history": {"record": {"time": [0.0, 1.0], "displacement": [0.0, 1.0]}},
@@ -259,6 +276,11 @@ def commands(place: Path) -> dict[str, list[str]]:
         "rerun": [file, "--serial", "--quiet", "--cell", "law=slip", "--cell", "b_over_a=2"],
         "export": [file, "--csv", "--output", f"{file}.csv"],
         "simulate": ["--duration", "0.1", "--engine", "compiled", "--rtol", "0.01"],
+        "fit": [
+            str(place / "record.csv"),
+            *("--stiffness", "3e-3 /um", "--law", "slip", "--free", "a,mu_star"),
+            *("--noise", "white", "--slip-distance", "10 um"),
+        ],
         "problems": ["referee"],
         "verify": [str(shipped()[19].with_suffix(".csv"))],
     }

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from running import cell_key
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene, history, simulate
-from rsfstudy.compute.plan import cell_key
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.normal_stress_response import NormalStressResponse

@@ -29,6 +29,7 @@ from rsfstudy.declare.names import names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import Reduction
@@ -174,6 +175,7 @@ def kept() -> dict[str, str]:
 @pytest.mark.parametrize(("asked", "message"), kept().items())
 def test_a_message_is_worded_as_it_was_read(asked, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(engines, "_OWN", {})  # steppers that other tests have made known
     assert answered(asked) == message
     assert set(os.listdir(tmp_path)) <= {"record.csv"}
 
