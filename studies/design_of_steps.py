@@ -61,7 +61,7 @@ class Kept(Reduction):
         """By each deviation: that over what is promised, over the mean and the number of all."""
         over = dataset[self.of] / dataset["promised_spread"] ** 2
         records = dataset.sizes["seed"] * dataset.sizes["design"]
-        return [(over / (records * dataset[self.name]), {})]
+        return [(over / (records * self(dataset)[self.name]), {})]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -54,7 +54,7 @@ class ScatterOverPromise(Reduction):
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """By each deviation: that over what is promised, over the mean and the number of all."""
         over = dataset[self.of] / dataset["promised_spread"] ** 2
-        return [(over / (dataset.sizes["seed"] * dataset[self.name]), {})]
+        return [(over / (dataset.sizes["seed"] * self(dataset)[self.name]), {})]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
