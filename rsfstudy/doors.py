@@ -7,6 +7,7 @@ from __future__ import annotations
 import bdb
 import functools
 import inspect
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -41,6 +42,14 @@ def door(function: Callable[P, T]) -> Callable[P, T]:
             raise _told(function.__name__, given, error) from error
 
     return answered
+
+
+def outside() -> int:
+    """The ``stacklevel`` by which a warning of whoever asks names the line of the user's."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").startswith("rsfstudy."):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _told(name: str, given: dict[str, Any], error: Exception) -> RsfStudyError:

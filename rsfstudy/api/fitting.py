@@ -121,7 +121,8 @@ def fit(
     Raises
     ------
     InvalidValue
-        For parameters that a law does not have, no stiffness, and records without steps.
+        For parameters that a law does not have, no stiffness, records without steps, steps outside
+        of the record, a load point that moves back, and alpha at constant normal stress.
 
     Warns
     -----
@@ -142,8 +143,12 @@ def fit(
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
     numbers = _numbers(records, steps)
+    for one in records:
+        for number in numbers:
+            _check_step(one, number)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
     if "alpha" in free:
+        _check_stressed(records, loading)
         scene = {"normal_stress": "imposed", **scene}
     first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
     _check_free(free, laws, first)
@@ -198,6 +203,32 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
             rule = f"is not the number of a step: the record has {count}"
             raise InvalidValue("steps", number, rule)
     return numbers
+
+
+def _check_step(record: Record, number: int) -> None:
+    """Refuse a step that lies outside a record, or a load point that does not move forward."""
+    if number > len(record.found):
+        return
+    step, time, moved = record.found[number - 1], record.time, record.columns["displacement"]
+    if not time[0] < step.begins <= step.ends < time[-1]:
+        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
+        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
+        raise InvalidValue(f"step {number}", tuple(step), rule, remedy=remedy)
+    if min(step.before, step.after) < 0.0 or not moved[-1] > np.interp(step.ends, time, moved):
+        told = f"{step.before:.4g} um/s before step {number}, {step.after:.4g} um/s after it"
+        rule = "must grow: a load point moves forward"
+        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
+        raise InvalidValue("displacement", told, rule, remedy=remedy)
+
+
+def _check_stressed(records: Sequence[Record], loading: str) -> None:
+    """Refuse to look for the effect of a normal stress that does not change."""
+    for record in records:
+        stress = record.columns.get("normal_stress", np.zeros(1))
+        if loading != "recorded" or not np.ptp(stress) > 0.0:
+            rule = f"needs a normal stress that changes, and that of {record.name} is constant"
+            remedy = "Leave it out, or record normal stress, with --loading recorded (loading=)."
+            raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
 def _together(records: Sequence[Record], numbers: Sequence[int]) -> tuple[tuple[str, int], ...]:

@@ -21,7 +21,7 @@ from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
-from rsfstudy.doors import door
+from rsfstudy.doors import door, outside
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import (
@@ -136,7 +136,7 @@ def run(
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         text = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
         text += "; dataset.rsf.failures() lists them"
-        warnings.warn(text, Incomplete, stacklevel=3)
+        warnings.warn(text, Incomplete, stacklevel=outside())
     return results
 
 

@@ -41,6 +41,8 @@ _SOUGHT = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
+#: A direct effect over its lower bound below which it is at that bound.
+_LEAST = 1.001
 LOADINGS = ("steps", "recorded")
 
 _NUMBERS = (
@@ -77,7 +79,8 @@ class Fit(Measure):
     reads it, plus a trend of powers of load point displacement from the step. Errors are standard
     errors ``<name>_stderr`` and the ends of 95 % intervals, ``<name>_low`` and ``<name>_high``;
     ``<name>_error`` is numerical. A parameter that the record does not tell makes the outcome
-    `not_identified`; the message names it.
+    `not_identified`; the message names it. The ends of its interval are then the bounds of the
+    search, or NaN where it has none: nothing is excluded.
 
     Parameters
     ----------
@@ -99,7 +102,8 @@ class Fit(Measure):
         trends and the time of the step for itself, as ``mu_star_1`` and so on.
     before, after : float
         Load point displacement in um that is fitted before the step and after it. Zero: half the
-        way back to the step before, and up to the next.
+        way back to the step before, and up to the next, or to its window if that is fitted
+        together with this one.
     part : float
         Part of what follows the step that is fitted.
     noise : str
@@ -290,9 +294,13 @@ class Fit(Measure):
         values = self._told(found, np.concatenate(rows), model)
         values |= self._place(parts[0], rows[0] - self._begins(self._windows[0][0]), steps[0])
         for name in self.parameters:
-            values[f"{name}_low"], values[f"{name}_high"] = search.interval(found, name)
+            of = search.bounds if name in untold else search.interval
+            values[f"{name}_low"], values[f"{name}_high"] = of(found, name)
         if untold:
             text = f"{', '.join(untold)}: the record does not tell"
+            if "a" in untold and found.values["a"] < _LEAST * search.bounds(found, "a")[0]:
+                text += "; friction does not change at the step as velocity does: "
+                text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         return Outcome(Status.OK, values)
 
@@ -318,6 +326,10 @@ class Fit(Measure):
         if len(rows) < _ROWS * len(self.free) or not step.begins < ends:
             text = f"the window holds {len(rows)} rows, too few for {len(self.free)} parameters"
             return rows, np.empty((0, 4)), text
+        before = record.columns["friction"][rows][record.time[rows] < step.begins]
+        if before.size and not before.mean() > 0.0:
+            text = f"mean friction before the step is {before.mean():.3g}, and must be positive"
+            return rows, np.empty((0, 4)), text
         loading = loading_of(record, begins, ends, recorded=self.loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
             loading[:, 2:] = 1.0, 0.0  # what was recorded is noise
@@ -329,14 +341,13 @@ class Fit(Measure):
 
     def _window(self, record: Record, step: Step) -> tuple[float, float]:
         """Times in s between which rows are fitted."""
-        earlier = [s.ends for s in record.found if s.ends < step.begins]
-        later = [s.begins for s in record.found if s.begins > step.ends]
-        first, last = max(earlier, default=record.time[0]), min(later, default=record.time[-1])
-        begins = step.begins - (_BACK if earlier else 1.0) * (step.begins - first)
+        later = [s for s in record.found if s.begins > step.ends]
+        last = later[0].begins if later else record.time[-1]
+        if later and (record.name, record.found.index(later[0]) + 1) in self.together:
+            # no row is fitted twice
+            last = record.time[record.time < self._opens(record, later[0])][-1]
         moved = record.columns["displacement"]
         at = np.interp(step.begins, record.time, moved)
-        if self.before:
-            begins = max(begins, record.time[np.argmax(moved >= at - self.before)])
         if self.after:
             beyond = (moved > at + self.after) & (record.time > step.begins)
             last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
@@ -344,7 +355,18 @@ class Fit(Measure):
             until = at + self.part * (np.interp(last, record.time, moved) - at)
             beyond = (moved > until) & (record.time > step.begins)
             last = record.time[np.argmax(beyond)]
-        return float(begins), float(last)
+        return self._opens(record, step), float(last)
+
+    def _opens(self, record: Record, step: Step) -> float:
+        """Time in s at which the window of a step begins."""
+        earlier = [s.ends for s in record.found if s.ends < step.begins]
+        first = max(earlier, default=record.time[0])
+        begins = step.begins - (_BACK if earlier else 1.0) * (step.begins - first)
+        if self.before:
+            moved = record.columns["displacement"]
+            at = np.interp(step.begins, record.time, moved)
+            begins = max(begins, record.time[np.argmax(moved >= at - self.before)])
+        return float(begins)
 
     def _first(self, scene: Scene, model: Model, step: Step) -> dict[str, float]:
         """All parameters to begin with: what the record shows at a glance, else those of the
@@ -406,17 +428,18 @@ class Fit(Measure):
             values[f"{name}_stderr"] = found.stderr(name)
         covariance = found.covariance * np.outer(slopes, slopes)
         spread = np.sqrt(np.diag(covariance))
-        with np.errstate(invalid="ignore"):
-            correlation = covariance / np.outer(spread, spread)
         signs = np.array(
             [{"a": 1.0, "b": -1.0, "b1": -1.0, "b2": -1.0}.get(n, 0.0) for n in found.free]
         )
+        with np.errstate(invalid="ignore"):
+            correlation = covariance / np.outer(spread, spread)
+            variance_of_rate = float(signs @ covariance @ signs)
         b = found.values["b"] if "b" in found.values else found.values["b1"] + found.values["b2"]
         left = model.friction - found.curve - found.trend
         variance = float(np.var(model.friction)) or math.nan
         values |= {
             "a_minus_b": found.values["a"] - b,
-            "a_minus_b_stderr": math.sqrt(max(float(signs @ covariance @ signs), 0.0)),
+            "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
             "noise_size": found.size,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,

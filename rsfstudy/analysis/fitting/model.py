@@ -71,6 +71,10 @@ _DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
 #: time in which the load point moves by a micrometre.
 _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
+#: Right-hand sides of a motion, and of each piece of its loading, beyond which it fits no record:
+#: those that do take some thousands, and some twenty a piece. A spring that is stiff for its direct
+#: effect takes 2 k x/a, x being the displacement of the window.
+_MOST, _MOST_EACH = 50_000, 60
 
 
 @dataclass(frozen=True)
@@ -144,7 +148,8 @@ class Model:
         return Scene(assembly.with_numbers(self.scene.parts._replace(loading=history), fields))
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
-        """Friction along the rows, without trend; NaN where there is no such motion.
+        """Friction along the rows, without trend; NaN where there is no such motion, or where it
+        takes far more work than those of records do.
 
         Parameters
         ----------
@@ -155,6 +160,8 @@ class Model:
             No motion is followed on a spring softer than the critical stiffness, nor with the
             longer of two slip distances first.
         """
+        budget = self.meter.budget
+        most = self.meter.spent + _MOST + _MOST_EACH * len(self.loading)
         try:
             scene = self.scene_of(values)
             swapped = values.get("slip_distance_2", math.inf) <= values["slip_distance"]
@@ -165,14 +172,17 @@ class Model:
             at = np.maximum(self.time - late - self.loading[0, 0], 0.0) * scale
             accuracy = self.accuracy.refined() if refined else self.accuracy
             recording, end = Recording(at=at), float(at[-1]) * (1.0 + 1e-12)
+            self.meter.budget = min(budget, most)
             for _event in follow(scene, accuracy, self.meter, recording=recording, until=end):
                 pass
         except Halt as halt:
-            if halt.status is Status.WORK_BUDGET_SPENT:
+            if halt.status is Status.WORK_BUDGET_SPENT and self.meter.budget == budget:
                 raise
             return np.full(len(self.time), math.nan)
         except InvalidValue:
             return np.full(len(self.time), math.nan)
+        finally:
+            self.meter.budget = budget
         found = recording.seen(scene)[:, READ.index("friction_coefficient")]
         return found if len(found) == len(self.time) else np.full(len(self.time), math.nan)
 

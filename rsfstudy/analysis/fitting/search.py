@@ -12,14 +12,14 @@ from scipy.stats import t as student
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import FINE, LOGARITHMIC, QUICK, Model, Values
+from rsfstudy.analysis.fitting.model import FINE, LOGARITHMIC, QUICK, Differences, Model, Values
 from rsfstudy.analysis.fitting.noise import Noise
 from rsfstudy.motion.meter import Halt
 from rsfstudy.status import Status
 
 #: Bounds of parameters; those of stiffness are over the first guess.
 _BOUNDS = {
-    "a": (1e-6, 1.0),
+    "a": (1e-4, 1.0),
     "b": (-1.0, 1.0),
     "b1": (-1.0, 1.0),
     "b2": (-1.0, 1.0),
@@ -145,6 +145,11 @@ class Search:
         curve = self.model.curve(values, checked=checked)
         return np.asarray(self.model.friction - curve - self.model.trend(values))
 
+    def _jacobian(self, x: np.ndarray, differences: Differences) -> np.ndarray:
+        """Derivatives of the model; 0, which tells nothing, where motions close by fail."""
+        found = self.model.jacobian(self.values(x), self.free, differences)
+        return np.where(np.isfinite(found).all(axis=0), found, 0.0)
+
     def run(self) -> Fitted:
         """The fit.
 
@@ -186,14 +191,14 @@ class Search:
 
     def _least_squares(self, x: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates that leave the least under a noise, and the derivatives there."""
-        model, derivatives = self.model, {}
+        derivatives = {}
 
         def left(x: np.ndarray) -> np.ndarray:
             found = self.residuals(self.values(x), checked=True)
             return np.asarray(noise.whitened(found[:, None])[:, 0] / scale)
 
         def slopes(x: np.ndarray) -> np.ndarray:
-            derivatives["last"] = model.jacobian(self.values(x), self.free, QUICK)
+            derivatives["last"] = self._jacobian(x, QUICK)
             return -noise.whitened(derivatives["last"]) / scale
 
         scale = 1.0
@@ -219,11 +224,11 @@ class Search:
         """All that is told of the parameters with the least left."""
         moved = np.zeros(len(x))
         for number in range(_POLISHED[1]):
-            jacobian = self.model.jacobian(self.values(x), self.free, FINE)
+            jacobian = self._jacobian(x, FINE)
             left = self.residuals(self.values(x))
             whitened = noise.whitened(np.column_stack([jacobian, left]))
             if not np.isfinite(whitened).all():
-                text = "motions next to the best one cannot be followed"
+                text = "the best motion cannot be followed"
                 raise Halt(Status.INTEGRATION_FAILED, text)
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
             beyond = np.clip(x + moved, self.low, self.high)
@@ -240,7 +245,8 @@ class Search:
         covariance = size**2 * inverse
         degrees = max(noise.effective_samples - len(x), _FEWEST)
         finer = self.model.curve(values, refined=True) - self.model.curve(values)
-        off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
+        with np.errstate(invalid="ignore"):  # of what is not told
+            off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [_slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
         variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
@@ -284,6 +290,13 @@ class Search:
                 found.append(name)
         return tuple(found)
 
+    def bounds(self, found: Fitted, name: str) -> tuple[float, float]:
+        """Bounds within which a parameter was looked for; NaN where there are none."""
+        place = found.free.index(name)
+        ends = self.low[place], self.high[place]
+        low, high = (v if math.isfinite(v) else math.nan for v in ends)
+        return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
+
     def interval(self, found: Fitted, name: str) -> tuple[float, float]:
         """Ends of the 95 % interval of a parameter: of the parabola that its likelihood is nearly,
         else where the likelihood itself has fallen as far, or a bound.
@@ -291,21 +304,18 @@ class Search:
         x, place = self.coordinates(found.values), self.free.index(name)
         reach = student.isf(0.5 * (1.0 - COVERS), found.degrees)
         direction = found.covariance[:, place] / math.sqrt(found.covariance[place, place])
-        if not np.isfinite(direction).all():
-            low, high = self.low[place], self.high[place]
-        else:
-            low, high = (self._end(found, x, place, s * direction, reach) for s in (-1.0, 1.0))
+        low, high = (self._end(found, x, place, s * direction, reach) for s in (-1.0, 1.0))
         return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
 
     def _end(
         self, found: Fitted, x: np.ndarray, place: int, direction: np.ndarray, reach: float
     ) -> float:
-        with np.errstate(divide="ignore"):
-            room = np.where(direction > 0.0, self.high - x, self.low - x) / direction
-        most = float(np.min(room, where=direction != 0.0, initial=math.inf))
+        bound = self.high if direction[place] > 0.0 else self.low
+        most = float((bound - x)[place] / direction[place])
         at = min(reach, most)
         for number in range(0 if self.model.is_linear(self.free[place]) else _FOLLOWED):
-            fallen = self._fallen(found, x + at * direction, place)
+            moved = np.clip(x + at * direction, self.low, self.high)
+            fallen = self._fallen(found, moved, place)
             if at == most and fallen < reach**2:
                 break
             if abs(fallen / reach**2 - 1.0) < (_CLOSE if number else _PARABOLIC):

@@ -1,0 +1,134 @@
+"""Bad records: each ends in a clear error or a status, with little work and no absurd numbers."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+import xarray as xr
+
+import rsfstudy
+from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.status import Status
+
+ROWS = 400
+FOUR = ("a", "b", "slip_distance", "mu_star")
+
+
+def columns(count: int = ROWS) -> dict[str, np.ndarray]:
+    """A velocity step by the slip law, with correlated noise."""
+    time = synthetic.rows(synthetic.STEP, 50.0, count)
+    friction = synthetic.motion("slip", time)[0] + synthetic.correlated(count, 0.5, 1e-4, 3)
+    return {
+        "time": time,
+        "displacement": synthetic.load_point(synthetic.STEP, time),
+        "friction": friction,
+    }
+
+
+GOOD = columns()
+
+
+def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset:
+    """Its fit by the slip law."""
+    read = record if isinstance(record, Record) else rsfstudy.read_record(record)
+    options = {"stiffness": 3e-3, "laws": ["slip"], "engine": "compiled", **options}
+    return rsfstudy.fit(read, **options)
+
+
+@pytest.mark.parametrize(
+    ("record", "options", "told"),
+    [
+        (GOOD | {"displacement": -GOOD["displacement"]}, {}, "displacement = .* Reverse its sign"),
+        (
+            GOOD | {"displacement": GOOD["friction"], "friction": GOOD["displacement"]},
+            {},
+            "displacement = .* which column is which",
+        ),
+        (
+            rsfstudy.read_record(GOOD).with_steps([(1e3, 1e3, 1.0, 10.0)]),
+            {},
+            "step 1 = .* outside of record, 0 to 50 s.*with_steps",
+        ),
+        (GOOD, {"free": (*FOUR, "alpha")}, "'alpha': needs a normal stress that changes"),
+        (
+            GOOD | {"normal_stress": np.full(ROWS, 20.0)},
+            {"free": (*FOUR, "alpha"), "loading": "recorded"},
+            "'alpha': needs a normal stress that changes",
+        ),
+        (
+            GOOD | {"normal_stress": np.linspace(20.0, 21.0, ROWS)},
+            {"free": (*FOUR, "alpha")},
+            "--loading recorded",
+        ),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(
+    record: dict[str, np.ndarray] | Record, options: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InvalidValue, match=told):
+        fitted(record, **options)
+
+
+SHORT = columns(15)
+NOISE = 0.6 + 1e-4 * np.random.default_rng(1).standard_normal(ROWS)
+
+
+@pytest.mark.parametrize(
+    ("record", "options", "told"),
+    [
+        (GOOD | {"friction": NOISE}, {}, "a, b, slip_distance"),
+        (  # displacement a thousand times too large
+            SHORT | {"friction": NOISE[:15], "displacement": 1e3 * SHORT["displacement"]},
+            {"stiffness": 2e-4, "noise": "white"},
+            "a, b, slip_distance",
+        ),
+        (
+            GOOD | {"time": GOOD["displacement"], "displacement": GOOD["time"]},
+            {},
+            "time and displacement",
+        ),
+    ],
+)
+def test_what_a_record_does_not_tell(
+    record: dict[str, np.ndarray], options: dict[str, Any], told: str
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = fitted(record, free=FOUR, **options).isel(law=0)
+    assert found.status.item() == Status.NOT_IDENTIFIED
+    assert told in found.message.item()
+    # of the 5e7 that a fit may spend
+    assert found.rhs_evaluations.item() < 1e7
+    # of what has no bounds no end is nearer than the standard error, though others are at bounds
+    ends = np.array([found.mu_star_low.item(), found.mu_star_high.item()])
+    assert not (np.abs(ends - found.mu_star.item()) < found.mu_star_stderr.item()).any()
+    assert (found.b_low.item(), found.b_high.item()) == (-1.0, 1.0)
+    assert found.a_high.item() == 1.0
+
+
+def test_friction_that_is_zeroed_is_told() -> None:
+    found = fitted(GOOD | {"friction": np.zeros(ROWS)})
+    assert found.status.item() == Status.NOT_APPLICABLE
+    assert "friction before the step is 0" in found.message.item()
+
+
+def test_steps_fitted_together_share_no_row() -> None:
+    loading = ((0.0, 1.0), (60.0, 10.0), (80.0, 1.0))
+    time = synthetic.rows(loading, synthetic.end(loading), 600)
+    record = {"time": time, "displacement": synthetic.load_point(loading, time)}
+    friction = synthetic.motion("slip", time, loading)[0]
+    friction += synthetic.correlated(600, 0.0, 1e-4, 3)
+    found = fitted(record | {"friction": friction}, together=True, noise="white")
+    assert found.rows_fitted.item() == 600  # all rows, each once
+    assert found.slip_distance.item() == pytest.approx(10.0, rel=0.02)  # 5 sd
+
+
+def test_a_warning_names_the_line_of_who_asks() -> None:
+    with pytest.warns(Incomplete) as caught:
+        fitted(GOOD, budget=100)
+    assert [one.filename for one in caught] == [__file__]
