@@ -132,3 +132,11 @@ def test_a_warning_names_the_line_of_who_asks() -> None:
     with pytest.warns(Incomplete) as caught:
         fitted(GOOD, budget=100)
     assert [one.filename for one in caught] == [__file__]
+
+
+def test_a_load_point_that_is_recorded_with_noise_takes_bounded_work() -> None:
+    record = columns(800)
+    record["displacement"] += 0.2 * np.random.default_rng(1).standard_normal(800)
+    found = fitted(record, loading="recorded")
+    assert found.status.item() == Status.OK
+    assert found.rhs_evaluations.item() < 5e6
