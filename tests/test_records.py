@@ -1,0 +1,156 @@
+"""Records from text files, from arrays, and from binary files of xlook written by its layout."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rsfstudy
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+
+TIME = np.array([0.0, 0.5, 1.0, 2.0])
+MOVED = np.array([0.0, 1.5, 3.0, 36.0])
+SHEAR = np.array([12.0, 12.5, 13.0, 12.25])
+NORMAL = np.array([20.0, 20.0, 20.5, 19.5])
+FRICTION = SHEAR / NORMAL
+
+
+def written(path: Path, headings: list[str], columns: list[np.ndarray], between: str) -> Path:
+    """A text file of columns."""
+    lines = [between.join(headings)]
+    lines += [between.join(f"{v:.12g}" for v in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("between", [",", ";", "\t"])
+def test_units_of_headings(between: str, tmp_path: Path) -> None:
+    """Millimetres, minutes and kilopascals: each column of another power, none by chance right."""
+    headings = ["Time (min)", "Displ (mm)", "Shear stress (kPa)", "Normal stress [MPa]"]
+    columns = [TIME / 60.0, MOVED * 1e-3, SHEAR * 1e3, NORMAL]
+    record = rsfstudy.read_record(written(tmp_path / "a run-2.csv", headings, columns, between))
+    told = record.columns
+    assert record.name == "a_run_2"
+    np.testing.assert_allclose(told["time"], TIME, rtol=1e-11)
+    np.testing.assert_allclose(told["displacement"], MOVED, rtol=1e-11)
+    np.testing.assert_allclose(told["friction"], FRICTION, rtol=1e-11)
+    np.testing.assert_allclose(told["normal_stress"], 1e6 * NORMAL, rtol=1e-11)
+
+
+def test_units_beside_headings_and_a_stated_normal_stress(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.txt", ["t", "lp", "tau"], [TIME, MOVED * 1e-3, SHEAR], "\t")
+    columns = {"time": "t (s)", "displacement": ("lp", "mm"), "shear_stress": "tau (MPa)"}
+    record = rsfstudy.read_record(path, columns, normal_stress="0.02 GPa", name="mine")
+    assert record.name == "mine"
+    np.testing.assert_allclose(record.columns["displacement"], MOVED, rtol=1e-11)
+    np.testing.assert_allclose(record.columns["friction"], SHEAR / 20.0, rtol=1e-11)
+    # a normal stress that was recorded is not replaced by the one stated
+    arrays = {"time": TIME, "displacement": MOVED, "shear_stress": SHEAR, "normal_stress": NORMAL}
+    both = rsfstudy.read_record(arrays, normal_stress="10 MPa")
+    np.testing.assert_allclose(both.columns["friction"], FRICTION, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("t (s),displ,mu\n0,0,0.6\n", ["displ", "states no units", "displ (um)"]),
+        ("t (s),displ (MPa),mu\n0,0,0.6\n", ["displacement", "MPa"]),
+        ("clock,displ (um),mu\n0,0,0.6\n", ["time and displacement", "columns="]),
+        ("t (s),displ (um)\n0,0\n", ["friction", "shear_stress"]),
+        ("t (s),displ (um),tau (MPa)\n0,0,1\n", ["normal stress", "20 MPa"]),
+        ("t (s),displ (um),mu\n0,0,0.6\n1,1,nan\n2,2,0.6\n", ["line 3", "column 3", "nan"]),
+        ("t (s),displ (um),mu\n0,0,0.6\n1,,0.6\n2,2,0.6\n", ["line 3", "column 2"]),
+        ("t (s),displ (um),mu\n\n0,0,0.6\n1,two,0.6\n", ["line 4", "column 2", "two"]),
+        ("t (s),displ (um),mu\n0,0,0.6\n1,1\n", ["line 3", "2 fields"]),
+        ("t (s),displ (um),mu\n0,0,0.6\n1,1,0.6\n1,2,0.6\n", ["time", "row 3", "later"]),
+        ("t (s),displ (um),mu\n0,0,0.6\n2,1,0.6\n1,2,0.6\n", ["time", "row 3", "later"]),
+        (
+            "t (s),displ (um),tau (MPa),sigma (MPa)\n0,0,1,1\n1,1,1,0\n",
+            ["normal_stress", "positive", "row 2"],
+        ),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_told_with_its_place(
+    text: str, told: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(text)
+    with pytest.raises(RsfStudyError) as error:
+        rsfstudy.read_record(path)
+    for words in told:
+        assert words in str(error.value)
+
+
+def test_what_is_wrong_in_arrays_is_told() -> None:
+    arrays = {"time": TIME, "displacement": MOVED, "friction": FRICTION}
+    for name, values, told in (
+        ("friction", [0.6, 0.6, np.nan, 0.6], "sample 3"),
+        ("displacement", MOVED[:3], "3 samples"),
+        ("time", [0.0, 1.0, 1.0, 2.0], "row 3"),
+        ("speed", MOVED, "unknown"),
+    ):
+        with pytest.raises(InvalidValue, match=told):
+            rsfstudy.read_record({**arrays, name: np.array(values)})
+
+
+def xlook(path: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
+    """A binary file of xlook: texts end at a NUL, and rubbish follows them."""
+
+    def text(told: str, size: int) -> bytes:
+        return (told.encode() + b"\0").ljust(size, b"\x7f")
+
+    data = text("p4567", 20) + struct.pack(">ii", max(len(v) for *_, v in columns), len(columns))
+    data += bytes(8)
+    for number in range(32):
+        heading, units, values = columns[number] if number < len(columns) else ("no_val", "", [])
+        data += text(heading, 13) + text(units, 13) + bytes(4) + text("remark", 50)
+        data += struct.pack(">i", len(values))
+    assert len(data) == 2724
+    for _heading, _units, values in columns:
+        data += np.asarray(values, dtype=">f4").tobytes()
+    path.write_bytes(data)
+    return path
+
+
+def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
+    """Time by differences in ms, raw bits of two columns, and one of a sample more."""
+    bits = np.array([100.0, 250.0, 400.0, 3700.0])
+    columns = [
+        ("Time", "ms", np.array([250.0, 500.0, 500.0, 1000.0])),
+        ("LP_Disp", "bit", bits),
+        ("mu", ".", np.array([*FRICTION, 0.75])),
+        ("rest", "bit", np.array([7.0])),
+    ]
+    path = xlook(tmp_path / "p4567.dat", columns)
+    chosen = {
+        "time": (1, "ms"),
+        "displacement": ("LP_Disp", "mm", 1e-5, -1e-3),
+        "friction": ("3", "1"),
+    }
+    told = rsfstudy.read_record(path, chosen).columns
+    # numbers of 32 bits have 7 digits
+    np.testing.assert_allclose(told["time"], TIME + 0.25, rtol=1e-6)
+    np.testing.assert_allclose(told["displacement"], 0.01 * bits - 1.0, rtol=1e-6)
+    np.testing.assert_allclose(told["friction"], FRICTION, rtol=1e-6)
+    scaled = rsfstudy.read_record(path, {**chosen, "displacement": ("LP_Disp", "um", 0.01)})
+    np.testing.assert_allclose(scaled.columns["displacement"], 0.01 * bits, rtol=1e-6)
+    by_text = {"time": "Time (ms)", "displacement": "LP_Disp (um)", "friction": "mu"}
+    plain = rsfstudy.read_record(path, by_text)
+    np.testing.assert_allclose(plain.columns["displacement"], bits, rtol=1e-6)
+    with pytest.raises(InvalidValue, match="differ by more than one"):
+        rsfstudy.read_record(path, {**chosen, "friction": ("rest", "1")})
+    with pytest.raises(InvalidValue, match="heads 0 columns"):
+        rsfstudy.read_record(path, {**chosen, "friction": ("tau", "1")})
+    with pytest.raises(InvalidValue, match=r"1: Time \(ms\), 2: LP_Disp \(bit\)"):
+        rsfstudy.read_record(path)
+
+
+@pytest.mark.parametrize(("length", "told"), [(2000, "headers"), (2740, "column 2")])
+def test_a_binary_file_that_is_cut(length: int, told: str, tmp_path: Path) -> None:
+    path = xlook(tmp_path / "cut", [("Time", "s", TIME), ("mu", "", FRICTION)])
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(DataError, match=told):
+        rsfstudy.read_record(path, {"time": (1, "s")})
