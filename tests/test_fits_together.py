@@ -1,0 +1,185 @@
+"""Fits of several windows as one, of of a free exponent; draws, tables and holds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+import xarray as xr
+from synthetic_records import HOLD, LAWS, STEP, TRUTH
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.analysis.fitting.joint import Joint
+from rsfstudy.analysis.fitting.model import Model
+from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.errors import Incomplete
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+
+ENOUGH = 10**9
+#: Up and back: the second step at 180 um.
+PAIR = ((0.0, 1.0), (40.0, 10.0), (54.0, 1.0))
+SHARED = ("a", "b", "slip_distance")
+OPTIONS = {"stiffness": TRUTH["stiffness"], "noise": "ar1", "engine": "compiled"}
+
+
+def record(
+    loading: tuple[tuple[float, float], ...] = STEP,
+    law: str = "slowness",
+    trend: float = 0.0,
+    seed: int = 0,
+    count: int = 400,
+    size: float = 3e-4,
+) -> Record:
+    """A record with noise correlated by .5, and a trend from its first step."""
+    times = synthetic.rows(loading, synthetic.end(loading), count)
+    moved = synthetic.load_point(loading, times)
+    friction = synthetic.motion(law, times, loading)[0] + trend * (moved - 40.0)
+    friction += synthetic.correlated(count, 0.5, size, seed)
+    arrays = {"time": times, "displacement": moved, "friction": friction}
+    steps = [(t, t, one, other) for (_, one), (t, other) in itertools.pairwise(loading)]
+    return rsfstudy.read_record(arrays, name=f"record_{seed}").with_steps(steps)
+
+
+def off(fit: xr.Dataset, name: str, true: float) -> float:
+    """By how many standard errors a parameter is off."""
+    return float((fit[name] - true) / fit[f"{name}_stderr"])
+
+
+def test_two_steps_of_a_record_share_a_law() -> None:
+    trend = 2e-5
+    one = record(PAIR, trend=trend, seed=1)
+    alone = rsfstudy.fit(one, laws=["slowness"], **OPTIONS)
+    both = rsfstudy.fit(one, laws=["slowness"], together=True, **OPTIONS).squeeze()
+    # at the second step the load point has moved by 140 um, at ten times the velocity
+    second = 0.6 + (TRUTH["a"] - TRUTH["b"]) * math.log(10.0) + 140.0 * trend
+    true = {n: TRUTH[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": second}
+    true |= {"trend1_1": trend, "trend1_2": trend}
+    for name, value in true.items():  # 4 standard errors: one of 2,000 records for seven numbers
+        assert abs(off(both, name, value)) < 4.0, name
+    for name in SHARED:
+        assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
+
+
+def test_two_records_share_a_law_and_have_trends_of_their_own() -> None:
+    records = [record(trend=2e-5, seed=1), record(trend=-3e-5, seed=2)]
+    alone = rsfstudy.fit(records, laws=["slowness"], **OPTIONS)
+    both = rsfstudy.fit(records, laws=["slowness"], together=True, **OPTIONS).squeeze()
+    true = {n: TRUTH[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": 0.6}
+    for name, value in (true | {"trend1_1": 2e-5, "trend1_2": -3e-5}).items():
+        assert abs(off(both, name, value)) < 4.0, name
+    for name in SHARED:  # two like records tell twice as much: 1/sqrt 2, as far as noise is told
+        ratio = float(both[f"{name}_stderr"] / alone[f"{name}_stderr"].mean())
+        assert ratio == pytest.approx(math.sqrt(0.5), rel=0.2), name
+
+
+def test_derivatives_of_windows_are_differences() -> None:
+    scene = Scene(
+        law="slip", a=0.01, b_over_a=1.3, normal_stress="constant", stiffness=0.03, mu_star=0.6
+    )
+    accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
+    parts = []
+    for loading in (STEP, synthetic.DOWN):
+        times = synthetic.rows(loading, synthetic.end(loading), 60)
+        pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
+        moved = synthetic.load_point(loading, times)
+        parts.append(Model(scene, times, moved, 0.0 * times, pieces, accuracy, Meter(ENOUGH)))
+    joint = Joint(tuple(parts))
+    plainly = {n: TRUTH[n] for n in ("a", "b", "slip_distance", "stiffness")}
+    values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}
+    free = ("a", "slip_distance", "mu_star_2", "trend1_1")
+    found = joint.jacobian(values, free)
+
+    def friction(name: str, by: float) -> np.ndarray:
+        moved = values[name] * math.exp(by) if name == "slip_distance" else values[name] + by
+        changed = values | {name: moved}
+        return joint.curve(changed) + joint.trend(changed)
+
+    for column, name in enumerate(free):
+        step = 1e-3 if name == "slip_distance" else 1e-5
+        exact = (friction(name, step) - friction(name, -step)) / (2.0 * step)
+        # of second order: a relative step of 1e-3 leaves 1e-6 times some tens
+        assert np.abs(found[:, column] - exact).max() < 1e-4 * np.abs(exact).max(), name
+    assert not found[:60, 2].any()  # a window knows nothing of the friction of the other
+    assert not found[60:, 3].any()
+
+
+@pytest.mark.parametrize(("law", "exponent"), [("family", 0.5), ("slip", 0.0)])
+def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
+    free = ("a", "b", "slip_distance", "mu_star", "law_exponent")
+    one = record(PAIR, law, seed=3)
+    scene = {"law_exponent": 0.7}
+    fit = rsfstudy.fit(one, laws=["family"], free=free, together=True, **OPTIONS, **scene)
+    fit = fit.squeeze()
+    low, high = (float(fit[f"law_exponent_{end}"]) for end in ("low", "high"))
+    assert low <= float(fit.law_exponent) <= high
+    assert low >= 0.0
+    assert high <= 1.0
+    assert abs(off(fit, "law_exponent", exponent)) < 4.0
+    assert float(fit.law_exponent_stderr) < 0.05  # one step tells it to some .1
+    if exponent == 0.0:
+        assert low == 0.0  # the interval ends at the bound
+
+
+def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:
+    fit = rsfstudy.fit(record(seed=4), laws=["slip"], **OPTIONS).squeeze()
+    drawn, names = fit.rsf.draw(20_000, seed=1), [str(n) for n in fit.parameter.values]
+    degrees = float(fit.degrees_of_freedom)
+    spread = np.array([drawn[n] - fit[n] for n in names]) / [
+        [float(fit[f"{n}_stderr"])] for n in names
+    ]
+    # of 20,000 draws means have standard errors of .007, covariances of .01 at most; curvature of
+    # the logarithm shifts D_c by half its relative standard error, a hundredth here
+    assert np.abs(spread.mean(axis=1)).max() < 0.05
+    exact = fit.correlation.values * degrees / (degrees - 2.0)
+    assert np.abs(np.cov(spread) - exact).max() < 0.08
+    assert (drawn.slip_distance > 0.0).all()
+    assert np.array_equal(drawn.a, fit.rsf.draw(20_000, seed=1).a)
+
+
+def test_the_table_has_the_columns_of_laboratories() -> None:
+    fit = rsfstudy.fit(record(seed=4), laws=["slip", "slowness"], **OPTIONS)
+    table = fit.rsf.table()
+    short = ("a", "b", "a_minus_b", "Dc", "mu_0", "trend")
+    columns = {*short, *(f"{n}_std" for n in short), "V0", "V1", "law", "window", "R2", "status"}
+    assert columns <= set(table.columns)
+    assert table.law.tolist() == ["slip", "slowness"]
+    assert table.Dc.tolist() == fit.slip_distance.values.ravel().tolist()
+
+
+def test_a_window_does_not_begin_within_a_hold() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Incomplete)
+        fit = rsfstudy.fit(record(HOLD, seed=3), laws=["slowness"], **OPTIONS)
+    hold, reloading = (fit.squeeze().sel(step=n) for n in (1, 2))
+    assert (float(hold.velocity_before), float(hold.velocity_after)) == (1.0, 0.0)
+    assert abs(off(hold, "a", TRUTH["a"])) < 4.0
+    assert "begins in a hold" in str(reloading.message.values)
+    assert np.isnan(float(reloading.a))
+
+
+def test_a_negative_b_is_found() -> None:
+    times = synthetic.rows(STEP, synthetic.end(STEP), 300)
+    friction = synthetic.motion("slowness", times, STEP, TRUTH | {"b": -0.004})[0]
+    arrays: dict[str, Any] = {"time": times, "displacement": synthetic.load_point(STEP, times)}
+    arrays["friction"] = friction + synthetic.correlated(300, 0.5, 2e-4, 6)
+    one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
+    fit = rsfstudy.fit(one, laws=["slowness"], **OPTIONS).squeeze()
+    assert abs(off(fit, "b", -0.004)) < 4.0
+    assert float(fit.b_high) < 0.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_is_fitted_without_the_compiled_engine(law: str) -> None:
+    free, scene = ("a", "b", "slip_distance"), {"law_exponent": 0.5} if law == "family" else {}
+    options = {**OPTIONS, "engine": "scipy", "noise": "white"}
+    one = record(law=law, count=100, size=2e-4)
+    fit = rsfstudy.fit(one, laws=[law], free=free, **options, **scene).squeeze()
+    for name in free:
+        assert abs(off(fit, name, TRUTH[name])) < 5.0, name  # noise is correlated, and taken white
