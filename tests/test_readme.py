@@ -5,6 +5,7 @@ their numbers are ours.
 import ast
 import functools
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -26,7 +27,13 @@ FILE = next(i for i, block in enumerate(BLOCKS) if "study = Study(" in block)
 
 
 def test_the_readme_is_read_in_a_few_minutes():
-    assert len(FILES[0].read_text().splitlines()) <= 170
+    """Sentences too: of what is neither code, nor a table, nor a place to go to."""
+    text = FILES[0].read_text()
+    assert len(text.splitlines()) <= 150
+    prose = re.sub(r"(?ms)^```.*?^```$|^\|.*?$|^#.*?$|<!--.*?-->", "\n\n", text)
+    prose = re.sub(r"\]\([^)]*\)", "]", prose)
+    said = re.split(r"(?<=[.?:])\*{0,2}\s+(?=[A-Z`])|\n\n|^- ", prose, flags=re.MULTILINE)
+    assert [sentence for sentence in said if len(sentence.split()) > 25] == []
 
 
 def test_links_lead_somewhere():
@@ -47,6 +54,14 @@ def test_there_are_examples():
     assert len(BLOCKS) >= 4
 
 
+def lay_record(folder: Path) -> None:
+    """The record of the examples where they look for it: in a checkout, or beside its page."""
+    pages = folder / "studies" / "pages"
+    pages.mkdir(parents=True)
+    for place in (folder, pages):
+        shutil.copy(ROOT / "studies" / "pages" / "step.csv", place)
+
+
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
 def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch):
     """In an empty directory, on workers that are there already; where it uses the results of a
@@ -63,14 +78,45 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
         _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
         (tmp_path / "outputs").mkdir()
         shutil.copy(file, tmp_path / "outputs")
-    if '"step.csv"' in code:
-        shutil.copy(FILES[0].parent / "studies" / "pages" / "step.csv", tmp_path)
+    if "step.csv" in code:
+        lay_record(tmp_path)
     monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
     names = {"__name__": "block"}
     exec(compile(code, f"block {number}", "exec"), names)
     for name, test in list(names.items()):
         if name.startswith("test_"):
             test()
+
+
+PRINTS = re.findall(r"```python\n([^`]*)```\n\n```text\n(.*?)```", FILES[0].read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize(("code", "told"), PRINTS, ids=["cycle", "fit"])
+def test_the_readme_prints_what_it_says(code, told, tmp_path, monkeypatch, capsys):
+    """To one in the last digit: another machine may round it otherwise."""
+    lay_record(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "README.md", "exec"), {})
+    ours, theirs = (text.split() for text in (capsys.readouterr().out, told))
+    assert len(ours) == len(theirs)
+    for one, other in zip(ours, theirs, strict=True):
+        if re.fullmatch(r"\d+\.\d+", other):
+            last = 10.0 ** -len(other.split(".")[1])
+            assert float(one) == pytest.approx(float(other), abs=1.01 * last)
+        else:
+            assert one == other
+
+
+def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
+    """And is that of the page on fits, whose output is checked, but for where the record is."""
+    texts = (FILES[0].read_text(), (ROOT / "studies" / "pages" / "fits.md").read_text())
+    here, there = (re.search(r"^rsfstudy fit .*$", text, re.MULTILINE)[0] for text in texts)
+    assert here == there.replace("step.csv", "studies/pages/step.csv")
+    lay_record(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    ran = call(*shlex.split(here)[1:])
+    assert ran.returncode == 0, ran.stderr
+    assert {"fit.png", "fit.nc"} <= {file.name for file in tmp_path.iterdir()}
 
 
 def test_commands_and_options_exist():
