@@ -4,6 +4,7 @@ their numbers are ours.
 
 import ast
 import functools
+import inspect
 import re
 import shlex
 import shutil
@@ -13,7 +14,9 @@ import pytest
 from running import call, named_results
 
 import rsfstudy
+from rsfstudy import measures, reduce
 from rsfstudy.cli.command_line import cli
+from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider import laws
 from rsfstudy.slider.parts import names_of
 
@@ -117,6 +120,20 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
     ran = call(*shlex.split(here)[1:])
     assert ran.returncode == 0, ran.stderr
     assert {"fit.png", "fit.nc"} <= {file.name for file in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("base", "example", "written"),
+    [
+        (laws.Law, laws.PARTS["slowness"], ("evolution", "numbers", "check")),
+        (measures.Measure, CriticalStep, ("find", "scales")),
+        (reduce.Reduction, reduce.Reduction, ("__call__", "derivatives")),
+    ],
+)
+def test_help_states_the_signatures_of_what_one_writes(base, example, written):
+    for name in written:
+        takes = ", ".join(inspect.signature(getattr(example, name)).parameters)
+        assert f"    {name}({takes}) -> " in base.__doc__
 
 
 def test_commands_and_options_exist():

@@ -65,7 +65,23 @@ TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS,
 
 @dataclass(frozen=True)
 class Measure:
-    """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status."""
+    """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.
+
+    What one writes, in a frozen dataclass whose fields are the options of the measure::
+
+        name: ClassVar[str]                       # what it is called
+        headline: str                             # the number it is about
+        outputs: Sequence[Output]                 # its numbers, with units and error estimates
+        typical_work: int                         # right-hand sides of a cell
+        find(self, scene, accuracy, meter) -> Outcome
+
+    `find` returns ``Outcome(status, values)``. `values` has a number for each name of `outputs`,
+    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds what is asked
+    for (``accuracy.rtol``), and motions charge `meter`, which stops one that takes too much work.
+    Optional is what makes a cell ``unverified`` where its estimates are far too large::
+
+        scales(self, scene, values) -> Mapping[str, float]
+    """
 
     #: File and registry name.
     name: ClassVar[str]

@@ -25,7 +25,20 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Reduction:
-    """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables."""
+    """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables.
+
+    What one writes, in a frozen dataclass whose fields beside `name` and `of` are its options::
+
+        kind: ClassVar[str]
+        __call__(self, dataset) -> xarray.Dataset
+
+    `name` is what the result is called, and `of` the variable that is reduced. Cells that failed
+    hold NaN in `dataset`, which has their `status`. Optional are what tells names and units, and
+    what carries numerical errors of cells over to ``<name>_error``::
+
+        quantities: property -> Sequence[Quantity]
+        derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
+    """
 
     #: Name of the kind in declarations.
     kind: ClassVar[str]

@@ -145,7 +145,22 @@ class LawOfStates(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Law(LawOfStates):
-    """Base of the laws with one b."""
+    """Base of the laws with one b.
+
+    What one writes, a plain function of floats, kept as ``evolution = staticmethod(evolution)``::
+
+        evolution(log_rate, state, p) -> float
+
+    It returns dTheta per unit of slip in D_c, at constant normal stress. `log_rate` is ln(V/V_*)
+    and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`); numbers of the law's own
+    follow it. A law that has some adds fields, by `rsfstudy.slider.parts.number`, and::
+
+        numbers(self, scene) -> tuple[float, ...]
+        check(self, scene) -> None
+
+    The first returns ``(*super().numbers(scene), ...)``, the second raises `InvalidValue`. The law
+    is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`.
+    """
 
     b_over_a: float = number(
         2.0,

@@ -55,6 +55,14 @@ class Segment(NamedTuple):
 class Loading(Part):
     """Base of the loading histories.
 
+    What one writes, in a frozen dataclass whose fields are made by `rsfstudy.slider.parts.number`::
+
+        name: ClassVar[str]
+        segments: property -> tuple[Segment, ...]
+
+    ``Segment(load_velocity, displacement=0, duration=inf, normal_stress=0)`` is in V_*, D_c,
+    D_c/V_* and sigma_*. The last segment goes on for ever.
+
     One that goes on changing normal stress says by which unknowns: the last of them takes from
     imposed normal stress, over sigma_*, as pore pressure does. It states `auxiliary_rates` and
     `auxiliary_steady_states` as a fluid does (see `fluid`), all unknowns being 0 in steady sliding,
