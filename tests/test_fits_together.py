@@ -183,3 +183,13 @@ def test_a_law_is_fitted_without_the_compiled_engine(law: str) -> None:
     fit = rsfstudy.fit(one, laws=[law], free=free, **options, **scene).squeeze()
     for name in free:
         assert abs(off(fit, name, TRUTH[name])) < 5.0, name  # noise is correlated, and taken white
+
+
+def test_the_scene_of_a_fit_moves_as_fitted() -> None:
+    """Stepped as the record was, since a scene of a fit is that of the sliding before the step."""
+    fit = rsfstudy.fit(record(seed=4), laws=["slowness"], **OPTIONS).squeeze()
+    scene, rows = fit.rsf.scene.with_(load_velocity_ratio=10.0), fit.record_time.values > 40.0
+    times = (fit.record_time.values[rows] - 40.0) / float(fit.slip_distance)
+    motion = rsfstudy.simulate(scene, times=times, engine="compiled")
+    seen, fitted = motion.friction_coefficient.values, fit.detrended_friction.values[rows]
+    assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some
