@@ -96,7 +96,9 @@ PRINTS = re.findall(r"```python\n([^`]*)```\n\n```text\n(.*?)```", FILES[0].read
 
 @pytest.mark.parametrize(("code", "told"), PRINTS, ids=["cycle", "fit"])
 def test_the_readme_prints_what_it_says(code, told, tmp_path, monkeypatch, capsys):
-    """To one in the last digit: another machine may round it otherwise."""
+    """To one in the last digit, or a small part of what fits are known to: another machine may
+    round them otherwise.
+    """
     lay_record(tmp_path)
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "README.md", "exec"), {})
@@ -105,7 +107,7 @@ def test_the_readme_prints_what_it_says(code, told, tmp_path, monkeypatch, capsy
     for one, other in zip(ours, theirs, strict=True):
         if re.fullmatch(r"\d+\.\d+", other):
             last = 10.0 ** -len(other.split(".")[1])
-            assert float(one) == pytest.approx(float(other), abs=1.01 * last)
+            assert float(one) == pytest.approx(float(other), rel=1e-4, abs=1.01 * last)
         else:
             assert one == other
 

@@ -341,7 +341,8 @@ class Fit(Measure):
 
     def _window(self, record: Record, step: Step) -> tuple[float, float]:
         """Times in s between which rows are fitted."""
-        later = [s for s in record.found if s.begins > step.ends]
+        # a hold is fitted with the sliding that ends it
+        later = [s for s in record.found if s.begins > step.ends and (step.after or s.before)]
         last = later[0].begins if later else record.time[-1]
         if later and (record.name, record.found.index(later[0]) + 1) in self.together:
             # no row is fitted twice

@@ -232,6 +232,7 @@ class Search:
                 raise Halt(Status.INTEGRATION_FAILED, text)
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
             beyond = np.clip(x + moved, self.low, self.high)
+            moved = beyond - x
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
                 x = beyond
             if number + 1 >= _POLISHED[0] and _is_still(moved, whitened, _DONE):
