@@ -420,7 +420,7 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
 
 def test_compiling_is_not_in_the_time_of_a_cell(monkeypatch):
     monkeypatch.setattr(compiling, "seconds", compiling.seconds)
-    task = cells.Task(Compiles(), Accuracy())
+    task = cells.Task(Scene(), Compiles(), Accuracy())
     assert cells.computed(task, Cell(Scene(), {}))[1] < -900.0
 
 

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from running import called, cell_key, run
+from running import called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
-from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
@@ -114,17 +113,6 @@ LATTICE = (
     RIG.axis("stiffness", ["0.01 MPa/um", "0.03 MPa/um"]),
     RIG.axis("hold_time", ["0 s", "10 s"]),
 )
-
-
-def test_planning_makes_the_scenes_that_cells_have():
-    """Cells are planned as columns of numbers, and made one by one: to the same last bit."""
-    made = study(*LATTICE, initial_stress="50 kPa")
-    plan = Plan(made)
-    cells = [cell for rows in plan.table.rows(np.arange(made.size)) for cell in rows.cells()]
-    order = plan.table.ordered(np.arange(made.size))
-    for number, cell in zip(order.tolist(), cells, strict=True):
-        assert cell.scene == made.scene(number)
-        assert cell_key(made.scene(number), made.measure) == plan.named(np.array([number]))[0]
 
 
 OTHER = {

@@ -3,6 +3,7 @@ starts.
 """
 
 import json
+import pickle
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from running import cell_key
 
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Batch, Plan
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
@@ -157,18 +159,22 @@ MIXED = Study(
 
 
 @pytest.mark.parametrize("name", ["mixed", *names.names()])
-def test_what_travels_in_columns_is_what_the_declaration_says(name):
-    """The name of each cell, its scene, and what it changes of the measure; of large lattices, for
-    a sample of their cells.
+def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
+    """What is sent are the name of each cell and what it changes of scene and measure; of large
+    lattices, a sample of the cells.
     """
     study = MIXED if name == "mixed" else catalogue.load(name)
     plan = Plan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
-    batch = Batch(plan, plan.table.ordered(numbers))
-    sent = dict(zip(batch.keys, (c for rows in batch.rows() for c in rows.cells()), strict=True))
-    for cell_number in numbers.tolist():
-        scene, changes = study.cell(cell_number)
-        key = cell_key(scene, study.measure.with_(**changes))
-        assert plan.keys[cell_number].tobytes() == key
-        assert sent[key] == (scene, changes)
-        assert sent[key].scene.numbers == scene.numbers
+    task = cells.Task(study.base, study.measure, study.accuracy)
+    monkeypatch.setattr(cells, "_received", lambda _sent: task)
+    monkeypatch.setattr(cells, "_WORKER_HANDS_OVER", np.inf)
+    monkeypatch.setattr(task.layout, "finished", lambda *finished: finished)
+    monkeypatch.setattr(cells, "computed", lambda _task, cell: (cell, 0.0))
+    found = pickle.loads(cells.on_worker(b"", cells.packed(Batch(plan, numbers))))
+    for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
+        scene, changes = study.cell(place)
+        assert plan.keys[place].tobytes() == key
+        assert cell_key(scene, study.measure.with_(**changes)) == key
+        assert cell == (scene, changes)
+        assert cell.scene.numbers == scene.numbers

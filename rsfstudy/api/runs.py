@@ -166,6 +166,7 @@ def prepared(
     """
     check_engine(study.accuracy.engine)
     task = Task(
+        study.base,
         study.measure,
         study.accuracy,
         workers.time_limit,

@@ -6,7 +6,6 @@ import contextlib
 import faulthandler
 import functools
 import importlib
-import itertools
 import pickle
 import signal
 import threading
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING
 import cloudpickle
 
 from rsfstudy.compute import code_digest, provenance
-from rsfstudy.declare.cell import Cell, Rows
+from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.names import PACKAGE
 from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError, brief
@@ -53,10 +52,12 @@ FinishedCells = list[Finished]
 
 @dataclass(frozen=True)
 class Task:
-    """Measure, accuracy and conditions that every cell is computed with.
+    """Scene, measure, accuracy and conditions that every cell is computed with.
 
     Parameters
     ----------
+    base : Scene
+        Each cell says what it changes of its fields.
     measure : Measure
         Each cell says what it changes of its fields.
     accuracy : Accuracy
@@ -73,6 +74,7 @@ class Task:
         The process that made the task.
     """
 
+    base: Scene
     measure: Measure
     accuracy: Accuracy
     time_limit: float = TIME_LIMIT
@@ -99,7 +101,8 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
     """
     finished: FinishedCells = []
     handed_over, since = 0, time.monotonic()
-    for key, cell in itertools.chain.from_iterable(map(_cells_of, batches)):
+    for key, changes in (cell for batch in batches for cell in batch.cells()):
+        cell = changes.of(task.base)
         outcome, seconds = computed(task, cell, let_through=(KeyboardInterrupt,))
         finished.append(task.layout.finished(key, outcome, seconds))
         if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER:
@@ -107,15 +110,6 @@ def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
             handed_over += len(finished)
             finished, since = [], time.monotonic()
     yield finished
-
-
-def _cells_of(batch: Batch) -> Iterator[tuple[bytes, Cell]]:
-    return _named(batch.keys, batch.rows())
-
-
-def _named(keys: Iterable[bytes], rows: Iterable[Rows]) -> Iterator[tuple[bytes, Cell]]:
-    """Cells by their names."""
-    return zip(keys, itertools.chain.from_iterable(map(Rows.cells, rows)), strict=True)
 
 
 def sendable(task: Task) -> bytes:
@@ -180,15 +174,13 @@ def _received(sent: bytes) -> Task:
 
 def packed(batch: Batch) -> bytes:
     """A batch in as few bytes as possible, because Dask's scheduler keeps what it has passed on.
-    Scenes are sent as columns of numbers; a worker has their parts from the task.
+    Parts of the user's own are sent by their names; a worker has them from the task.
     """
-    rows = [(rows.head.as_dict(), *rows[1:]) for rows in batch.rows()]
-    return zlib.compress(pickle.dumps((batch.keys, rows)), level=1)
-
-
-def _unpacked(batch: bytes) -> Iterator[tuple[bytes, Cell]]:
-    keys, rows = pickle.loads(zlib.decompress(batch))
-    return _named(keys, (Rows(Scene(**values), *others) for values, *others in rows))
+    cells = [
+        (key, {n: getattr(v, "name", v) for n, v in of_scene.items()}, of_measure)
+        for key, (of_scene, of_measure) in batch.cells()
+    ]
+    return zlib.compress(pickle.dumps(cells), level=1)
 
 
 def on_worker(sent: bytes, batch: bytes) -> bytes:
@@ -214,7 +206,8 @@ def on_worker(sent: bytes, batch: bytes) -> bytes:
     with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
         registry.register(task.parts)
         engines.know(task.steppers)
-        for key, cell in _unpacked(batch):
+        for key, *changes in pickle.loads(zlib.decompress(batch)):
+            cell = Changes(*changes).of(task.base)
             finished.append(task.layout.finished(key, *computed(task, cell)))
             if time.monotonic() - began > _WORKER_HANDS_OVER:
                 break

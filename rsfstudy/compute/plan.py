@@ -2,63 +2,47 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.cell import Rows
+from rsfstudy.declare.cell import Changes
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.table import Table
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.slider.scene import Scene
 
-_KEY = np.dtype("V16")
+#: Of the names of cells.
+KEY = np.dtype("V16")
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: Time a batch should last in s, and the most cells it may hold: as many are lost with the machine.
 _SECONDS_PER_TASK, LARGEST_BATCH = 0.3, 5000
 #: Typical time of one right-hand side in s, by engine, with its share of everything else.
 _SECONDS_PER_RHS = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
-#: Cells that are named at a time: their numbers are in memory meanwhile.
-_NAMED_AT_A_TIME = 50_000
 
 
-def _values(scene: Scene, measure: Measure) -> dict[tuple[str, str], Any]:
-    """All that a cell is named by: the exact values of its scene and of its measure's fields."""
-    of_scene = {("scene", name): value for name, value in scene.as_dict().items()}
-    return of_scene | {("measure", name): value for name, value in measure.plain_fields.items()}
+def key(scene: Scene, measure: Measure) -> bytes:
+    """Name of a cell: a digest of the exact values of its scene and of its measure's fields."""
+    of_scene, of_measure = scene.as_dict(), measure.plain_fields
+    values = (*of_scene.values(), *of_measure.values())
+    floats = [value for value in values if type(value) is float]
+    others = tuple(None if type(value) is float else value for value in values)
+    digest = _begun(tuple(of_scene), tuple(of_measure), others).copy()
+    digest.update(struct.pack(f"<{len(floats)}d", *floats))
+    return bytes(digest.digest()[: KEY.itemsize])
 
 
-def _digests(
-    values: Mapping[tuple[str, str], Any], names: Sequence[str], columns: np.ndarray
-) -> Iterator[bytes]:
-    """The names of cells: of all that is no float as text, then of the bytes of each float.
-
-    Parameters
-    ----------
-    values : mapping
-        Those of one cell.
-    names : sequence of str
-        Fields of the scene in which the cells differ from it,
-    columns : ndarray, shape (fields, cells)
-        and what they hold.
-    """
-    floats = {name: value for name, value in values.items() if type(value) is float}
-    text = [(name, None if name in floats else value) for name, value in values.items()]
-    begun = hashlib.sha256(repr(text).encode())
-    table = np.empty((columns.shape[1], len(floats)), dtype="<f8")
-    table[:] = list(floats.values())
-    places = {name: place for place, name in enumerate(floats)}
-    for name, column in zip(names, columns, strict=True):
-        table[:, places["scene", name]] = column
-    width, numbers = table.strides[0], table.tobytes()
-    for start in range(0, width * len(table), width):
-        digest = begun.copy()
-        digest.update(numbers[start : start + width])
-        yield digest.digest()[: _KEY.itemsize]
+@functools.lru_cache(maxsize=256)
+def _begun(of_scene: tuple[str, ...], of_measure: tuple[str, ...], values: tuple[Any, ...]) -> Any:
+    """Digest of the fields of a cell and of what they hold that is no float."""
+    names = [*(("scene", n) for n in of_scene), *(("measure", n) for n in of_measure)]
+    return hashlib.sha256(repr(list(zip(names, values, strict=True))).encode())
 
 
 class Plan:
@@ -70,8 +54,6 @@ class Plan:
 
     Attributes
     ----------
-    table : Table
-        The cells as columns of numbers.
     keys : ndarray of bytes, shape (cells,)
         Name of each cell; equal cells have the same name.
     different : ndarray of int
@@ -86,49 +68,47 @@ class Plan:
     """
 
     def __init__(self, study: Study) -> None:
-        self.study, self.table = study, Table(study)
+        self.study = study
+        self.keys = np.empty(study.size, dtype=KEY)
         examples = dict[tuple[type, ...], Scene]()
-        for block in self.table.blocks:
-            examples.setdefault(block.head.layout.kinds, block.head)
+        number = 0
+        try:
+            for scene, changes in study.cells():
+                self.keys[number] = key(scene, study.measure.with_(**changes))
+                examples.setdefault(scene.layout.kinds, scene)
+                number += 1
+        except InvalidValue as error:
+            raise _counted(study, number, error) from None
         self.examples = list(examples.values())
-        self.keys = np.empty(study.size, dtype=_KEY)
-        for start in range(0, study.size, _NAMED_AT_A_TIME):
-            self._name(np.arange(start, min(start + _NAMED_AT_A_TIME, study.size)))
-        self.different = _first_of_equals(self.keys)
+        self.different = np.sort(np.unique(self.keys, return_index=True)[1])
 
     def named(self, numbers: np.ndarray) -> list[bytes]:
         """Names of some cells."""
-        names, width = self.keys[numbers].tobytes(), _KEY.itemsize
+        names, width = self.keys[numbers].tobytes(), KEY.itemsize
         return [names[at : at + width] for at in range(0, len(names), width)]
 
-    def _name(self, numbers: np.ndarray) -> None:
-        """Name these cells."""
-        for at, block, rows in self.table.split(numbers):
-            columns = self.table.columns(block, rows)
-            for some, measure in self._measures(rows):
-                values, those = _values(block.head, measure), columns[:, some]
-                names = b"".join(_digests(values, block.names, those))
-                self.keys[numbers[at[some]]] = np.frombuffer(names, dtype=_KEY)
 
-    def _measures(self, rows: Sequence[np.ndarray]) -> Iterator[tuple[np.ndarray, Measure]]:
-        """Places of the cells with the same changes of the measure, and the measure there."""
-        places: dict[str, list[int]] = {}
-        changes = self.table.changes(rows) or [{}]
-        for place, changed in enumerate(changes):
-            places.setdefault(repr(changed), []).append(place)
-        everywhere = np.arange(len(rows[0]))
-        for same in places.values():
-            some = everywhere if len(places) == 1 else np.array(same)
-            yield some, self.study.measure.with_(**changes[same[0]])
-
-
-def _first_of_equals(keys: np.ndarray) -> np.ndarray:
-    """Places of the names that differ: of equal ones, the first."""
-    halves = keys.view("<u8").reshape(-1, 2)
-    order = np.lexsort(halves.T)  # which keeps the order of equals
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(halves[order], axis=0) != 0).any(axis=1)
-    return np.sort(order[new])
+def _counted(study: Study, number: int, first: InvalidValue) -> InvalidValue:
+    """The error of a cell that is no meaningful scene; where its axis is of samples or cases, with
+    how many of them are none.
+    """
+    if number == study.size:
+        return first
+    place = np.unravel_index(number, study.shape)
+    for varied, axis in enumerate(study.axes):
+        if not axis.is_numbered:
+            continue
+        along = (np.arange(len(axis)) if at == varied else n for at, n in enumerate(place))
+        names = []
+        for cell in np.ravel_multi_index(np.broadcast_arrays(*along), study.shape):
+            try:
+                study.cell(int(cell))
+            except InvalidValue as error:
+                names.append(error.name)
+        by = ", ".join(f"{n} in {names.count(n)}" for n in sorted(set(names)))
+        told = f"{len(names)} of {len(axis)} points of the axis {axis.dimension}"
+        return first.at(f"{told} ({len(names) / len(axis):.2g}) make no meaningful scene, by {by}")
+    return first
 
 
 class Batch:
@@ -138,7 +118,7 @@ class Batch:
     ----------
     plan : Plan
     numbers : ndarray of int
-        Which, block after block.
+        Which.
     """
 
     def __init__(self, plan: Plan, numbers: np.ndarray) -> None:
@@ -160,9 +140,9 @@ class Batch:
         """Names of the cells."""
         return self._plan.named(self._numbers)
 
-    def rows(self) -> list[Rows]:
-        """The cells as columns of numbers."""
-        return list(self._plan.table.rows(self._numbers))
+    def cells(self) -> Iterator[tuple[bytes, Changes]]:
+        """The cells by their names, each as what it changes of the study's scene and measure."""
+        return zip(self.keys, map(self._plan.study.changes, self._numbers.tolist()), strict=True)
 
 
 class Batches(Iterator[Batch]):
@@ -191,7 +171,7 @@ class Batches(Iterator[Batch]):
         if not len(numbers):
             raise StopIteration
         self._next += len(numbers)
-        return Batch(self._plan, self._plan.table.ordered(numbers))
+        return Batch(self._plan, numbers)
 
     def size(self) -> int:
         """Cells in the next batch: one, until some are finished."""

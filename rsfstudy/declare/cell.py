@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from rsfstudy.slider.scene import Scene
 
@@ -17,29 +14,12 @@ class Cell(NamedTuple):
     changes: dict[str, Any]
 
 
-class Rows(NamedTuple):
-    """Cells of one block, as they are sent: a scene and the numbers in which theirs differ.
+class Changes(NamedTuple):
+    """What the axes change in a cell: fields of the base scene, and fields of the measure."""
 
-    Attributes
-    ----------
-    head : Scene
-        One of the block.
-    names : tuple of str
-        The fields that vary,
-    columns : ndarray of float64, shape (fields, cells)
-        and their values.
-    changes : sequence of dict
-        What each cell changes of the fields of the measure; empty where none does.
-    """
+    of_scene: dict[str, Any]
+    of_measure: dict[str, Any]
 
-    head: Scene
-    names: tuple[str, ...]
-    columns: np.ndarray
-    changes: Sequence[dict[str, Any]] = ()
-
-    def cells(self) -> Iterator[Cell]:
-        """Each cell with its scene."""
-        rows = self.columns.T.tolist()
-        changes = self.changes or [{}] * len(rows)
-        for row, changed in zip(rows, changes, strict=True):
-            yield Cell(self.head.with_numbers(dict(zip(self.names, row, strict=True))), changed)
+    def of(self, base: Scene) -> Cell:
+        """The cell."""
+        return Cell(base.with_(**self.of_scene), self.of_measure)

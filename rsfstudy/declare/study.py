@@ -7,7 +7,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from rsfstudy.declare import checks
 from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain_values, select, spread
-from rsfstudy.declare.cell import Cell
+from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
@@ -41,6 +41,9 @@ from rsfstudy.slider.registry import (
     without_meaning,
 )
 from rsfstudy.slider.scene import Scene
+
+#: Fields that decide what fills a slot.
+_CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,9 +213,7 @@ class Study:
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
     def fields_of(self, row: Row) -> Row:
-        """The fields of a scene that differ from the base where axes have these values, or arrays
-        of numbers.
-        """
+        """The fields of a scene that differ from the base where axes have these values."""
         return self.rig.fields(row) if self.rig else row
 
     @property
@@ -253,10 +254,6 @@ class Study:
             cell = self._cell(rows)
             unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
             yield cell
-        self.refuse(unused)
-
-    def refuse(self, unused: Collection[str]) -> None:
-        """Raise InvalidValue where an axis varies one of these fields, which no cell has."""
         for axis in self.axes:
             for name in axis.fields:
                 if name in unused:
@@ -264,8 +261,16 @@ class Study:
 
     def cell(self, number: int) -> Cell:
         """One cell, by its number in row-major order."""
+        return self._cell(self._at(number))
+
+    def changes(self, number: int) -> Changes:
+        """What the axes change in one cell, of which no scene is made here."""
+        return self._changes(self._at(number))
+
+    def _at(self, number: int) -> list[Row]:
+        """The row of each axis that makes a cell."""
         places = np.unravel_index(number, self.shape)
-        return self._cell([axis.rows[i] for axis, i in zip(self.axes, places, strict=True)])
+        return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
 
     def scenes(self) -> Iterator[Scene]:
         """The scene of each cell, in row-major order; raises as `cells` does."""
@@ -290,17 +295,22 @@ class Study:
                 split[name not in self.of_scene][name] = value
         return split
 
-    def _cell(self, rows: Sequence[Row]) -> Cell:
-        given, changes = self.split(rows)
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
+        return self.base.as_dict()
+
+    def _changes(self, rows: Sequence[Row]) -> Changes:
+        given, of_measure = self.split(rows)
         # a row that states a choice together with a field it makes meaningless must be refused
-        stated = {name for row in rows if set(row) & {*SLOT_NAMES, *CALLERS} for name in row}
-        parts = self.own_parts
+        stated = {name for row in rows if not _CHOOSING.isdisjoint(row) for name in row}
+        of_scene, parts = self.fields_of(given), self.own_parts
+        values = by_class({**self._shared, **of_scene}, parts)
+        meaningless = without_meaning(values, parts.values()) - stated
+        return Changes({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
+
+    def _cell(self, rows: Sequence[Row]) -> Cell:
         try:
-            of_scene = self.fields_of(given)
-            values = by_class({**self.base.as_dict(), **of_scene}, parts)
-            meaningless = without_meaning(values, parts.values()) - stated
-            of_scene = {name: values[name] for name in of_scene if name not in meaningless}
-            return Cell(self.base.with_(**of_scene), changes)
+            return self._changes(rows).of(self.base)
         except InvalidValue as error:
             place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
             raise error.at(f"cell {place}") from error
