@@ -7,7 +7,7 @@ from running import command, ended
 
 import rsfstudy
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, RunError
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -189,7 +189,7 @@ class Failing(Reduction):
     unfit = DECLARATION.replace(
         "measure=", 'reductions=[Failing(name="s", of="critical_displacement")], measure='
     )
-    with pytest.raises(DataError, match="ZeroDivisionError: on numbers.*without reductions"):
+    with pytest.raises(RunError, match="cannot be reduced .ZeroDivisionError: on numbers"):
         rsfstudy.run(written(tmp_path, failing + unfit), output=tmp_path, progress=False, workers=0)
-    kept = rsfstudy.open(tmp_path / "mine.unreduced.nc")
+    kept = rsfstudy.open(tmp_path / "mine.partial.nc")
     assert kept.critical_displacement.notnull().all()

@@ -18,8 +18,7 @@ from rsfstudy.measures import Measure
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.slider.scene import Scene
 
-#: Of the names of cells.
-KEY = np.dtype("V16")
+_KEY = np.dtype("V16")
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: Time a batch should last in s, and the most cells it may hold: as many are lost with the machine.
 _SECONDS_PER_TASK, LARGEST_BATCH = 0.3, 5000
@@ -35,7 +34,7 @@ def key(scene: Scene, measure: Measure) -> bytes:
     others = tuple(None if type(value) is float else value for value in values)
     digest = _begun(tuple(of_scene), tuple(of_measure), others).copy()
     digest.update(struct.pack(f"<{len(floats)}d", *floats))
-    return bytes(digest.digest()[: KEY.itemsize])
+    return bytes(digest.digest()[: _KEY.itemsize])
 
 
 @functools.lru_cache(maxsize=256)
@@ -69,7 +68,7 @@ class Plan:
 
     def __init__(self, study: Study) -> None:
         self.study = study
-        self.keys = np.empty(study.size, dtype=KEY)
+        self.keys = np.empty(study.size, dtype=_KEY)
         examples = dict[tuple[type, ...], Scene]()
         number = 0
         try:
@@ -84,7 +83,7 @@ class Plan:
 
     def named(self, numbers: np.ndarray) -> list[bytes]:
         """Names of some cells."""
-        names, width = self.keys[numbers].tobytes(), KEY.itemsize
+        names, width = self.keys[numbers].tobytes(), _KEY.itemsize
         return [names[at : at + width] for at in range(0, len(names), width)]
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -193,12 +193,16 @@ class Run:
 
     def _finished(self, journal: Journal) -> xr.Dataset:
         zarr = self.keeping.format == "zarr"
-        with self._reducing(journal):
+        try:
             results = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
+        except RsfStudyError:
+            raise
+        except Exception as error:  # of a reduction
+            raise RunError(f"cannot be reduced ({type(error).__name__}: {error})") from error
         if self.keeping.output is None:
             return store.clean_attributes(results)
         written = results if zarr else store.write(results, self.path(".nc"))
-        for stale in (".partial.nc", ".partial.png", ".unreduced.nc", ".unreduced.png"):
+        for stale in (".partial.nc", ".partial.png"):
             self.path(stale).unlink(missing_ok=True)
         return written
 
@@ -216,27 +220,12 @@ class Run:
 
         return pieces.write(self.study, read, self.about, self._reduced, self.path(".zarr"))
 
-    @contextlib.contextmanager
-    def _reducing(self, journal: Journal) -> Iterator[None]:
-        """Write the cells without reductions where a reduction raises."""
-        try:
-            yield
-        except RsfStudyError:
-            raise
-        except Exception as error:
-            text = f"{self.study.name}: cannot be reduced ({type(error).__name__}: {error})"
-            if self.keeping.output is None:
-                raise RunError(f"{text}.") from error
-            path = self.path(".unreduced.nc")
-            store.write(self.lattice(journal), path)
-            raise DataError(f"{text}; its cells are in {path}, without reductions.") from error
-
     def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
         """Write what is finished, and give the error for a run that ended early."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.keeping.output is not None and self.keeping.format == "netcdf":
             lattice = self.lattice(journal)
-            with contextlib.suppress(Exception):  # a reduction may not bear missing cells
+            with contextlib.suppress(Exception):  # a reduction may not bear missing cells, or any
                 lattice = self._reduced(lattice)
             try:
                 store.write(lattice, self.path(".partial.nc"))

@@ -8,17 +8,15 @@ its own is blamed.
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 import os
 import pickle
 import time
 import warnings
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from rsfstudy.compute.cells import (
@@ -114,13 +112,18 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
     """
 
     def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
-        sent, waiting = sendable(task), _Waiting(batches)
+        sent, new = sendable(task), iter(batches)
+        left: list[Batch] = []  # of batches that a worker returned before their end
         running: dict[Any, Batch] = {}
         suspects: list[Batch] = []
         try:
             while True:
-                if not suspects:
-                    _fill(client, sent, waiting, running)
+                # no more than keeps the workers busy: the rest would fill the scheduler's memory
+                for _ in range(0 if suspects else 4 + 2 * threads(client) - len(running)):
+                    some = left.pop() if left else next(new, None)
+                    if some is None:
+                        break
+                    running[client.submit(on_worker, sent, packed(some), pure=False)] = some
                 if running:
                     for future in _finished(client, running):
                         batch = running.pop(future)
@@ -128,7 +131,8 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                         if finished is None:
                             suspects += batch.singly()
                         else:
-                            waiting.back(batch.after(len(finished)))
+                            if len(finished) < len(batch):
+                                left.append(batch.after(len(finished)))
                             yield finished
                 elif suspects:
                     warnings.warn(
@@ -145,28 +149,6 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
             client.cancel(list(running))
 
     return mapper
-
-
-class _Waiting(Iterator[Batch]):
-    """Batches that are not sent yet; the rest of one that a worker returned comes first."""
-
-    def __init__(self, batches: Iterable[Batch]) -> None:
-        self._new = iter(batches)
-        self._left: list[Batch] = []
-
-    def __next__(self) -> Batch:
-        return self._left.pop() if self._left else next(self._new)
-
-    def back(self, rest: Batch) -> None:
-        """Put the rest of a batch back."""
-        self._left += [rest] if len(rest) else []
-
-
-def _fill(client: Any, sent: bytes, waiting: _Waiting, running: dict[Any, Batch]) -> None:
-    """Send just enough batches to keep the workers busy: more would fill the scheduler's memory."""
-    enough = 4 + 2 * threads(client)
-    for batch in itertools.islice(waiting, max(0, enough - len(running))):
-        running[client.submit(on_worker, sent, packed(batch), pure=False)] = batch
 
 
 def threads(client: Any) -> int:
@@ -281,7 +263,7 @@ def on_local_cluster(processes: int, log: Path | None) -> Mapper:
     return mapper
 
 
-class SharedProcesses(contextlib.AbstractContextManager["SharedProcesses"]):
+class SharedProcesses(contextlib.ExitStack):
     """Worker processes of this machine for one run after the other: to start them takes seconds.
     They are started when the first cell is needed, and end where the context does.
 
@@ -294,18 +276,9 @@ class SharedProcesses(contextlib.AbstractContextManager["SharedProcesses"]):
     """
 
     def __init__(self, processes: int, log: Path | None) -> None:
+        super().__init__()
         self._processes, self._log = processes, log
-        self._stack = contextlib.ExitStack()
         self._started: Mapper | None = None
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
-        self._started = None
-        self._stack.close()
 
     def mapper(self, task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
         """Compute batches of cells there; see `cells.Mapper`."""
@@ -314,12 +287,13 @@ class SharedProcesses(contextlib.AbstractContextManager["SharedProcesses"]):
         try:
             yield from self._started(task, batches)
         except RunError:
-            self.__exit__(None, None, None)  # whoever comes next starts others
+            self.close()
+            self._started = None  # whoever comes next starts others
             raise
 
     def _start(self) -> Mapper:
         from rsfstudy.compute import worker_log
 
-        file = self._stack.enter_context(worker_log.kept(self._log))
-        client = self._stack.enter_context(local_cluster(self._processes, file))
+        file = self.enter_context(worker_log.kept(self._log))
+        client = self.enter_context(local_cluster(self._processes, file))
         return on_client(client, str(file))

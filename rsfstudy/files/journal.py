@@ -17,7 +17,6 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -188,12 +187,7 @@ class Journal:
     def __enter__(self) -> Journal:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._db.close()
 
     def add(self, cells: Iterable[Finished]) -> None:
@@ -216,8 +210,6 @@ class Journal:
         """The status of each cell; `pending` for a cell that is not in the journal."""
         codes = {status.name: int(status) for status in Status}
         statuses = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
-        if not self._holds_any():
-            return statuses
         for places, rows in self._rows(keys, "status"):
             statuses[places] = [codes.get(name, int(Status.PENDING)) for (name,) in rows]
         return statuses
@@ -241,15 +233,6 @@ class Journal:
                 ) from error
         return columns
 
-    def _holds_any(self) -> bool:
-        try:
-            return self._db.execute("SELECT 1 FROM cells LIMIT 1").fetchone() is not None
-        except sqlite3.Error as error:
-            raise self._damaged(error) from error
-
-    def _damaged(self, error: sqlite3.Error) -> DataError:
-        return DataError(f"{self._path} is damaged: {error}. {_REMEDY}")
-
     def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[list[int], list[Any]]]:
         """The cells that are known, a group at a time: places of their keys, and their rows."""
         names, width = np.ascontiguousarray(keys).tobytes(), keys.dtype.itemsize
@@ -265,7 +248,7 @@ class Journal:
                     )
                 }
             except sqlite3.Error as error:
-                raise self._damaged(error) from error
+                raise DataError(f"{self._path} is damaged: {error}. {_REMEDY}") from error
             known = [
                 (cell, rows[key]) for cell, key in zip(ends, wanted, strict=True) if key in rows
             ]
