@@ -207,26 +207,24 @@ class Axis:
         drawn: Mapping[str, Any] | None = None,
     ) -> Axis:
         """An axis of this kind with other fields set at its points."""
-        values: Any = [row.get(self.dimension) for row in rows]
+        return Axis(self.dimension, self._values(rows), units, drawn)
+
+    def _values(self, rows: Sequence[Row]) -> Any:
+        """What an axis of this kind with these rows is declared by."""
         if self.labels is not None:
-            values = dict(zip(self.labels, rows, strict=True))
-        elif self.is_numbered:
-            values = columns(rows)
-        return Axis(self.dimension, values, units, drawn)
+            return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
+        if self.is_numbered:
+            return columns(rows)
+        return [row.get(self.dimension) for row in rows]
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def describe(self) -> dict[str, Any]:
         """The axis as plain data."""
-        values: Any = [row.get(self.dimension) for row in self.rows]
-        if self.labels is not None:
-            values = {label: dict(row) for label, row in zip(self.labels, self.rows, strict=True)}
-        elif self.is_numbered:
-            values = columns(self.rows)
         beside = {"units": dict(self.units), "drawn": dict(self.drawn)}
         stated = {name: about for name, about in beside.items() if about}
-        return {"dimension": self.dimension, "values": values, **stated}
+        return {"dimension": self.dimension, "values": self._values(self.rows), **stated}
 
     @property
     def points(self) -> list[str]:
@@ -295,28 +293,18 @@ def select(axis: Axis, points: Sequence[Any]) -> Axis:
     """The points of an axis that bear these labels, or numbers; of samples, the first ones are a
     sample still.
     """
-    if axis.is_numbered:
-        return _select_numbers(axis, points)
-    return _select_labels(axis, points)
-
-
-def _select_numbers(axis: Axis, numbers: Sequence[Any]) -> Axis:
-    for number in numbers:
-        if number not in range(len(axis)):
-            rule = f"is no point of the axis: they are numbered from 0 to {len(axis) - 1}"
-            raise InvalidValue(axis.dimension, number, rule)
-    first = list(numbers) == list(range(len(numbers)))
-    drawn = {**axis.drawn, "n": len(numbers)} if axis.drawn and first else {}
-    return axis.with_rows([axis.rows[int(n)] for n in numbers], axis.units, drawn)
-
-
-def _select_labels(axis: Axis, labels: Sequence[str]) -> Axis:
-    assert axis.labels is not None
-    rows = dict(zip(axis.labels, axis.rows, strict=True))
-    for label in labels:
-        if label not in rows:
-            raise InvalidValue(axis.dimension, label, "is no point of the axis", choices=rows)
-    return Axis(axis.dimension, {label: rows[label] for label in labels}, axis.units)
+    rows: dict[Any, Row] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
+    for point in points:
+        if point not in rows:
+            rule, choices = "is no point of the axis", axis.labels or ()
+            if axis.is_numbered:
+                rule += f": they are numbered from 0 to {len(axis) - 1}"
+            raise InvalidValue(axis.dimension, point, rule, choices=choices)
+    if axis.labels is not None:
+        return Axis(axis.dimension, {label: rows[label] for label in points}, axis.units)
+    first = list(points) == list(range(len(points)))
+    drawn = {**axis.drawn, "n": len(points)} if axis.drawn and first else {}
+    return axis.with_rows([rows[number] for number in points], axis.units, drawn)
 
 
 def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:

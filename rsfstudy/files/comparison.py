@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,14 +45,9 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """
     both = _finished(theirs) & _finished(ours)
     rows = []
-    for name in theirs.data_vars:
+    for name, a in theirs.data_vars.items():
         if name in MEASURED_TIMES:
             continue
-        if name not in ours or not _comparable(theirs[name], ours[name]):
-            missing = dict.fromkeys(("largest_difference", "beyond_errors"), np.nan)
-            rows.append({"variable": name, "values": theirs[name].size, "identical": 0, **missing})
-            continue
-        a, b = theirs[name], ours[name]
         known = np.broadcast_to(True, a.shape)
         if set(both.dims) <= set(a.dims):
             known = np.asarray(both.broadcast_like(a).transpose(*a.dims))
@@ -61,25 +56,22 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         e = f"{name}_error"
         beside = [d[e].values for d in (theirs, ours) if e in d and d[e].dims == a.dims]
         errors = [values[known] for values in beside if values.shape == known.shape]
-        rows.append({"variable": name, **_agreement(a.values[known], b.values[known], errors)})
-    frame = pd.DataFrame(rows, columns=_COLUMNS)
-    frame.attrs["differs"] = differences(*(provenance(d)["fingerprint"] for d in (theirs, ours)))
-    return frame
+        rows.append(_agreement(name, theirs, ours, known, errors))
+    return _table(rows, *(provenance(dataset)["fingerprint"] for dataset in (theirs, ours)))
 
 
 def of_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """How two motions of one scene agree, as `compared` tells it of studies."""
-    rows = []
-    for name in (name for name, values in theirs.variables.items() if values.dims):
-        same = name in ours and _comparable(theirs[name], ours[name])
-        missing = {"identical": 0, "largest_difference": np.nan, "beyond_errors": np.nan}
-        found = missing | {"values": theirs[name].size}
-        if same:
-            found = _agreement(theirs[name].values, ours[name].values, [])
-        rows.append({"variable": name, **found})
+    names = [name for name, values in theirs.variables.items() if values.dims]
+    made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (theirs, ours))
+    return _table([_agreement(name, theirs, ours, ..., []) for name in names], *made)
+
+
+def _table(
+    rows: Sequence[dict[str, Any]], theirs: Mapping[str, Any], ours: Mapping[str, Any]
+) -> pd.DataFrame:
     frame = pd.DataFrame(rows, columns=_COLUMNS)
-    made = [str(dataset.attrs.get("source", "unknown")) for dataset in (theirs, ours)]
-    frame.attrs["differs"] = {"source": tuple(made)} if made[0] != made[1] else {}
+    frame.attrs["differs"] = differences(theirs, ours)
     return frame
 
 
@@ -87,25 +79,31 @@ def _finished(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["status"] != int(Status.PENDING)
 
 
-def _comparable(theirs: xr.DataArray, ours: xr.DataArray) -> bool:
-    """True if two variables have the same shape, and both or neither hold real numbers."""
-    return theirs.shape == ours.shape and (theirs.dtype.kind == "f") == (ours.dtype.kind == "f")
-
-
 def _agreement(
-    theirs: np.ndarray, ours: np.ndarray, errors: Sequence[np.ndarray]
+    name: Hashable,
+    theirs: xr.Dataset,
+    ours: xr.Dataset,
+    known: Any,
+    errors: Sequence[np.ndarray],
 ) -> dict[str, Any]:
-    """Agreement of two arrays of values; their error estimates are none, or one for each."""
-    if theirs.dtype.kind != "f":
-        same, largest = np.asarray(theirs == ours), np.nan
+    """Agreement of a variable where it is known to both; its error estimates are none, or one for
+    each. Variables agree nowhere that differ in shape, or of which one alone holds real numbers.
+    """
+    a, b = theirs[name], ours.get(name)
+    if b is None or a.shape != b.shape or (a.dtype.kind == "f") != (b.dtype.kind == "f"):
+        return {"variable": name, "values": a.size, "identical": 0}
+    x, y = a.values[known], b.values[known]
+    if a.dtype.kind != "f":
+        same, largest = np.asarray(x == y), np.nan
     else:
-        same = (theirs == ours) | (np.isnan(theirs) & np.isnan(ours))
-        largest = float(np.max(gap)) if (gap := np.abs(theirs - ours)[~same]).size else 0.0
+        same = (x == y) | (np.isnan(x) & np.isnan(y))
+        largest = float(np.max(gap)) if (gap := np.abs(x - y)[~same]).size else 0.0
     beyond = np.nan
     if len(errors) == 2:
         # a number that one of them lacks, or whose error is unknown, is beyond any estimate
-        beyond = int((~same & ~(np.abs(theirs - ours) <= errors[0] + errors[1])).sum())
-    return dict(zip(_COLUMNS[1:], (same.size, int(same.sum()), largest, beyond), strict=True))
+        beyond = int((~same & ~(np.abs(x - y) <= errors[0] + errors[1])).sum())
+    found = (name, same.size, int(same.sum()), largest, beyond)
+    return dict(zip(_COLUMNS, found, strict=True))
 
 
 # ---- side by side -------------------------------------------------------------------------------

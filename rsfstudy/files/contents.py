@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 import xarray as xr
 
+from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy
@@ -66,22 +67,12 @@ class PlainAxis(TypedDict):
     drawn: NotRequired[Mapping[str, Any]]
 
 
-def is_numbered(axis: PlainAxis) -> bool:
-    """True of an axis of samples or cases: it holds the values of each field."""
-    values = axis["values"]
-    columns = values.values() if isinstance(values, Mapping) else [None]
-    return all(isinstance(column, Sequence) for column in columns)
-
-
-def rows_of(axis: PlainAxis) -> Sequence[Mapping[str, Any]]:
-    """The fields that are set at each point of an axis."""
-    values = axis["values"]
-    if not isinstance(values, Mapping):
-        return [{axis["dimension"]: value} for value in values]
-    if is_numbered(axis):
-        columns: Any = values.values()
-        return [dict(zip(values, point, strict=True)) for point in zip(*columns, strict=True)]
-    return [point for point in values.values() if isinstance(point, Mapping)]
+def axis(plain: PlainAxis) -> Axis:
+    """An axis, on which parts of the user's own are named; raises DataError for what is none."""
+    try:
+        return Axis(**plain)
+    except InvalidValue as error:
+        raise refused(f"declaration.axes.{plain['dimension']}", f"is refused ({error})") from error
 
 
 class PlainMeasure(TypedDict):
@@ -258,8 +249,8 @@ def scene(
 def own_part(declared: Declaration, held: Collection[str] = ()) -> tuple[str, str] | None:
     """Slot and name of a part that the user wrote, if any cell has one; not one that is held."""
     rows: list[Mapping[str, Any]] = [declared.base]
-    for axis in declared.axes:
-        rows += rows_of(axis)
+    for plain in declared.axes:
+        rows += axis(plain).rows
     for slot in SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
             if isinstance(name, str) and name not in (*slot.choices, *held):

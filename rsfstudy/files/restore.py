@@ -17,9 +17,9 @@ import xarray as xr
 
 from rsfstudy import measures, reduce
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.axis import Axis, columns
+from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.figure import figure_name
-from rsfstudy.declare.names import PACKAGE, names
+from rsfstudy.declare.names import names
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.files import contents, loadings
@@ -34,8 +34,8 @@ from rsfstudy.files.contents import (
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures import Measure
 from rsfstudy.reduce import Reduction
+from rsfstudy.rig import reductions as _of_rigs  # noqa: F401  # to be found by its name
 from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.reductions import InUnits
 from rsfstudy.slider.registry import SLOTS, Own, by_class
 
 _NAME_IT = "Name the file that declares it: --study FILE (study=)."
@@ -50,7 +50,7 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
         file = declared.name
     for axis in declared.axes:
         points = results.sizes.get(axis["dimension"])
-        declared_points = len(contents.rows_of(axis))
+        declared_points = len(contents.axis(axis))
         if declared_points != points:
             rule = f"has {declared_points} points in the declaration, and {points} in the file"
             raise refused(axis["dimension"], rule)
@@ -167,16 +167,9 @@ def _own_parts(study: Study | None) -> Mapping[str, Own]:
 
 
 def _axis(described: PlainAxis, own: Mapping[str, Own]) -> Axis:
-    dimension, values = described["dimension"], described["values"]
-    units, rows = (
-        described.get("units"),
-        [by_class(row, own) for row in contents.rows_of(described)],
-    )
-    if not isinstance(values, Mapping):
-        return Axis(dimension, [row[dimension] for row in rows], units)
-    if contents.is_numbered(described):
-        return Axis(dimension, columns(rows) if rows else {}, units, described.get("drawn"))
-    return Axis(dimension, dict(zip(values, rows, strict=True)), units)
+    named = contents.axis(described)
+    rows = [by_class(row, own) for row in named.rows]
+    return named.with_rows(rows, named.units, named.drawn)
 
 
 def _laboratory(stated: Mapping[str, float]) -> Laboratory:
@@ -189,50 +182,43 @@ def _laboratory(stated: Mapping[str, float]) -> Laboratory:
 def measure(described: PlainMeasure, path: str) -> Measure:
     """The measure with this description, which stands at `path` in a file."""
     values: dict[str, Any] = dict(described)
-    name = values.pop("name")
-    kinds = _kinds(Measure, measures, name)
-    if name not in kinds:
-        rule = "is not part of rsfstudy"
-        raise InvalidValue("measure", name, rule, choices=kinds, remedy=_NAME_IT)
-    given = dict(kinds[name].restored_fields(values, path))
+    kind = _kind("measure", Measure, measures, values.pop("name"))
+    given = dict(kind.restored_fields(values, path))
     if isinstance(values.get("measure"), Mapping):
         given["measure"] = measure(values.pop("measure"), f"{path}.measure")
-    made: Measure = restored(values, kinds[name], path, **given)
+    made: Measure = restored(values, kind, path, **given)
     return made
 
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
-    wanted = values.pop("kind")
-    kinds: dict[str, Any] = {InUnits.kind: InUnits}
-    if wanted not in kinds:
-        kinds |= _kinds(Reduction, reduce, wanted)
-    if wanted not in kinds:
-        rule = "is not part of rsfstudy"
-        raise InvalidValue("reduction", wanted, rule, choices=kinds, remedy=_NAME_IT)
-    made: Reduction = restored(values, kinds[wanted], path)
+    kind = _kind("reduction", Reduction, reduce, values.pop("kind"))
+    made: Reduction = restored(values, kind, path)
     return made
 
 
-def _kinds(base: Any, package: ModuleType, wanted: str) -> dict[str, Any]:
-    """The classes of a package that are derived from `base`, by their names in declarations; where
-    none has the `wanted` name, those in the files of named studies too.
+def _kind(what: str, base: Any, package: ModuleType, name: str) -> Any:
+    """The class of rsfstudy that is derived from `base` and has a name in declarations; those in
+    the files of named studies are looked for where their package has none.
     """
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
-    kinds = _within(package.__name__, base)
-    if wanted not in kinds:
-        for name in names():
-            catalogue.load(name)
-        kinds |= _within(PACKAGE, base)
-    return kinds
+    if name not in _kinds(base):
+        for study in names():
+            catalogue.load(study)
+    kinds = _kinds(base)
+    if name not in kinds:
+        rule = "is not part of rsfstudy"
+        raise InvalidValue(what, name, rule, choices=kinds, remedy=_NAME_IT)
+    return kinds[name]
 
 
-def _within(package: str, base: Any) -> dict[str, Any]:
+def _kinds(base: Any) -> dict[str, Any]:
+    """The classes of rsfstudy that are derived from `base`, by their names in declarations."""
     return {
         vars(kind).get("name") or vars(kind)["kind"]: kind
         for kind in _members(base)
-        if kind.__module__.startswith(f"{package}.")
+        if kind.__module__.partition(".")[0] == __name__.partition(".")[0]
     }
 
 

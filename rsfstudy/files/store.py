@@ -5,6 +5,7 @@ file, because HDF5 may hang on damaged bytes. Other programs write none when the
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -56,7 +57,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _remove(beside)  # were it a link or a pipe, writing would go elsewhere
+        beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
         # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
         with dask.config.set(scheduler="synchronous"):
             clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
@@ -75,7 +76,8 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             "--output."
         ) from error
     finally:
-        _remove(beside)
+        with contextlib.suppress(OSError):  # where its directory is none, the error says so
+            beside.unlink(missing_ok=True)
     clean.encoding["source"] = str(path)
     return clean
 
@@ -129,13 +131,6 @@ def _check_bytes(path: Path) -> bool:
     if trailer != _MARK + _digest_of_bytes(path, size):
         raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
     return True
-
-
-def _remove(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return  # its directory is not a directory; the error that is being raised says so
 
 
 def read(path: Path) -> xr.Dataset:

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from rsfstudy.declare.figure import Draw, Panel
-from rsfstudy.files.contents import declaration, is_numbered
+from rsfstudy.files import contents
 from rsfstudy.plots._axes import is_number, is_numeric, place, varied
 from rsfstudy.plots._style import look
 from rsfstudy.plots._text import pretty, symbol
@@ -48,9 +48,9 @@ def square(panels: Sequence[Panel]) -> int:
 def _fields(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Fields along each axis whose points are numbered, by its dimension."""
     found: dict[str, list[str]] = {}
-    for axis in declaration(dataset).axes:
-        if is_numbered(axis) and dataset.sizes.get(axis["dimension"], 1) > 1:
-            found[axis["dimension"]] = [n for n in map(str, axis["values"]) if n in dataset.coords]
+    for axis in map(contents.axis, contents.declaration(dataset).axes):
+        if axis.is_numbered and dataset.sizes.get(axis.dimension, 1) > 1:
+            found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found
 
 

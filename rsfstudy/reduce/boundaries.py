@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, failed, refused
+from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
 _STEP = 1e-6
@@ -78,8 +78,6 @@ class Boundary(Reduction):
         )
         for name in result:
             result[name].attrs["comment"] = note
-            if bool(failed(dataset["status"]).any()):
-                result[name].attrs["refused"] = "cells along it failed or are missing"
         return result
 
     def _bracket(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:

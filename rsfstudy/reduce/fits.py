@@ -32,12 +32,9 @@ class _Fit(Reduction):
 
     on: str = ""
     within: tuple[float, float] | None = None
-    #: Parameters of the law.
+    #: Parameters of the law, and the law with the names of the fields of the fit.
     unknowns: ClassVar[int] = 1
-
-    def law(self) -> str:
-        """The law in words."""
-        raise TypeError(f"{type(self).__name__} fits no law")
+    law: ClassVar[str]
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Values as they enter a fit through the origin."""
@@ -68,8 +65,7 @@ class _Fit(Reduction):
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        bad = refused(support, self.of, dimension)
-        known = (count >= self.unknowns) & ~bad
+        known = (count >= self.unknowns) & ~refused(support, self.of, dimension)
         result = xr.Dataset(
             {
                 self.name: slope.where(known),
@@ -80,12 +76,9 @@ class _Fit(Reduction):
         )
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
+        law = self.law.format(**vars(self))
         for name in result:
-            result[name].attrs["comment"] = f"least squares of {self.law()} over {span}"
-            if bool(bad.any()):
-                result[name].attrs["refused"] = (
-                    "cells within the fitted range failed or are missing"
-                )
+            result[name].attrs["comment"] = f"least squares of {law} over {span}"
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
@@ -122,10 +115,7 @@ class ProportionalFit(_Fit):
 
     minus: float = 0.0
     kind: ClassVar[str] = "proportional_fit"
-
-    def law(self) -> str:
-        """The law in words."""
-        return f"{self.of} = {self.minus:g} + {self.name} * {self.on}"
+    law: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """As they are: the line goes through the origin."""
@@ -142,10 +132,7 @@ class LinearFit(_Fit):
 
     unknowns: ClassVar[int] = 2
     kind: ClassVar[str] = "linear_fit"
-
-    def law(self) -> str:
-        """The law in words."""
-        return f"{self.of} = constant + {self.name} * {self.on}"
+    law: ClassVar[str] = "{of} = constant + {name} * {on}"
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Less their mean, which takes care of the constant."""
@@ -159,10 +146,7 @@ class DecadeFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-
-    def law(self) -> str:
-        """The law in words."""
-        return f"{self.of} = constant + {self.name} * log10({self.on})"
+    law: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def abscissa(self, on: xr.DataArray) -> xr.DataArray:
         """The decimal logarithm."""
