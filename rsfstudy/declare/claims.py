@@ -25,6 +25,7 @@ UNDECIDED = "undecided"
 NOT_APPLICABLE = "not applicable"
 
 RELATIONS = ("equals", "below", "above")
+_EXPECTED = (REPRODUCED, DIFFERS)
 _TEXTS = (
     *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
     *("relation", "expected"),
@@ -86,11 +87,8 @@ class Claim:
                 raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
-        if self.expected not in (REPRODUCED, DIFFERS):
-            raise InvalidValue(
-                "expected", self.expected, "is no verdict", choices=(REPRODUCED, DIFFERS)
-            )
-
+        if self.expected not in _EXPECTED:
+            raise InvalidValue("expected", self.expected, "is no verdict", choices=_EXPECTED)
         for name in ("published", "tolerance"):
             value = getattr(self, name)
             if not _is_number(value) or not math.isfinite(value):
@@ -196,23 +194,15 @@ def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float
     """The one number at these coordinate values; KeyError where there is no such place."""
     values = dataset[variable]
     for name, wanted in where.items():
-        coordinate = dataset[name]
-        text = isinstance(wanted, str)
-        if coordinate.dtype.kind not in ("OUST" if text else "iufb"):
+        at, text = dataset[name], isinstance(wanted, str)
+        along = at.ndim <= 1 and set(at.dims) <= set(values.dims)
+        if not along or at.dtype.kind not in ("OUST" if text else "iufb"):
             raise KeyError(name)
-        if coordinate.ndim == 0:
-            if coordinate.item() != wanted:
-                raise KeyError(name)
-            continue
-        if len(coordinate.dims) > 1 or coordinate.dims[0] not in values.dims:
-            raise KeyError(name)
-        if text:
-            matches = np.flatnonzero(coordinate.values == wanted)
-        else:
-            matches = np.flatnonzero(np.isclose(coordinate.values, wanted, rtol=1e-9, atol=0.0))
+        same = at.values == wanted if text else np.isclose(at.values, wanted, rtol=1e-9, atol=0.0)
+        matches = np.flatnonzero(same)
         if matches.size != 1:
             raise KeyError(name)
-        values = values.isel({coordinate.dims[0]: int(matches[0])})
+        values = values.isel(dict.fromkeys(at.dims, int(matches[0])))
     if values.ndim or values.dtype.kind not in "iufb":
         raise KeyError(variable)  # more dimensions than the claim speaks of, or no number
     if variable == "status" and int(values) == int(Status.PENDING):

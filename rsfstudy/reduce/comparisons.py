@@ -11,6 +11,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import Derivatives, Reduction
 from rsfstudy.slider.closed_forms import FORMS
 
+Pair = tuple[xr.DataArray, xr.DataArray]
+
 
 @dataclass(frozen=True)
 class _Against(Reduction):
@@ -36,9 +38,7 @@ class _Against(Reduction):
         """The comparison."""
         raise TypeError(f"{type(self).__name__} compares nothing")
 
-    def slopes(
-        self, values: xr.DataArray, reference: xr.DataArray
-    ) -> tuple[xr.DataArray, xr.DataArray]:
+    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
         """Derivatives of the comparison by the value and by the reference."""
         raise TypeError(f"{type(self).__name__} compares nothing")
 
@@ -78,9 +78,7 @@ class RelativeDifference(_Against):
         """1 - of/of_reference."""
         return 1.0 - values / reference
 
-    def slopes(
-        self, values: xr.DataArray, reference: xr.DataArray
-    ) -> tuple[xr.DataArray, xr.DataArray]:
+    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
         """-1/of_reference and of/of_reference^2."""
         return -xr.ones_like(values) / reference, values / reference**2
 
@@ -96,9 +94,7 @@ class Difference(_Against):
         """Of - of_reference."""
         return values - reference
 
-    def slopes(
-        self, values: xr.DataArray, reference: xr.DataArray
-    ) -> tuple[xr.DataArray, xr.DataArray]:
+    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
         """1 and -1."""
         return xr.ones_like(values), -xr.ones_like(values)
 
