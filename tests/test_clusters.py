@@ -96,12 +96,6 @@ class Cluster:
             os.killpg(process.pid, signal.SIGKILL)
         process.wait(HANGS)
 
-    def worker(self, **environment):
-        place = self.tmp_path / f"worker{len(self.workers)}"
-        place.mkdir()
-        words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        self.workers.append(self._start(*words, cwd=place, **environment))
-
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory):

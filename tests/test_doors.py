@@ -13,6 +13,7 @@ import itertools
 import json
 import os
 import random
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -32,6 +33,7 @@ from rsfstudy.cli import command_line
 from rsfstudy.declare.claims import Claim
 from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.files import journal
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.referee.problem import shipped
 
@@ -313,18 +315,21 @@ def test_junk_in_commands(name, parameter, place, tmp_path, monkeypatch):
             assert line.isprintable(), words
 
 
-@pytest.mark.parametrize(("encoding", "columns"), [("ascii", "20"), ("latin-1", "80")])
-def test_output_that_cannot_hold_a_character(encoding, columns, tmp_path):
+@pytest.mark.parametrize(
+    ("encoding", "columns", "words"),
+    [("ascii", "20", ["show"]), ("latin-1", "80", ["compare", "lattice.nc"])],
+)
+def test_output_that_cannot_hold_a_character(encoding, columns, words, tmp_path):
     run(LATTICE.with_(b_over_a=[2.0, 3.0]), output=tmp_path, command="rsfstudy run Größe ζ ✓")
-    for words in (["show"], ["compare", tmp_path / "lattice.nc"]):
-        ran = subprocess.run(
-            [sys.executable, "-m", "rsfstudy.cli.command_line", *words, tmp_path / "lattice.nc"],
-            capture_output=True,
-            env={**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": columns},
-            check=False,
-        )
-        assert (ran.returncode, ran.stderr) == (0, b"")
-        assert ran.stdout.decode(encoding)
+    ran = subprocess.run(
+        [sys.executable, "-m", "rsfstudy.cli.command_line", *words, "lattice.nc"],
+        capture_output=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "COLUMNS": columns},
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr) == (0, b"")
+    assert ran.stdout.decode(encoding)
 
 
 # ---- journals and stores ------------------------------------------------------------------------
@@ -345,12 +350,12 @@ def test_output_that_cannot_hold_a_character(encoding, columns, tmp_path):
         ),
     ],
 )
-def test_a_journal_of_other_things_is_refused(change, tmp_path):
-    run(SMALL, output=tmp_path)
-    with contextlib.closing(sqlite3.connect(tmp_path / "small.cells.sqlite")) as db, db:
+def test_a_journal_of_other_things_is_refused(change, place, tmp_path):
+    kept = Path(shutil.copy(place / "lattice.cells.sqlite", tmp_path))
+    with contextlib.closing(sqlite3.connect(kept)) as db, db:
         db.executescript(change)
-    answered(lambda: run(SMALL, output=tmp_path))
-    assert call("show", "rate_step_boundary", "--output", tmp_path).returncode == 0
+    answered(lambda: run(LATTICE, output=tmp_path))
+    answered(lambda: journal.timed(kept))
 
 
 def test_a_store_with_a_link_is_refused(tmp_path):

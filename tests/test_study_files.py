@@ -7,7 +7,7 @@ from running import command, ended
 
 import rsfstudy
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.errors import InvalidValue, RunError
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -133,16 +133,6 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InvalidValue, match="is no file"):
         catalogue.load(str(tmp_path / "nothing.py"))
-
-
-def test_a_measure_that_was_edited_does_not_reuse_its_old_cells(tmp_path):
-    run = {"output": tmp_path, "progress": False, "workers": 0}
-    rsfstudy.run(written(tmp_path, OWN_MEASURE), **run)
-    edited = OWN_MEASURE.replace('"spring": scene.stiffness', '"spring": 2 * scene.stiffness')
-    with pytest.raises(DataError, match="own_code"):
-        rsfstudy.run(written(tmp_path, edited), **run)
-    dataset = rsfstudy.run(written(tmp_path, edited), fresh=True, **run)
-    assert float(dataset.spring[0]) == 2.0 * rsfstudy.Scene(phi=55).stiffness
 
 
 def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):

@@ -127,9 +127,8 @@ class Study:
         for axis in self.axes:
             for name in {FULL.get(n, n) for n in (axis.dimension, *axis.fields)}:
                 if name in taken:
-                    raise InvalidValue(
-                        "axis", axis.dimension, f"varies {name!r}, as {taken[name]!r} does already"
-                    )
+                    rule = f"varies {name!r}, as {taken[name]!r} does already"
+                    raise InvalidValue("axis", axis.dimension, rule)
                 taken[name] = axis.dimension
 
     def _check_parts(self) -> None:

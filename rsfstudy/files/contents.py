@@ -350,22 +350,13 @@ def restored(value: Mapping[str, Any], kind: Any, path: str, **given: Any) -> An
     kinds = {name: hint for name, hint in get_type_hints(kind).items() if name in value}
     _check_names({**value, **given}, _names(kind), path)
     for name, part in value.items():
-        if kinds[name] is int and isinstance(part, int | float) and abs(part) > MOST_POINTS:
+        if kinds[name] is int and isinstance(part, int) and abs(part) > MOST_POINTS:
             raise refused(f"{path}.{name}", f"is above {MOST_POINTS}")
-    parts = {
-        # whole numbers that were typed as others
-        name: int(part) if kinds[name] is int and _is_whole(part) else part
-        for name, part in value.items()
-    }
-    fitted = {name: fit(part, kinds[name], f"{path}.{name}") for name, part in parts.items()}
+    fitted = {name: fit(part, kinds[name], f"{path}.{name}") for name, part in value.items()}
     try:
         return kind(**{**fitted, **given})
     except InvalidValue as error:
         raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
-
-
-def _is_whole(number: Any) -> bool:
-    return isinstance(number, float) and number.is_integer()
 
 
 def _names(kind: Any) -> list[str]:

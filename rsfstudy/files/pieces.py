@@ -36,9 +36,8 @@ Reduce = Callable[[xr.Dataset], xr.Dataset]
 def check_installed() -> None:
     """Refuse the format where the package zarr is missing."""
     if importlib.util.find_spec("zarr") is None:
-        raise InvalidValue(
-            "format", "zarr", "needs a package", remedy="pip install 'rsfstudy[zarr]'."
-        )
+        remedy = "pip install 'rsfstudy[zarr]'."
+        raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
 
 
 def check_free(path: Path) -> None:

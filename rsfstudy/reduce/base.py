@@ -126,12 +126,8 @@ def dimension_of(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
         Where `on` is no coordinate along one dimension.
     """
     if on not in dataset.coords or dataset[on].ndim != 1:
-        raise InvalidValue(
-            "on",
-            on,
-            "must be a coordinate along one dimension",
-            choices=[str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != on],
-        )
+        choices = [str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != on]
+        raise InvalidValue("on", on, "must be a coordinate along one dimension", choices=choices)
     if dataset[on].dtype.kind not in "iuf":
         raise InvalidValue("on", on, "must be a coordinate of numbers")
     return str(dataset[on].dims[0])
