@@ -1,0 +1,95 @@
+"""What surrounds compiled motions, measured: ``python tests/benchmarks/over_motions.py [rounds]``.
+
+A measure takes so many times what its calls of the compiled loop take, which are run again from
+copies of their arguments, in turns with the measure: the shortest of the rounds of both.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from rsfstudy import Scene
+from rsfstudy.measures import Measure
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.compiled import machine
+
+ACCURACY = Accuracy(1e-7, engine="compiled")
+
+
+def cases() -> dict[str, tuple[Measure, Scene]]:
+    """Measures and scenes, by name."""
+    steps, soft = {"b_over_a": 2.0, "stiffness_ratio": 1.3}, {"b_over_a": 2.0}
+    soft |= {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+    found: dict[str, tuple[Measure, Scene]] = {}
+    for law in ("slip", "slowness"):
+        for stress in ("constant", "variable"):
+            kind = {"law": law, "normal_stress": stress}
+            found[f"critical_step {law} {stress}"] = CriticalStep(), Scene(**kind, **steps)
+            found[f"limit_cycle {law} {stress}"] = LimitCycle(), Scene(**kind, **soft)
+    shift = CriticalStep(of="displacement_step")
+    found["critical_step slip constant, displacement"] = shift, Scene(law="slip", **steps)
+    return found
+
+
+def calls_of(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
+    """Copies of the arguments of all calls of the loop in a measurement."""
+    run, kept = machine.compiled_loop(), list[tuple[Any, ...]]()
+
+    def noting(*arguments: Any) -> Any:
+        kept.append(copied(arguments))
+        return run(*arguments)
+
+    with mock.patch.object(machine, "compiled_loop", lambda: noting):
+        measure(scene, ACCURACY)
+    return kept
+
+
+def copied(value: Any) -> Any:
+    """Arguments that a call of the loop may change without a trace."""
+    if isinstance(value, tuple):
+        return tuple(map(copied, value))
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def seconds(call: Callable[[], object]) -> float:
+    """How long a call takes."""
+    began = time.perf_counter()
+    call()
+    return time.perf_counter() - began
+
+
+def again(calls: list[tuple[Any, ...]]) -> float:
+    """How long the calls of the loop take, without the copies."""
+    run = machine.compiled_loop()
+    arguments = [copied(each) for each in calls]
+    began = time.perf_counter()
+    for each in arguments:
+        run(*each)
+    return time.perf_counter() - began
+
+
+def main(rounds: int) -> None:
+    """Print a table."""
+    print(f"{'':44}{'measure':>10}{'motions':>10}{'ratio':>7}{'calls':>7}{'sides':>7}")
+    for name, (measure, scene) in cases().items():
+        calls = calls_of(measure, scene)
+        sides = measure(scene, ACCURACY).rhs_evaluations
+        whole = motions = float("inf")
+        for _ in range(rounds):
+            fresh = Scene(**scene.as_dict())
+            whole = min(whole, seconds(lambda: measure(fresh, ACCURACY)))
+            motions = min(motions, again(calls))
+        times = f"{1e6 * whole:10.0f}{1e6 * motions:10.0f}{whole / motions:7.2f}"
+        print(f"{name:44}{times}{len(calls):7}{sides:7}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)
