@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from inspect import Parameter, Signature
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -29,6 +29,7 @@ from rsfstudy.slider import (
     system,
 )
 from rsfstudy.slider.assembly import Layout, Parts
+from rsfstudy.slider.derived import derived
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
@@ -216,7 +217,7 @@ class Scene(ShownAsTable):
 
     # ---- its fields -----------------------------------------------------------------------------
 
-    @cached_property
+    @derived
     def layout(self) -> Layout:
         """Places of its fields."""
         return assembly.layout_of(tuple(map(type, self.parts[1:])))
@@ -305,7 +306,7 @@ class Scene(ShownAsTable):
             return self.under(alone)
         return Scene(self.parts._replace(loading=alone))
 
-    @cached_property
+    @derived
     def chains(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Its segments of loading as far as each follows on another without a jump: the scene as
         the first of them has it, and their table (see `places`).
@@ -319,28 +320,28 @@ class Scene(ShownAsTable):
         acting = map(self.acting, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
 
-    @cached_property
+    @derived
     def _history(self) -> tuple[loading.Segment, ...]:
         return self.parts.loading.segments
 
     # ---- its equations --------------------------------------------------------------------------
 
-    @cached_property
+    @derived
     def made(self) -> dict[tuple[Any, ...], Any]:
         """Cache of what others make of it once and for all."""
         return {}
 
-    @cached_property
+    @derived
     def numbers(self) -> Numbers:
         """All numbers, as the functions of the equations read them (see `places`)."""
         return places.numbers(self)
 
-    @cached_property
+    @derived
     def numbers_of_friction(self) -> Numbers:
         """Numbers for functions that friction alone decides."""
         return places.numbers_of_friction(self)
 
-    @cached_property
+    @derived
     def functions(self) -> system.System:
         """The functions of the equations, by name (see `system`)."""
         return system.functions(self)
@@ -352,7 +353,7 @@ class Scene(ShownAsTable):
         """The part that balances the spring besides friction."""
         return self.parts.dynamics
 
-    @cached_property
+    @derived
     def pressure_source(self) -> fluid.Fluid | loading.Loading | Recharged:
         """The part whose last unknown takes from normal stress, if any has unknowns; two, where the
         loading imposes the pressure around a fluid.
@@ -367,7 +368,7 @@ class Scene(ShownAsTable):
         """True if mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
 
-    @cached_property
+    @derived
     def states(self) -> int:
         """Number of states: those of the law, and the unknowns of a loading that goes on changing
         normal stress and of the fluid.
@@ -379,12 +380,12 @@ class Scene(ShownAsTable):
         """Names of the effects that act in this scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
-    @cached_property
+    @derived
     def a(self) -> float:
         """Direct effect parameter."""
         return self.parts.slider.a
 
-    @cached_property
+    @derived
     def b(self) -> float:
         """Evolution effect parameter, of all states together."""
         return float(self.parts.slider.a * self.parts.law.b_over_a)
@@ -395,7 +396,7 @@ class Scene(ShownAsTable):
         given = self.parts.slider.stiffness
         return float(given) if given is not None else self._relative_stiffness
 
-    @cached_property
+    @derived
     def _relative_stiffness(self) -> float:
         ratio = self.parts.slider.stiffness_ratio
         assert ratio is not None  # one of the two is given
@@ -414,17 +415,17 @@ class Scene(ShownAsTable):
             return float(given)
         return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
 
-    @cached_property
+    @derived
     def load_velocity(self) -> float:
         """V_0/V_* after the last step."""
         return self._history[-1].load_velocity
 
-    @cached_property
+    @derived
     def log_load_rate(self) -> float:
         """ln(V_0/V_*), and -inf for a load point at rest."""
         return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
 
-    @cached_property
+    @derived
     def imposed_normal_stress(self) -> float:
         """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
         return self._history[-1].normal_stress
@@ -444,7 +445,7 @@ class Scene(ShownAsTable):
         """True if it begins with other stress or state than those of steady sliding at V_*."""
         return bool(self.initial_stress or self.initial_state)
 
-    @cached_property
+    @derived
     def inertial_time(self) -> float:
         """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
 
@@ -458,7 +459,7 @@ class Scene(ShownAsTable):
         """ln(V/V_*) at which the instability norm is reached."""
         return math.log(self.instability_norm / self.inertial_time)
 
-    @cached_property
+    @derived
     def critical_stiffness(self) -> float:
         """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
         (see `stability.critical_stiffness`).
