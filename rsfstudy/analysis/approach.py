@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events, orbit_of
+from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events
 from rsfstudy.analysis.return_map import Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
@@ -86,9 +86,7 @@ class Approach:
     def orbit(self) -> Orbit:
         """The last cycle, and what it implies of the limit cycle."""
         last = self.seen[-1:]
-        path = orbit_of(self._scene, last, None)
-        slopes = (self._slopes,)
-        return Orbit(tuple(last), slopes, self._ahead, self._accuracy, self._work, path)
+        return Orbit(tuple(last), (self._slopes,), self._ahead, self._accuracy, self._work)
 
     @property
     def _return(self) -> float:

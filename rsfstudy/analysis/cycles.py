@@ -126,7 +126,7 @@ def more_events(events: int, name: str = "events") -> str:
     return f"--set {name}={2 * events} ({name}=) waits for more"
 
 
-def orbit_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
+def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
     """Record of cycles that follow each other; their ends, where nothing was."""
     begin, end = seen[0].begin, seen[-1].end
     passed = math.fsum(cycle.interval for cycle in seen)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsfstudy.analysis.cycles import NUMBERS, Cycle, cycles, orbit_of
+from rsfstudy.analysis.cycles import NUMBERS, Cycle, cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.meter import Halt, Meter
@@ -59,8 +59,8 @@ class Orbit:
         With which the events were followed.
     work : int
         Right-hand sides that took.
-    path : ndarray
-        Rows of what was recorded along the events, or of their ends.
+    recording : Recording or None
+        What was recorded along the events, and beyond.
     """
 
     events: tuple[Cycle, ...]
@@ -68,7 +68,7 @@ class Orbit:
     ahead: np.ndarray
     accuracy: Accuracy
     work: int
-    path: np.ndarray
+    recording: Recording | None = None
 
     @property
     def period(self) -> int:
@@ -288,9 +288,8 @@ class ReturnMap:
             size = float(np.abs(move).max())
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
-                path = orbit_of(self.scene, events, recording)
                 work = self._meter.spent - spent
-                return Orbit(tuple(events), tuple(slopes), move, self.accuracy, work, path)
+                return Orbit(tuple(events), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
             if not np.abs(at - start).max() <= reach * scale:
                 return None

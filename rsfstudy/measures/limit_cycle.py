@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from rsfstudy.analysis.approach import Approach
-from rsfstudy.analysis.cycles import LN10, Cycle, more_events
+from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
 from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.measures import Outcome
@@ -185,7 +185,8 @@ class LimitCycle(Recorded):
         values["events_until_repeat"] = float(events)
         values["work_per_cycle"] = one.work / one.period
         status, why = judged(accuracy, one, errors)
-        return Outcome(status, values | along_path(again.path, self.phases), why)
+        path = path_of(scene, again.events, again.recording)
+        return Outcome(status, values | along_path(path, self.phases), why)
 
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")

@@ -98,8 +98,7 @@ class Recording:
             last = row(until.time, until.slip, until.point, self.number(until.regime))
             table = up_to(table, np.array(last[:columns]))
         table[:, 2] /= math.log(10.0)
-        for stress in 3, 4:
-            table[:, stress] += scene.mu_star
+        table[:, 3:5] += scene.mu_star
         return table
 
 
@@ -199,9 +198,9 @@ def _polynomial(at: float, coefficients: Sequence[float]) -> float:
 
 def _weights(parts: np.ndarray) -> np.ndarray:
     """Weights of the values at the places of a step, a row each, at parts of it in places."""
-    powers = np.ones((SAMPLES + 1, len(parts)))
-    for power in range(1, SAMPLES + 1):
-        powers[power] = powers[power - 1] * (parts / _HALF - 1.0)
+    powers, from_middle = np.ones((SAMPLES + 1, len(parts))), parts / _HALF - 1.0
+    for power in range(SAMPLES):
+        np.multiply(powers[power], from_middle, out=powers[power + 1])
     return np.asarray(_COEFFICIENTS.T @ powers)
 
 
@@ -214,9 +213,9 @@ def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarr
     jumps = (places[after] == 0.0) & (at > 0.0)
     begin = np.where(jumps, after - 1, after - places[after]).astype(int)
     part, columns = at - begin, np.ascontiguousarray(values.T)
-    found = np.zeros((len(columns), len(at)))
-    for place, weight in enumerate(_weights(part)):
-        found += weight * columns.take(begin + place, axis=1, mode="clip")
+    around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
+    around *= _weights(part)
+    found = around.sum(axis=1)
     at_a_row = part == np.rint(part)
     found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]

@@ -58,7 +58,8 @@ def starting(scene: Scene) -> Point:
     if scene.begins_elsewhere:
         psis, log_rate = _stated(scene, psis)
     psis = _with_beginning(scene, psis)
-    stepped = on_slow_manifold(scene, scene.initial_stress + scene.spring_stress_step, psis)
+    stress = scene.parts.slider.initial_stress + scene.spring_stress_step
+    stepped = on_slow_manifold(scene, stress, psis)
     return at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
 
 
@@ -151,14 +152,15 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     """Refuse a displacement step that leaves no friction of forward slip to integrate; it is that
     of the beginning, or leads to a point.
     """
-    begins = scene.initial_stress + scene.spring_stress_step
+    slider = scene.parts.slider
+    begins = slider.initial_stress + scene.spring_stress_step
     spring = begins if start is None else start.spring
     lost = spring <= scene.parts.normal_stress.weakest(scene)
     if lost or (start and normal_stress_at(scene, spring, start.psis) <= handover.LOST):
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
-    if scene.mu_star + spring > 0.0:
+    if slider.mu_star + spring > 0.0:
         return
-    text = f"the step takes shear stress to {scene.mu_star + spring:.3g} sigma_*"
+    text = f"the step takes shear stress to {slider.mu_star + spring:.3g} sigma_*"
     if not scene.parts.law.regularised:
         raise Halt(Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True")
     if scene.load_velocity == 0.0:

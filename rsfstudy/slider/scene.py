@@ -443,7 +443,8 @@ class Scene(ShownAsTable):
     @property
     def begins_elsewhere(self) -> bool:
         """True if it begins with other stress or state than those of steady sliding at V_*."""
-        return bool(self.initial_stress or self.initial_state)
+        slider = self.parts.slider
+        return bool(slider.initial_stress or slider.initial_state)
 
     @derived
     def inertial_time(self) -> float:
@@ -454,10 +455,10 @@ class Scene(ShownAsTable):
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
-    @property
+    @derived
     def log_norm_rate(self) -> float:
         """ln(V/V_*) at which the instability norm is reached."""
-        return math.log(self.instability_norm / self.inertial_time)
+        return math.log(self.parts.slider.instability_norm / self.inertial_time)
 
     @derived
     def critical_stiffness(self) -> float:

@@ -205,8 +205,8 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float
             ahead = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
             at[place] = value - number * step
             behind = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
-            for state, (more, less) in enumerate(zip(ahead, behind, strict=True)):
-                slopes[state] += weight * (more - less) / step
+            changes = zip(slopes, ahead, behind, strict=True)
+            slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
         at[place] = value
         columns.append(slopes)
     by_rate, by_shift, *by_state = columns
