@@ -215,7 +215,7 @@ def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarr
     part, columns = at - begin, np.ascontiguousarray(values.T)
     around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
     around *= _weights(part)
-    found = around.sum(axis=1)
+    found: np.ndarray = around.sum(axis=1)
     at_a_row = part == np.rint(part)
     found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]
