@@ -62,6 +62,7 @@ _BEHIND = slice(_BEFORE.stop, _OF_STATES)
 #: Makes a named tuple of a tuple, in half the time that its name takes.
 _named = tuple.__new__
 _TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
+_NOTHING = layout.NEVER, np.empty(0), np.empty((0, STATES))
 _NO_KINKS = np.empty((0, RELIEF + 1)), 0
 _NO_MASS = (math.nan,) * len(Limits._fields)
 
@@ -147,12 +148,19 @@ class _Plan(NamedTuple):
         The argument `plan` of the loop.
     systems : tuple of Equations
         Those of the regimes they go through.
+    regimes : tuple of str
+        Names of these.
+    unknowns, states : int
+        Most unknowns of a regime, and how many states there are.
     """
 
     machine: Any
     initial: Any
     called: tuple[Any, ...]
     systems: tuple[Equations, ...]
+    regimes: tuple[str, ...]
+    unknowns: int
+    states: int
 
 
 def chain(
@@ -183,8 +191,7 @@ def chain(
         How many segments, the last ones, are told to begin.
     """
     plan = _planned(scene, accuracy, meter, clock=clock)
-    count = max(len(system.unknowns) for system in plan.systems)
-    begins = np.empty(2 * count), _columns_of(start)
+    begins = np.empty(2 * plan.unknowns), _columns_of(start)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
     return _events(plan, (lasts, *origin), begins, meter, watches, recording, (table[1:], told))
 
@@ -252,7 +259,9 @@ def _plan(
     limits = _NO_MASS if both is None else tuple(both.limits)
     table, p = machine.table(systems), machine.numbers(slow.p)
     called = *machine.passed(scales), table, limits, p, p
-    return _Plan(machine, machine.initial(tuple(fields.items())), called, systems)
+    initial, regimes = machine.initial(tuple(fields.items())), tuple(s.regime for s in systems)
+    unknowns = max(fields["unknowns"], fields["unknowns_fast"])
+    return _Plan(machine, initial, called, systems, regimes, int(unknowns), slow.states)
 
 
 def _events(
@@ -281,8 +290,7 @@ def _events(
     Halt
         Where it cannot go on.
     """
-    machine, (y, last) = plan.machine, begins
-    regimes, states = [system.regime for system in plan.systems], len(last) - layout.PSIS
+    machine, regimes, states, (y, last) = plan.machine, plan.regimes, plan.states, begins
     asked, meanings = _asked(tuple(watches))
     called, systems = plan.called, plan.systems
     if len(kinks[0]):  # where the numbers change, they are those of this motion alone
@@ -290,19 +298,20 @@ def _events(
         called, systems = (*called[:-2], p, p_before), tuple(s._replace(p=p) for s in systems)
     stepper = stepper_of(meter.engine, systems, meter.methods)
     events = np.empty((max(_EVENTS, 2 * len(watches) + 4), _OF_STATES + states))
-    keeper = _Keeper(recording, plan.systems[0], regimes, states)
-    called_with = *times, meter.budget - meter.spent, keeper.records, len(kinks[0]), kinks[1]
+    records, samples, rows = _to_record(recording, systems[0], states)
+    called_with = *times, meter.budget - meter.spent, records, len(kinks[0]), kinks[1]
     state = machine.state(plan.initial, called_with)
-    block = np.empty(workspace.size(len(y) // 2, states, len(watches)))
+    block = np.empty(workspace.size(plan.unknowns, states, len(watches)))
     arrays = machine.passed(y, last, block)
-    tables = machine.passed(asked.copy(), kinks[0], keeper.samples, events, keeper.rows)
+    tables = machine.passed(asked.copy(), kinks[0], samples, events, rows)
     arguments = *arrays, called, *tables, stepper
     run, end, account = machine.advance(), layout.HANDS_OVER, Account(meter, regimes)
     while end == layout.HANDS_OVER:
         end = run(state.memory, *arguments)
         slow, fast, steps, happened, recorded, jacobians = state.says()
         before = account.settle(slow, fast, steps, jacobians)
-        keeper.keep(recorded)
+        if recording is not None and recorded:
+            recording.take(rows[:recorded].copy(), regimes)
         for line in events[:happened].tolist():
             psis = tuple(line[_OF_STATES:])
             point = _named(Point, (*line[_BEFORE], psis, *line[_BEHIND]))
@@ -316,38 +325,19 @@ def _events(
         raise _halt(end, state, regimes, stepper)
 
 
-class _Keeper:
-    """Hands what one chain of segments records to a recording.
-
-    Attributes
-    ----------
-    records : int
-        Whether the loop records, and when.
-    samples, rows : ndarray
-        Times or clocks at which to, and the table that the loop fills.
+def _to_record(
+    recording: Recording | None, system: Equations, states: int
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Whether a chain of segments records, and when; the times or clocks at which to; and the table
+    that the loop fills.
     """
-
-    def __init__(
-        self,
-        recording: Recording | None,
-        system: Equations,
-        regimes: Sequence[str],
-        states: int,
-    ) -> None:
-        self._recording, self._regimes = recording, regimes
-        self.samples, count, self.records = np.empty(0), 0, layout.NEVER
-        if recording is not None and recording.at is not None:
-            self.samples = recording.left()
-            count = len(self.samples) + 2 * SAMPLES
-            self.records = layout.AT_CLOCKS if system.is_rigid else layout.AT_TIMES
-        elif recording is not None:
-            count, self.records = _RECORDED, layout.WITHIN_STEPS
-        self.rows = np.empty((count, STATES + states))
-
-    def keep(self, recorded: int) -> None:
-        """Add the rows that one call has filled."""
-        if self._recording is not None and recorded:
-            self._recording.take(self.rows[:recorded].copy(), self._regimes)
+    if recording is None:
+        return _NOTHING
+    if recording.at is None:
+        return layout.WITHIN_STEPS, np.empty(0), np.empty((_RECORDED, STATES + states))
+    samples = recording.left()
+    rows = np.empty((len(samples) + 2 * SAMPLES, STATES + states))
+    return layout.AT_CLOCKS if system.is_rigid else layout.AT_TIMES, samples, rows
 
 
 def happening(
