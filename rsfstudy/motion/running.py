@@ -313,13 +313,12 @@ def _events(
         if recording is not None and recorded:
             recording.take(rows[:recorded].copy(), regimes)
         for line in events[:happened].tolist():
+            code, regime, clock, time, slip, spent = line[: layout.POINT]
             psis = tuple(line[_OF_STATES:])
             point = _named(Point, (*line[_BEFORE], psis, *line[_BEHIND]))
-            kind, watch = meanings[int(line[layout.CODE])]
-            name = regimes[int(line[layout.REGIME])]
-            work = before + int(line[layout.SPENT])
-            time, slip = line[layout.TIME], line[layout.SLIP]
-            yield _named(Event, (kind, watch, time, slip, point, name, work, line[layout.CLOCK]))
+            kind, watch = meanings[int(code)]
+            name, work = regimes[int(regime)], before + int(spent)
+            yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
         meter.check()
     if end != layout.ENDED:
         raise _halt(end, state, regimes, stepper)
