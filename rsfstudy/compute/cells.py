@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 #: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
 WAITING = 10.0
-#: Seconds after which finished cells are handed over: in this process, and by a worker.
-_HAND_OVER, _WORKER_HANDS_OVER = 0.2, 0.5
+#: Seconds after which finished cells are handed over; the disk may take 30 ms to keep them.
+_HAND_OVER = 0.5
 #: Identifies this process.
 _HERE = uuid.uuid4().hex
 #: CPU time that Dask itself may use on a worker, over that of the cells.
@@ -209,7 +209,7 @@ def on_worker(sent: bytes, batch: bytes) -> bytes:
         for key, *changes in pickle.loads(zlib.decompress(batch)):
             cell = Changes(*changes).of(task.base)
             finished.append(task.layout.finished(key, *computed(task, cell)))
-            if time.monotonic() - began > _WORKER_HANDS_OVER:
+            if time.monotonic() - began > _HAND_OVER:
                 break
     return pickle.dumps(finished)
 
@@ -246,7 +246,7 @@ class _Limits:
     CPU time is limited, because a slow or busy machine takes longer for the same computation. The
     system counts it for the whole process, so the limit is multiplied by the number of threads that
     compute. The system acts even while a cell holds the interpreter's lock. The limit is set once
-    for each batch: all cells but the last take no longer than `_WORKER_HANDS_OVER` together.
+    for each batch: all cells but the last take no longer than `_HAND_OVER` together.
     """
 
     def __init__(self) -> None:
@@ -283,9 +283,9 @@ class _Limits:
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
-            faulthandler.dump_traceback_later(WAITING * seconds + _WORKER_HANDS_OVER, exit=True)
+            faulthandler.dump_traceback_later(WAITING * seconds + _HAND_OVER, exit=True)
             faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
-            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _WORKER_HANDS_OVER)
+            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _HAND_OVER)
 
 
 _limits = _Limits()
