@@ -48,10 +48,6 @@ class Headlines(Measure):
     outputs = tuple(Output(name, error=True) for name in OF.values())
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
-    @property
-    def classes(self) -> tuple[type[Measure], ...]:
-        return (*super().classes, CriticalStep, LimitCycle)
-
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Measure both; the first that has no number ends it."""
         at_critical = scene.without_mass().with_(stiffness_ratio=1.0)

@@ -8,6 +8,7 @@ import sys
 import textwrap
 from pathlib import Path
 
+import msgspec
 import pytest
 from rsfstudy.named_studies import effects
 
@@ -95,6 +96,35 @@ study = Study(
 """
 
 
+AROUND = """
+@dataclass(frozen=True)
+class Around(Measure):
+    inner: Measure
+    name: ClassVar[str] = "around"
+    headline = "total"
+    variables = {"total": ()}
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        return self.inner.charged(scene, accuracy, meter)
+
+"""
+
+KEEPING = """
+import dataclasses
+
+@dataclasses.dataclass
+class Kept:
+    x: float = 1.0
+
+    @functools.cached_property
+    def twice(self):
+        return 2.0 * self.x
+
+KEPT = Kept()
+
+"""
+
 FOUND = 'find(self, scene, accuracy, meter):\n        """A remark."""'
 
 
@@ -156,6 +186,37 @@ def test_what_it_does_not_draw_on_does_not(part, old, new, tmp_path):
     assert old in before[part]
     after = {**before, part: before[part].replace(old, new)}
     assert digest(study_in(tmp_path / "a", **after)) == digest(study_in(tmp_path / "b"))
+
+
+def test_the_code_of_a_measure_within_another_counts(tmp_path):
+    """Whoever wrote the other: it holds the measure in a field."""
+    head = "from rsfstudy.measures.elasticities import Elasticities\n" + MEASURE
+    theirs = head.replace("measure=Own()", 'measure=Elasticities(Own(), ("b_over_a",))')
+    around = MEASURE.replace("study = Study(", f"{AROUND}study = Study(")
+    around = around.replace("measure=Own()", "measure=Around(inner=Own())")
+    for text in (theirs, around):
+        edits = [(HELPER, text)] * 2
+        edits += [(HELPER.replace("2.0 * x", "3.0 * x"), text)]
+        edits += [(HELPER, text.replace("y * SCALE", "y / SCALE"))]
+        found = []
+        for helper, measure in edits:
+            # in a place of its own: Python takes a file of the same second and size for the same
+            place = tmp_path / str(len(list(tmp_path.iterdir())))
+            study = study_in(place, helper=helper, measure=measure)
+            found.append(provenance.fingerprint(study)["own_code"])
+        assert found[0] == found[1] != "none"
+        assert len(set(found)) == 3
+
+
+def test_what_use_leaves_on_a_class_or_in_an_object_does_not_count(tmp_path):
+    """What a cached property made, and what msgspec keeps of a class that it has read."""
+    kept = HELPER.replace("class Tool(Base):", KEEPING + "class Tool(Base):")
+    using = MEASURE.replace("from helper import Tool", "from helper import Tool, KEPT")
+    study = study_in(tmp_path, helper=kept, measure=using.replace("TOOL.more", "KEPT.x"))
+    before, used = digest(study), type(study.measure).find.__globals__["KEPT"]
+    assert used.twice == 2.0
+    msgspec.convert({"x": 2.0}, type(used))
+    assert digest(study) == before
 
 
 def test_it_is_the_same_in_other_processes(tmp_path):

@@ -135,17 +135,6 @@ def test_a_study_of_elasticities():
     assert again.describe() == study.describe()
 
 
-def test_what_a_measure_asks_decides_its_numbers_too():
-    """Own code within it is named in the fingerprint, and must be the same on workers."""
-    from rsfstudy.compute import provenance
-
-    axes = [Axis("b_over_a", [2.0, 3.0])]
-    measure = Elasticities(Known(), parameters=("a",))
-    study = Study(name="felt", title="Felt", base=SCENE, axes=axes, measure=measure)
-    assert study.own_classes[:2] == (Elasticities, Known)
-    assert provenance.fingerprint(study)["own_code"] != "none"
-
-
 class Curve(Known):
     """A headline along an inner dimension."""
 

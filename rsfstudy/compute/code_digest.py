@@ -37,14 +37,14 @@ _INSTALLED = tuple(
         site.getusersitepackages(),
     }
 )
-#: Attributes that Python makes for classes and dataclasses, which decide no number.
+#: Attributes that Python and msgspec make for classes and dataclasses, which decide no number.
 _MADE = {
     *("__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__"),
     *("__annotate__", "__annotate_func__", "__annotations_cache__", "__firstlineno__"),
     *("__static_attributes__", "__match_args__", "__slotnames__", "__abstractmethods__"),
     *("__dataclass_fields__", "__dataclass_params__", "__repr__", "__eq__"),
     *("__hash__", "__setattr__", "__delattr__", "__replace__", "__getstate__", "__setstate__"),
-    "_abc_impl",
+    *("_abc_impl", "__msgspec_cache__"),
 }
 _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 
@@ -170,12 +170,20 @@ class _Walk:
 
     def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
         if _is_followed(type(value).__module__):
-            yield from self.parts(getattr(value, "__dict__", None), names)
+            kept = {
+                n: v for n, v in getattr(value, "__dict__", {}).items() if not _is_made(value, n)
+            }
+            yield from self.parts(kept, names)
             return
         try:
             yield pickle.dumps(value, protocol=4).hex()
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
+
+
+def _is_made(value: Any, name: str) -> bool:
+    """True if an attribute keeps what a property has once made of the others."""
+    return isinstance(getattr(type(value), name, None), functools.cached_property)
 
 
 def _is_documented(code: CodeType) -> bool:

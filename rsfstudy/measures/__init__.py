@@ -137,8 +137,9 @@ class Measure:
 
     @property
     def classes(self) -> tuple[type[Measure], ...]:
-        """Its class, and those of measures that it asks: their code decides its numbers."""
-        return (type(self),)
+        """Its class, and those of measures that it holds: their code decides its numbers."""
+        held = (getattr(self, f.name) for f in fields(self))
+        return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.classes))
 
     @property
     def typical_work(self) -> int:

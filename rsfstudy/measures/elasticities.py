@@ -99,10 +99,6 @@ class Elasticities(Measure):
         return self.measure.sought
 
     @property
-    def classes(self) -> tuple[type[Measure], ...]:
-        return (*super().classes, *self.measure.classes)
-
-    @property
     def typical_work(self) -> int:
         return self.measure.typical_work * (2 * min(_USUAL, len(self.parameters)) + 1)
 
