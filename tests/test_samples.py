@@ -1,11 +1,13 @@
 """Samples and tables of cases as one dimension over several fields, and what is made of them."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from rsfstudy.named_studies import uncertain_recurrence
 from running import call, run
 from scipy.stats import lognorm, norm, truncnorm, uniform
 
@@ -26,6 +28,7 @@ from rsfstudy.reduce import (
 from rsfstudy.rig.reductions import InUnits
 from rsfstudy.status import Status
 
+RECORDS = Path(uncertain_recurrence.__file__).parent / "records"
 BASE = Scene(normal_stress="constant")
 LOGS = {"ln_a": norm(np.log(0.01), 0.1), "ln_net": norm(np.log(0.02), 0.1)}
 FIELDS = {
@@ -192,6 +195,24 @@ def test_samples_in_units_of_a_rig():
     declared = study(lengths, base=base, laboratory=RIG)
     for row, scene in zip(lengths.rows, declared.scenes(), strict=True):
         assert scene.stiffness == pytest.approx(2e-4 * row["slip_distance"], rel=1e-12)
+
+
+# ---- from a fit ----------------------------------------------------------------------------------
+
+
+def test_the_estimates_that_uncertain_recurrence_states():
+    """Those of the fit that it names, of the record that is shipped, to half of the last of four
+    digits; a fit at a hundredth of the tolerance differs by less than one in 10^6.
+    """
+    stated = uncertain_recurrence
+    record = rsfstudy.read_record(RECORDS / "basalt.txt")
+    fitted = rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])
+    names = list(stated.ESTIMATES)
+    assert fitted["parameter"].values.tolist()[: len(names)] == names
+    found = [fitted[name].item() for name in names]
+    assert list(stated.ESTIMATES.values()) == pytest.approx(found, rel=1.1e-4)
+    covariance = fitted["covariance"].values.squeeze()[: len(names), : len(names)]
+    np.testing.assert_allclose(stated.COVARIANCE, covariance, rtol=2.5e-4)
 
 
 # ---- what is refused ----------------------------------------------------------------------------
