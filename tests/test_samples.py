@@ -200,19 +200,42 @@ def test_samples_in_units_of_a_rig():
 # ---- from a fit ----------------------------------------------------------------------------------
 
 
-def test_the_estimates_that_uncertain_recurrence_states():
-    """Those of the fit that it names, of the record that is shipped, to half of the last of four
-    digits; a fit at a hundredth of the tolerance differs by less than one in 10^6.
-    """
-    stated = uncertain_recurrence
+@pytest.fixture(scope="module")
+def fitted():
+    """The fit that uncertain_recurrence names, of the record that is shipped."""
     record = rsfstudy.read_record(RECORDS / "basalt.txt")
-    fitted = rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])
+    return rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])
+
+
+def test_the_estimates_that_uncertain_recurrence_states(fitted):
+    """To half of the last of four digits; at a tenth of the tolerance six digits are the same."""
+    stated = uncertain_recurrence
     names = list(stated.ESTIMATES)
     assert fitted["parameter"].values.tolist()[: len(names)] == names
     found = [fitted[name].item() for name in names]
     assert list(stated.ESTIMATES.values()) == pytest.approx(found, rel=1.1e-4)
     covariance = fitted["covariance"].values.squeeze()[: len(names), : len(names)]
     np.testing.assert_allclose(stated.COVARIANCE, covariance, rtol=2.5e-4)
+
+
+def test_draws_of_a_fit_are_cases_of_a_rig(fitted):
+    """With units that the draws state, or that a DataFrame of them is told: k_cr = (b - a)
+    sigma_*/D_c, to rounding and the width of a root, on a machine whose K goes with D_c.
+    """
+    draws = fitted.rsf.draw(16, seed=1)
+    fields = {
+        "a": "a",
+        "b_over_a": lambda drawn: drawn["b"] / drawn["a"],
+        "slip_distance": "slip_distance",
+    }
+    base = RIG.scene(law="slowness", a=0.006, b_over_a=1.1, normal_stress="constant")
+    for table, units in ((draws, None), (draws.to_dataframe(), {"slip_distance": "um"})):
+        axis = Axis.cases(table, fields=fields, units=units, dimension="draw")
+        found = run(study(axis, base=base, laboratory=RIG))
+        assert found["slip_distance"].attrs["units"] == "um"
+        np.testing.assert_allclose(found["slip_distance"], draws["slip_distance"], rtol=1e-15)
+        np.testing.assert_allclose(found["critical_stiffness"], draws["b"] - draws["a"], rtol=1e-7)
+        np.testing.assert_allclose(found["stiffness"], 2e-4 * draws["slip_distance"], rtol=1e-12)
 
 
 # ---- what is refused ----------------------------------------------------------------------------
@@ -256,7 +279,20 @@ def test_what_is_no_table():
         ([0.01], "table = .*: is no table of columns"),
         ({}, "table = {}: is no table"),
         ({"a": [0.01, 0.02], "mu_star": [0.6]}, "columns = .*: must be of one length"),
-        ({"a": [0.01, np.nan]}, "a = nan: must be finite"),
+        ({"a": [0.01, np.nan]}, "case 1: a = nan: must be finite"),
+        (
+            pd.DataFrame({"a": pd.array([1, None], dtype="Int64")}),
+            "case 1: a = nan: must be finite",
+        ),
+        (pd.Series([0.01], name="a"), "table = .*: is no table of columns"),
+        (pd.DataFrame([[0.01, 1.5]]), "column = '0': must be named as a field is"),
+        (
+            pd.DataFrame([[1.0, 2.0]], columns=["a", "a"]),
+            "a = .*: must be one list, of a value for",
+        ),
+        (xr.Dataset({"a": (("x", "y"), np.ones((2, 2)))}), "a = .*: must be one list"),
+        ({"a": 0.01}, "a = 0.01: must be one list"),
+        ({"a": [[0.01], [0.01, 0.02]]}, r"a = \[0.01\]: must be a number, a flag or a text"),
         ({"case": [1.0, 2.0]}, "column = 'case': must be named"),
     ):
         with pytest.raises(InvalidValue, match=message):

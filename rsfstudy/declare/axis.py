@@ -166,15 +166,17 @@ class Axis:
             raise InvalidValue("units", self.units, rule, choices=self.fields)
         for name, text in self.units.items():
             check_text(name, text)
-        for row in self.rows:
+        for number, row in enumerate(self.rows):
             for name, value in row.items():
                 if not isinstance(value, float | str | bool | None):
                     raise InvalidValue(name, value, "must be a number, a flag or a text")
                 if isinstance(value, str):
                     check_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
-                    name = name if self.is_numbered else self.dimension
-                    raise InvalidValue(name, value, "must be finite")
+                    if self.is_numbered:
+                        wrong = InvalidValue(name, value, "must be finite")
+                        raise wrong.at(f"{self.dimension} {number}")
+                    raise InvalidValue(self.dimension, value, "must be finite")
         if self.is_numbered:
             return  # of equal ones one is computed
         seen: set[frozenset[tuple[str, Any]]] = set()

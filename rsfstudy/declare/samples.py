@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
+from rsfstudy.declare.axis import is_list
 from rsfstudy.errors import InvalidValue
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.
@@ -173,18 +174,21 @@ def _made(name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]) ->
 
 def columns_of(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Columns of a table by their names, and the units that it states of them."""
-    if not hasattr(table, "keys") or not len(table):
+    if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
         rule = "is no table of columns"
         remedy = "Give a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found, units = {}, {}
     # the keys of an xarray.Dataset are its data variables
-    for name in map(str, getattr(table, "data_vars", table)):
-        column = table[name]
+    for key in getattr(table, "data_vars", table):
+        name, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
         stated = stated.get(name, "") if isinstance(stated, Mapping) else stated
         values = getattr(column, "values", column)
-        found[name] = list(values) if np.ndim(values) == 1 else values
+        values = np.asarray(values) if hasattr(values, "dtype") else values
+        if not is_list(values):
+            raise InvalidValue(name, column, "must be one list, of a value for each row")
+        found[name] = list(values)
         if stated not in ("", "1"):
             units[name] = stated
     return found, units

@@ -19,7 +19,7 @@ from rsfstudy.rig.units import number
 _HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 #: What numbers without surprises are made of.
 _PLAIN = frozenset("0123456789+-.eE \t\r\n")
-_EXAMPLE = "velocity (um/s), distance (um)"
+_EXAMPLE = "velocity (um/s), distance (um), a (1)"
 
 
 class Column(NamedTuple):
