@@ -68,6 +68,31 @@ def test_at_the_critical_stiffness_there_is_one_side():
     assert 1e-4 < error < 0.01
 
 
+CONSTANT = {"normal_stress": "constant", "law": "slowness"}
+SCENES = [
+    (CriticalStep("displacement_step"), Scene(**CONSTANT, b_over_a=1.5, stiffness_ratio=1.3)),
+    (CriticalStep(), Scene(law="slip", alpha=0.3, phi=45.0, b_over_a=1.5, stiffness_ratio=1.02)),
+    (LimitCycle(phases=2), Scene(**CONSTANT, b_over_a=1.5, stiffness_ratio=0.8, inertia=True)),
+    (LimitCycle(phases=2), Scene(**CONSTANT, b_over_a=1.2, stiffness_ratio=0.95, inertia=True)),
+]
+
+
+@pytest.mark.parametrize(("measure", "scene"), SCENES)
+def test_errors_are_told_without_closed_forms_too(measure, scene):
+    """By each number of the scene, the stiffness of a cycle near the critical one among them:
+    against steps that are ten times shorter, at 10^-4 of the tolerance.
+    """
+    of = Elasticities(measure)
+    finer = Accuracy(rtol=1e-9, engine="compiled", budget=50_000_000)
+    looser = Accuracy(rtol=1e-5, engine="compiled")
+    loose, tight = (told(of, scene, accuracy)[0] for accuracy in (looser, finer))
+    known = {name for name, (elasticity, _error) in loose.items() if not math.isnan(elasticity)}
+    assert {"a", "b_over_a", "mu_star", "stiffness_ratio"} <= known
+    for name in known:
+        assert abs(loose[name][0] - tight[name][0]) <= loose[name][1] + tight[name][1]
+        assert loose[name][1] < 0.02
+
+
 @dataclass(frozen=True)
 class Known(Measure):
     """y = a^2 exp(-mu_star)/(b/a - 1), with an error that is stated, and made."""

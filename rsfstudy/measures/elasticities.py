@@ -24,6 +24,8 @@ from rsfstudy.status import Status
 NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (float, float | None))
 #: Longest step of ln p.
 _LONGEST = 0.1
+#: Slopes that are none, and how much more than by curvature alone the third derivative may be.
+_FLAT, _MOST_CURVED = 1e-9, 4.0
 #: How many numbers a scene usually has that are not zero.
 _USUAL = 8
 
@@ -41,10 +43,11 @@ class Elasticities(Measure):
     scene, all others held: 2 where y doubles twice as p doubles once.
 
     They are central differences over a step of ln p that balances what is left out with the error
-    of y, which the measure tells: h = (3 e)^(1/3). The error estimate adds both: e/h, and h^2/3
-    times the third power of a scale of ln y on which it curves, as a logarithm does that ends at a
-    boundary. Where only one side has a number, as at the critical stiffness, the difference is
-    one-sided, and its error larger by that. There are two measurements of each number and one more.
+    of y, which the measure tells: h = (e/2)^(1/3). The error estimate adds both: e/h, and three
+    times what is left out of a logarithm, or a power, that ends at a boundary and has the slope and
+    curvature of ln y. Where only one side has a number, as at the critical stiffness, the
+    difference is one-sided, and its error larger by that. There are two measurements of each number
+    and one more.
 
     Parameters
     ----------
@@ -125,7 +128,7 @@ class Elasticities(Measure):
             why = f"{self.headline} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
         here = _level(y, error)
-        step = min(_LONGEST, (3.0 * here.error) ** (1.0 / 3.0))
+        step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking = []
         for place, name in enumerate(self.parameters):
@@ -181,8 +184,9 @@ def _derivative(here: _Level, sides: Sequence[_Level | None], step: float) -> tu
     if below and above:
         slope = (above.value - below.value) / (2.0 * step)
         curved = abs(above.value - 2.0 * here.value + below.value) / step**2
-        left_out = step**2 / 3.0 * max(1.0, curved) ** 1.5
-        return slope, left_out + (above.error + below.error) / (2.0 * step)
+        # of c ln(x - x_0), slope and curvature tell half of the third derivative
+        third = curved**1.5 * min(max(1.0, curved**0.5 / max(abs(slope), _FLAT)), _MOST_CURVED)
+        return slope, step**2 * max(1.0, third) + (above.error + below.error) / (2.0 * step)
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
             slope = sign * (beside.value - here.value) / step
