@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events
-from rsfstudy.analysis.return_map import Orbit, ReturnMap, section
+from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -126,9 +126,20 @@ class Approach:
             return True
         if len(self.seen) < 2 or self.seen[-2].end != self.seen[-1].begin:
             return False
+        if self._wavers():
+            return True
         change = np.abs(numbers - self.seen[-2].numbers())
         left = min(max(self._return, 0.0), _DIVERGES)
         return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
+
+    def _wavers(self) -> bool:
+        """True if the last two cycles go to and fro, as near the limit cycle as it is ever closed:
+        by numerical errors, because on a plane no motion passes another, so that cycles approach
+        their limit from one side.
+        """
+        before, last = (cycle.end.spring - cycle.begin.spring for cycle in self.seen[-2:])
+        near = CLOSED * self._accuracy.rtol * self._scene.a * self.seen[-1].swing
+        return before * last <= 0.0 and abs(last) <= near
 
     def _may_leap(self) -> bool:
         """True if to leap to the fixed point: not where the next cycle comes as close, nor where

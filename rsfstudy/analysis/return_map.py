@@ -39,7 +39,7 @@ _WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 _NEAR, _TRIES = 0.1, 12
 #: How nearly its events must close a cycle, in the accuracy asked for: what they do not is
 #: corrected to first order.
-_CLOSED = 0.3
+CLOSED = 0.3
 
 
 @dataclass(frozen=True)
@@ -273,7 +273,7 @@ class ReturnMap:
         """The cycle of as many events as derivatives are known of, within reach of a section; None
         where there is none. By Newton's method with Broyden's corrections.
         """
-        at, enough, last = start, _CLOSED * self.accuracy.rtol * scale, math.inf
+        at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
         jacobian = product(slopes) - np.eye(len(start))
         move = np.zeros(len(start))
         for _ in range(_TRIES):
