@@ -1,15 +1,22 @@
 """The regularised form of friction, in which slip reverses with shear stress."""
 
 import math
+import pickle
 
+import numpy as np
 import pytest
 from in_time import InTime
 
-from rsfstudy import Scene, simulate
-from rsfstudy.errors import Incomplete
+from rsfstudy import Scene, history, protocol, simulate
+from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.events import Kind, maximum, minimum
+from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.readings import watched
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import relation_of
 from rsfstudy.status import Status
@@ -92,3 +99,77 @@ def test_steady_friction_stays_positive(stress, load):
         assert stability.critical_stiffness(scene, math.log(load)) == pytest.approx(
             weakens, rel=1e-9
         )
+
+
+#: Friction without a state, which turns within a few D_c.
+TURNS = {"law": "slip", "a": 0.01, "b_over_a": 0.0, "mu_star": 0.1, "stiffness": 0.02}
+
+
+def unloaded(time, back):
+    """Shear stress under a load point that moves back, from steady sliding at V_* on, without a
+    state: ``dtau/dt = -K [r + 2 exp(-mu_*/a) sinh(tau/a)]`` is a Riccati equation of exp(tau/a).
+    """
+    a, weak = TURNS["a"], 2.0 * math.exp(-TURNS["mu_star"] / TURNS["a"])
+    root = math.hypot(back, weak)
+    rests, other = weak / (back + root), -(back + root) / weak
+    start = math.exp(math.asinh(1.0 / weak))
+    ratio = (start - rests) / (start - other) * np.exp(-TURNS["stiffness"] / a * root * time)
+    return a * np.log((rests - ratio * other) / (1.0 - ratio))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("of", ["displacement", "velocity", "protocol"])
+def test_a_load_point_that_moves_back_unloads_and_reverses(of, engine):
+    """From forward slip through none to steady slip back, by records and by a protocol."""
+    time, rate = np.linspace(0.5, 20.0, 40), 1.5
+    sampled = {"displacement": [0.0, -45.0], "velocity": [-rate, -rate]}
+    back = protocol([{"velocity": -rate}])
+    if of != "protocol":
+        back = history({"time": [0.0, 30.0], of: sampled[of]})
+    scene = Scene(**TURNS, **CONSTANT, regularised=True, loading=back)
+    ran = simulate(scene, times=time, rtol=1e-9, engine=engine)
+    # measured 1e-11, which is the accuracy of ln V times a
+    assert ran.shear_stress.values == pytest.approx(unloaded(time, rate), abs=1e-10)
+    assert ran.load_point_displacement.values == pytest.approx(-rate * time, abs=1e-9)
+    assert ran.log10_slip_rate[-1] == pytest.approx(math.log10(rate), abs=1e-5)
+    assert ran.slip[-1] < -15.0
+
+
+@pytest.mark.parametrize("law", ["slowness", "slip"])
+def test_slip_back_is_a_mirror_of_slip_forward(law):
+    """Steady sliding back, and a step of its velocity. Between both the fault is locked, and the
+    spring unloads linearly.
+    """
+    fields = {"law": law, "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
+    on = Scene(**fields, loading=protocol([{"velocity": 3.0}]))
+    times = np.linspace(0.5, 12.0, 24)
+    known = simulate(on, times=times, rtol=1e-8, engine=COMPILED).shear_stress
+    back = [{"velocity": -1.0, "duration": 120.0}, {"velocity": -3.0}]
+    scene = Scene(**fields, regularised=True, loading=protocol(back))
+    ran = simulate(scene, times=[20.0, 50.0, *(120.0 + times)], rtol=1e-8, engine=COMPILED)
+    assert float(ran.shear_stress[0] - ran.shear_stress[1]) == pytest.approx(0.6, abs=1e-9)
+    np.testing.assert_allclose(-ran.shear_stress[2:], known, atol=1e-7)
+
+
+def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
+    fields = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
+    scene = Scene(**fields, regularised=True, loading=protocol([{"velocity": -1.0}]))
+    of = watched(scene)[0]
+    watches = [minimum(of, ends=True), maximum(of, ends=True)]
+    *_before, turn = follow(scene, Accuracy(1e-6), Meter(10**5), watches, until=100.0)
+    assert turn.kind is Kind.MINIMUM
+    assert turn.point.log_rate == pytest.approx(0.0, abs=1e-6)
+    assert turn.point.spring < -2.0 * scene.mu_star
+
+
+def test_friction_of_forward_slip_is_no_part_of_reversal():
+    back = protocol([{"velocity": 2.0, "duration": 1.0}, {"velocity": -1.0}])
+    with pytest.raises(InvalidValue, match="segment 2: velocity = -1.0: moves the load point back"):
+        Scene(**CONSTANT, loading=back)
+    record = history({"time": [0.0, 1.0, 2.0], "displacement": [0.0, 1.0, 0.5]})
+    with pytest.raises(InvalidValue, match="sample 3: displacement = 0.5: .*regularised=True"):
+        Scene(**CONSTANT, loading=pickle.loads(pickle.dumps(record)))
+    hold = protocol([{"velocity": -1.0, "duration": 100.0}, {"velocity": 0.0}])
+    scene = Scene(**CONSTANT, stiffness=0.02, regularised=True, loading=hold)
+    with pytest.warns(Incomplete, match="shear stress has gone to -"):
+        assert simulate(scene).attrs["status"] == "shear_stress_reversed"

@@ -221,7 +221,7 @@ def _limit(scene: Scene) -> float:
     if scene.has_mass or scene.dynamics.damping(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.table)[:, VELOCITY]
-    fastest = math.log(max(1.0, float(loads.max())))
+    fastest = math.log(max(1.0, float(abs(loads).max())))
     norm = scene.log_norm_rate
     return norm if norm > fastest else fastest + math.log(_OVER_LOADING)
 
@@ -257,7 +257,7 @@ def _as_stated(scene: Scene) -> float:
         return loading.lasts
     if len(loading.segments) == 1:
         return _USUAL
-    return stated + (_BEYOND / scene.load_velocity if scene.load_velocity else _USUAL)
+    return stated + (_BEYOND / abs(scene.load_velocity) if scene.load_velocity else _USUAL)
 
 
 def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray | None:

@@ -163,8 +163,9 @@ def _hold(scene: Scene) -> int | Outcome:
     if not holds:
         return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
     before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
-    if reload.load_velocity == 0.0:
-        return Outcome(Status.NOT_APPLICABLE, message="the hold is followed by another")
+    if reload.load_velocity <= 0.0:
+        why = "the hold is followed by another, or by a load point that moves back"
+        return Outcome(Status.NOT_APPLICABLE, message=why)
     stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
     if hold.displacement or reload.displacement or len(stresses) > 1:
         why = "the load point is displaced, or normal stress stepped, at an end of the hold"

@@ -193,8 +193,8 @@ class VelocityStep(Recorded):
             return Outcome(Status.NO_STEP, message="the load point goes on as before")
         stressed = earlier[-1].normal_stress if earlier else 0.0
         changed = own.displacement or own.normal_stress != stressed
-        if not own.load_velocity or not before or changed:
-            text = "a hold, a displacement or a change of normal stress is no step of velocity"
+        if min(own.load_velocity, before) <= 0.0 or changed:
+            text = "a hold, a reversal, a displacement or a change of normal stress is no step"
             return Outcome(Status.NOT_APPLICABLE, message=text)
         start_time = math.fsum(segment.duration for segment in earlier)
         duration = min(own.duration, self.record / own.load_velocity)

@@ -11,6 +11,7 @@ from rsfstudy.motion.layout import (
     BEGIN,
     CLOCK,
     CODE,
+    COEFFICIENT,
     DISTANCE,
     ENDS,
     FARTHEST,
@@ -193,7 +194,8 @@ def detect(motion, space, limits):
         watch = watch_of(space, w)
         space.when[w] = math.nan
         if watch[KIND] == SETTLED:
-            if motion.kinks > 0:
+            against = motion.reverses and p[LOAD_VELOCITY] * space.after[COEFFICIENT] < 0.0
+            if motion.kinks > 0 or against:
                 continue
             apart = abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE])
             away = max(apart, space.after[DISTANCE] / abs(p[B]))

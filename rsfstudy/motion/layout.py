@@ -36,6 +36,7 @@ MOTION = np.dtype(
         ("resolved", "f8"),  # longest step within which dense output is as accurate as is wanted
         ("regime", "i8"),
         ("begins", "i8"),  # what to tell before the first event of a regime
+        ("reverses", "i8"),  # whether slip may, with shear stress
         ("terminates", "i8"),  # whether the motion ends where it cannot go on
         ("has_mass", "i8"),  # whether there are two regimes
         ("has_clock", "i8"),  # whether time is an unknown

@@ -29,16 +29,18 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
     """
     size = scene.a * scene.parts.law.size_over_a
     return max(
-        abs(point.log_rate - math.log(load_velocity)), point.distance_from_steady_state / size
+        abs(point.log_rate - math.log(abs(load_velocity))), point.distance_from_steady_state / size
     )
 
 
 def watched(scene: Scene) -> tuple[str, float]:
     """Quantity that an engine watches to tell extrema and levels of the friction coefficient that
-    is read, and what it is above it: spring stress itself where nothing changes normal stress.
+    is read, and what it is above it: spring stress itself where nothing changes normal stress and
+    slip rate alone tells where that is extreme.
     """
     parts = scene.parts
-    if parts.normal_stress.normal_stress is None and not parts.loading.unknowns:
+    stressed = parts.normal_stress.normal_stress is not None or parts.loading.unknowns
+    if not stressed and not parts.law.regularised:
         return "spring", scene.mu_star
     return "reading", 0.0
 

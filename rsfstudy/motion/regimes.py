@@ -160,7 +160,9 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     if slider.mu_star + spring > 0.0:
         return
-    text = f"the step takes shear stress to {slider.mu_star + spring:.3g} sigma_*"
+    steps = start is None or scene.spring_stress_step
+    now = "the step takes shear stress to" if steps else "shear stress has gone to"
+    text = f"{now} {slider.mu_star + spring:.3g} sigma_*"
     if not scene.parts.law.regularised:
         raise Halt(Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True")
     if scene.load_velocity == 0.0:

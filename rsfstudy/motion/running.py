@@ -222,6 +222,7 @@ def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> 
         slow = both.slow if both else without_mass(scene, clock=clock)
         fields = _fields(accuracy.solver, slow, both)
         fields["behind"] = len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0
+        fields["reverses"] = scene.parts.law.regularised
         fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
         scene.made[key] = _plan(_machine(meter), fields, slow, both)
     found: _Plan = scene.made[key]

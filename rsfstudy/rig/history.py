@@ -57,9 +57,9 @@ def history(
     Raises
     ------
     InvalidValue
-        For missing units, a gap or NaN, a clock that stands still or runs back, a load point that
-        moves back, and normal stress that is not positive: with line and column, or the number of
-        the sample.
+        For missing units, a gap or NaN, a clock that stands still or runs back, and normal stress
+        that is not positive: with line and column, or the number of the sample; and so when a Scene
+        is made of a load point that moves back, unless it is `regularised`.
     """
     found = _columns(record, columns, laboratory)
     for key in found:
@@ -82,7 +82,7 @@ def history(
     time, clock = values["time"], found["time"]
     late = np.append(False, np.diff(time) <= 0.0)
     _check("time", clock.values, late, "must be later than the sample before", clock.place)
-    velocity = _velocity(values, found)
+    velocity, back = _velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:
         ones, none = np.ones(len(time)), np.zeros(len(time))
@@ -91,7 +91,7 @@ def history(
         rule = "leaves no normal stress: it must stay positive, less pore pressure"
         _check(key, found[key].values, fall >= 1.0, rule, found[key].place)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
-    return sampled(time, velocity, fall, name, of_pressure=of_pressure)
+    return sampled(time, velocity, fall, name, of_pressure=of_pressure, back=back)
 
 
 def _columns(
@@ -135,21 +135,28 @@ def _plain(key: str, column: Column, laboratory: Laboratory | None) -> np.ndarra
     return np.asarray(column.values * one)
 
 
-def _velocity(values: Mapping[str, np.ndarray], found: Mapping[str, Column]) -> np.ndarray:
-    """Velocity of the load point from each sample on."""
+def _velocity(
+    values: Mapping[str, np.ndarray], found: Mapping[str, Column]
+) -> tuple[np.ndarray, tuple[str, float, str] | None]:
+    """Velocity of the load point from each sample on; and the sample by which it first moves back,
+    with its name and place.
+    """
     time, key = values["time"], "velocity" if "velocity" in found else "displacement"
     if key not in found:
-        return np.ones(len(time))
-    rule = "moves the load point back: friction is that of forward slip"
+        return np.ones(len(time)), None
     if key == "velocity":
         speeds = values[key]
-        _check(key, found[key].values, speeds < 0.0, rule, found[key].place)
-        return np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
-    steps = np.diff(values[key])
-    back = np.append(False, steps < 0.0)
-    _check(key, found[key].values, back, rule, found[key].place)
-    speeds = steps / np.diff(time)
-    return np.append(speeds, speeds[-1])
+        back = speeds < 0.0
+        mean = np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
+    else:
+        steps = np.diff(values[key])
+        back = np.append(False, steps < 0.0)
+        speeds = steps / np.diff(time)
+        mean = np.append(speeds, speeds[-1])
+    if not back.any():
+        return mean, None
+    first = int(np.argmax(back))
+    return mean, (key, float(found[key].values[first]), found[key].place(first))
 
 
 def _check(

@@ -60,12 +60,15 @@ class History(Stated):
     of_pressure : bool
         Whether it is pore pressure alone. Beside a fluid that has pressure too, that is the
         pressure around the fault; fluid flows in or out until both are the same.
+    back : tuple of (str, float, str), optional
+        Name, value and place of the first sample that moves the load point back.
     """
 
     samples: bytes = field(repr=False)  # type: ignore[misc]  # of each, and not of the class
     digest: str  # type: ignore[misc]
     of_stress: bool
     of_pressure: bool = False
+    back: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
 
     auxiliary_rates = staticmethod(ramp.auxiliary_rates)
     auxiliary_steady_states = staticmethod(ramp.auxiliary_steady_states)
@@ -76,9 +79,14 @@ class History(Stated):
         return _UNKNOWNS if self.of_stress else ()
 
     def check(self, scene: Scene) -> None:
-        """No fluid that changes normal stress too, unless it is of pressure."""
+        """No fluid that changes normal stress too, unless it is of pressure; see `Stated`."""
+        super().check(scene)
         if self.of_stress and not self.of_pressure:
             refuse_fluid(scene, "loading", self.name)
+
+    def stated_at(self, number: int) -> tuple[str, float, str]:
+        velocity = float(self.columns[number, VELOCITY])
+        return self.back or ("velocity", velocity, f"sample {number + 1}")
 
     @property
     def beginning(self) -> Numbers:
@@ -155,6 +163,7 @@ def sampled(
     name: str,
     *,
     of_pressure: bool = False,
+    back: tuple[str, float, str] | None = None,
 ) -> History:
     """A loading history of samples.
 
@@ -170,6 +179,8 @@ def sampled(
         What the history is called in results.
     of_pressure : bool
         Whether all of the fall is pore pressure.
+    back : tuple of (str, float, str), optional
+        Name, value and place of the first sample that moves the load point back.
 
     Raises
     ------
@@ -183,7 +194,8 @@ def sampled(
     if fall is not None:
         columns[:, FALL] = fall
         columns[:-1, RISING] = -np.diff(fall) / np.diff(time)
-    return of_samples(columns, fall is not None, name, of_pressure=of_pressure)
+    history = of_samples(columns, fall is not None, name, of_pressure=of_pressure)
+    return replace(history, back=back)
 
 
 def of_samples(
@@ -198,4 +210,4 @@ def of_samples(
 
 def _log(velocity: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(velocity))
+        return np.asarray(np.log(abs(velocity)))

@@ -10,11 +10,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.places import VELOCITY
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.scene import Scene
 
 #: What a segment of a protocol may state.
 KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
@@ -31,6 +37,19 @@ class Stated(Loading):
     """
 
     name: str  # type: ignore[misc]  # of each, and not of the class
+
+    def check(self, scene: Scene) -> None:
+        """A load point that moves back only where slip may."""
+        back = np.asarray(self.table)[:, VELOCITY] < 0.0
+        if back.any() and not scene.parts.law.regularised:
+            name, value, place = self.stated_at(int(np.argmax(back)))
+            rule = "moves the load point back, and friction is that of forward slip"
+            remedy = "Set regularised=True, by which slip reverses with shear stress."
+            raise InvalidValue(name, value, rule, remedy=remedy).at(place)
+
+    def stated_at(self, number: int) -> tuple[str, float, str]:
+        """Name and value of what was stated of a segment that moves back, and where."""
+        return "velocity", self.segments[number].load_velocity, f"segment {number + 1}"
 
     @property
     def lasts(self) -> float:
@@ -72,19 +91,19 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     ----------
     segments : sequence of Segment or mapping
         What the load point does, one segment after the other. A mapping states its ``velocity`` in
-        V_*, and how long it lasts by its ``duration`` in D_c/V_* or its ``distance`` in D_c; a
-        ``step`` is a sudden displacement of the load point in D_c at its beginning, and
-        ``normal_stress`` what the rig imposes during it, over sigma_* (that of the segment before
-        unless stated; 1 before the first). After the last one, which need not say how long it
-        lasts, the load point goes on at that velocity.
+        V_* (below 0 it moves back, where the scene is `regularised`), and how long it lasts by its
+        ``duration`` in D_c/V_* or its ``distance`` in D_c; a ``step`` is a sudden displacement of
+        the load point in D_c at its beginning, and ``normal_stress`` what the rig imposes during
+        it, over sigma_* (that of the segment before unless stated; 1 before the first). After the
+        last one, which need not say how long it lasts, the load point goes on at that velocity.
     name : str
         What the protocol is called in results.
 
     Raises
     ------
     InvalidValue
-        For a protocol without segments, a segment that moves backwards, lasts no time, has no
-        normal stress, or says twice or not at all how long it lasts.
+        For a protocol without segments, a segment that lasts no time, has no normal stress, or says
+        twice or not at all how long it lasts.
     """
     if not is_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
@@ -140,20 +159,22 @@ def _duration(stated: Mapping[str, Any]) -> Any:
     if "duration" in stated:
         rule = f"give duration or distance (here {distance!r}), not both"
         raise InvalidValue("duration", stated["duration"], rule)
-    _check("distance", distance, "must be positive and finite", positive=True)
-    _check("velocity", velocity, "must be positive where a distance is stated", positive=True)
+    _check("distance", distance, "must be positive and finite")
+    _check("velocity", velocity, "must be positive where a distance is stated")
     return distance / velocity
 
 
 def _excess(normal_stress: Any) -> float:
     """Imposed normal stress less its reference value, over that."""
     rule = "must be greater than 0, and finite"
-    _check("normal_stress", normal_stress, rule, positive=True)
+    _check("normal_stress", normal_stress, rule)
     return float(normal_stress) - 1.0
 
 
 def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
-    _check("velocity", velocity, "must be 0 or greater, and finite", positive=False)
+    if not _is_number(velocity) or not math.isfinite(velocity):
+        remedy = "0 holds the load point."
+        raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
@@ -165,13 +186,9 @@ def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Seg
     return Segment(float(velocity), float(step), float(duration), float(normal_stress))
 
 
-def _check(name: str, value: Any, rule: str, *, positive: bool) -> None:
-    right = _is_number(value) and math.isfinite(value)
-    if not right or value < 0.0 or (positive and value == 0.0):
-        remedy = ""
-        if name == "velocity":
-            remedy = "Friction is that of forward slip; 0 holds the load point."
-        raise InvalidValue(name, value, rule, remedy=remedy)
+def _check(name: str, value: Any, rule: str) -> None:
+    if not (_is_number(value) and math.isfinite(value) and value > 0.0):
+        raise InvalidValue(name, value, rule)
 
 
 def _is_number(value: Any) -> bool:

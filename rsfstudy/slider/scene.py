@@ -422,8 +422,8 @@ class Scene(ShownAsTable):
 
     @derived
     def log_load_rate(self) -> float:
-        """ln(V_0/V_*), and -inf for a load point at rest."""
-        return math.log(self.load_velocity) if self.load_velocity > 0.0 else -math.inf
+        """ln(V_0/V_*) of the magnitude of V_0, and -inf for a load point at rest."""
+        return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
 
     @derived
     def imposed_normal_stress(self) -> float:

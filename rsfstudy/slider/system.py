@@ -73,8 +73,8 @@ def velocity_ratios(log_rate: float, p: Numbers) -> Ratios:
 def duration(ratios: Ratios, p: Numbers) -> float:
     """Time over slip and load point displacement together, ``1/(V + V_0)``."""
     x, slower, fraction = ratios
-    if p[LOAD_VELOCITY] > 0.0:
-        return slower * fraction / p[LOAD_VELOCITY]
+    if p[LOAD_VELOCITY] != 0.0:
+        return slower * fraction / abs(p[LOAD_VELOCITY])
     return math.exp(-max(x, SLOWEST))
 
 
@@ -91,8 +91,8 @@ def path_metric(slant: float) -> float:
 def against_displacement(made: Friction, balance: Function, *, reverses: bool) -> Function:
     """``(state, p) -> (df/ds, dPsi/ds, velocity ratios)``.
 
-    Where slip may reverse, it then loads the spring, and displacement is its magnitude plus that of
-    the load point: ``df/ds = K (V_0 + V)/(V + V_0)``.
+    Where slip may reverse, so may the load point, and displacement is the magnitudes of both
+    together: ``df/ds = K (V_0 - V)/(|V| + |V_0|)``, V having the sign of shear stress.
     """
     evolutions, end = made.evolutions, 1 + made.states
 
@@ -105,10 +105,11 @@ def against_displacement(made: Friction, balance: Function, *, reverses: bool) -
         return loading, evolutions(x, psis, shift, fraction, p), ratios
 
     def either_way(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
-        loading, changes, ratios = forward(state, p)
-        if p[MU_STAR] + state[0] < 0.0:
-            loading += 2.0 * p[STIFFNESS] * ratios[2]
-        return loading, changes, ratios
+        _loading, changes, ratios = forward(state, p)
+        _x, slower, fraction = ratios
+        slip = math.copysign(1.0, p[MU_STAR] + state[0])
+        load = math.copysign(slower, p[LOAD_VELOCITY])
+        return p[STIFFNESS] * (load - slip) * fraction, changes, ratios
 
     return either_way if reverses else forward
 

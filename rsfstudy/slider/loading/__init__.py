@@ -115,7 +115,7 @@ class Loading(Part):
         """The segments as motions read them, a row each (see `places`)."""
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
-            log = math.log(velocity) if velocity > 0.0 else -math.inf
+            log = math.log(abs(velocity)) if velocity else -math.inf
             rows.append((begins, begins + lasts, velocity, log, math.nan, math.nan))
             begins += lasts
         return rows
