@@ -1,6 +1,7 @@
 """Files of motions: what they say of themselves, and what commands make of them."""
 
 import re
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -105,6 +106,13 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
     assert str(mat["units"]["shear_stress"]) == "Pa"
     assert "simulate" in str(mat["attributes"]["history"])
     assert call("export", place / "rig.nc").returncode == 2  # of which kind?
+    shutil.copy(place / "rig.nc", tmp_path / "both.nc")
+    both = call("export", tmp_path / "both.nc", "--csv", "--mat")
+    assert both.returncode == 0, both.stderr
+    assert (tmp_path / "both.csv").read_bytes() == (tmp_path / "motion.csv").read_bytes()
+    assert loadmat(tmp_path / "both.mat").keys() == mat.keys()
+    one = call("export", place / "rig.nc", "--csv", "--mat", "--output", tmp_path / "one.csv")
+    assert "is one file" in one.stderr
 
 
 def test_names_are_legal_in_matlab(tmp_path):

@@ -290,15 +290,15 @@ def rerun(**given: Any) -> int:
 
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--csv", "form", flag_value="csv", required=True, help="Without what never changes.")
-@click.option("--mat", "form", flag_value="mat", help="For MATLAB: every variable.")
+@click.option("--csv", is_flag=True, help="Without what never changes.")
+@click.option("--mat", is_flag=True, help="For MATLAB: every variable.")
 @click.option(
     "--output", type=click.Path(path_type=Path), help="The file to write.  [default: beside FILE]"
 )
 def export(**given: Any) -> int:
     """Write results, or a motion, for other programs.
 
-    As a table of CSV, a row a cell or a time, or as a file of MATLAB.
+    As a table of CSV, a row a cell or a time, as a file of MATLAB, or both.
     """
     from rsfstudy.cli import commands
 

@@ -248,17 +248,24 @@ def plot(
     return status
 
 
-def export(file: Path, form: str, output: Path | None) -> int:
-    """Write a file for other programs."""
-    path = output or file.with_suffix(f".{form}")
-    if path.exists():
-        raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
+def export(file: Path, csv: bool, mat: bool, output: Path | None) -> int:
+    """Write a file for other programs, or two."""
+    if not csv and not mat:
+        raise click.UsageError("say --csv or --mat, or both")
+    if csv and mat and output:
+        raise click.UsageError(f"{output} is one file: no --csv beside --mat")
+    asked = {"csv": (csv, exchange.to_csv), "mat": (mat, exchange.to_mat)}
+    files = {output or file.with_suffix(f".{e}"): to for e, (wanted, to) in asked.items() if wanted}
+    for path in files:
+        if path.exists():
+            raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
     dataset = store.read_any(file)
-    try:
-        {"csv": exchange.to_csv, "mat": exchange.to_mat}[form](dataset, path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error})") from error
-    console.print(f"{path}")
+    for path, write in files.items():
+        try:
+            write(dataset, path)
+        except OSError as error:
+            raise DataError(f"{path}: cannot be written ({error})") from error
+        console.print(f"{path}")
     return OK
 
 

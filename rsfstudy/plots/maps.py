@@ -54,6 +54,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if plane is None or not set(values.dims) <= set(cells):
         return []
     others = [str(d) for d in values.dims if d not in plane]
+    about = quantity(names[0], stated_by(dataset))
     places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MOST]
     panel = partial(
         Panel,
@@ -61,6 +62,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         marks=[partial(draw_map, names[0], plane, _scale(values))],
         y_label=label(quantity(plane[0], stated_by(dataset)), 200),
         title=None if others else pretty(dataset.attrs.get("title", "")),
+        legend_title=label(about, 60) if _meanings(values) else None,
     )
     return [panel(at=dict(zip(others, at, strict=True))) for at in places]
 
@@ -91,11 +93,14 @@ def draw_map(
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
     if found := scale or _scale(dataset[name]):
         drawn = _colours(axes, at, values.values, norm=found[0])
-        bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
-        bar.set_label(label(quantity(name, stated_by(dataset)), 34))
         if meanings := _meanings(dataset[name]):
-            bar.set_ticks([*meanings], labels=[*meanings.values()])
-        contours(axes, values, found[1])
+            for flag in found[1]:
+                colour = drawn.to_rgba(np.array(flag))
+                axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
+        else:
+            bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
+            bar.set_label(label(quantity(name, stated_by(dataset)), 34))
+            contours(axes, values, found[1])
     status = dataset["status"].squeeze()
     if set(status.dims) == set(plane):
         unknown = ~np.isfinite(values.values)
@@ -109,12 +114,15 @@ def _meanings(values: xr.DataArray) -> dict[float, str]:
 
 
 def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
-    """A scale of colours, and where contours are on it; none where nothing is known."""
+    """A scale of colours, and where contours are on it, or the flags that there are; none where
+    nothing is known.
+    """
     values = data.values.astype(float)
     if not np.isfinite(values).any():
         return None
-    if meanings := _meanings(data):
-        return BoundaryNorm(_edges(np.array([*meanings])), 256), ()
+    if _meanings(data):
+        flags = np.unique(values[np.isfinite(values)])
+        return BoundaryNorm(_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if is_wide(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)

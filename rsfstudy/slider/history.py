@@ -204,8 +204,9 @@ def of_samples(
     """A loading history of its columns (see `History.columns`)."""
     samples = np.ascontiguousarray(columns, dtype=float).tobytes()
     digest = hashlib.sha256(samples).hexdigest()[:16]
-    told = {"of_stress": of_stress, "of_pressure": of_pressure}
-    return History(name=name, samples=samples, digest=digest, **told)
+    return History(
+        name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
+    )
 
 
 def _log(velocity: np.ndarray) -> np.ndarray:
