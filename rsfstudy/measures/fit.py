@@ -5,17 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
-from rsfstudy.analysis.fitting.model import INSTEAD, LOGARITHMIC, PARAMETERS, Model
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC,
+    PARAMETERS,
+    Model,
+    check_free,
+    check_positive,
+)
 from rsfstudy.analysis.fitting.noise import check_noise
-from rsfstudy.analysis.fitting.record import COLUMNS, Record, loading_of
+from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
@@ -26,11 +34,8 @@ from rsfstudy.status import Status
 
 #: Accuracy of motions at which their differences tell derivatives.
 _SMOOTH = 1e-9
-#: Part of the way back to the step before that the window begins at, least slip distance over the
-#: distance of rows, and rows for each parameter.
-_BACK, _POINTS, _ROWS = 0.5, 3.0, 3
-#: Part of the time before the first step by which loading may come late.
-_LATE = 0.2
+#: Least slip distance over the distance of rows.
+_POINTS = 3.0
 #: Lags at which residuals freed of correlation are tested for what is left of it.
 _LAGS = 20
 #: Standard errors that numerical errors are held to as to the parameter itself: at the default
@@ -43,7 +48,6 @@ _SOUGHT = (
 )
 #: A direct effect over its lower bound below which it is at that bound.
 _LEAST = 1.001
-LOADINGS = ("steps", "recorded")
 
 _NUMBERS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
@@ -151,15 +155,8 @@ class Fit(Measure):
         names = [record.name for record in self.records]
         if len(set(names)) < len(names):
             raise InvalidValue("records", names, "must have names that differ")
-        if not self.free or len(set(self.free)) < len(self.free):
-            raise InvalidValue("free", self.free, "must name parameters, each once")
-        for name in self.free:
-            if name not in PARAMETERS:
-                remedy = f"Write {INSTEAD[name]}." if name in INSTEAD else ""
-                raise InvalidValue(
-                    "free", name, "is no parameter", choices=PARAMETERS, remedy=remedy
-                )
-        for name, step in self._windows:
+        check_free(self.free)
+        for name, step in self._steps:
             if name not in names:
                 raise InvalidValue("record", name, "is unknown", choices=names)
             if step < 1:
@@ -169,9 +166,7 @@ class Fit(Measure):
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
         if not 0.0 < self.part <= 1.0:
             raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
-        for name in ("slip_distance_guess", "slip_distance_2_guess"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise InvalidValue(name, getattr(self, name), "must be positive, in um")
+        check_positive(self, "slip_distance_guess", "slip_distance_2_guess")
         if self.loading not in LOADINGS:
             raise InvalidValue("loading", self.loading, "is unknown", choices=LOADINGS)
         if "step_time" in self.free and self.loading == "recorded":
@@ -192,12 +187,28 @@ class Fit(Measure):
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of what is looked for."""
-        return numbered(self.free, len(self._windows))
+        return numbered(self.free, len(self._steps))
 
     @property
-    def _windows(self) -> tuple[tuple[str, int], ...]:
-        """Records and steps that are fitted."""
+    def _steps(self) -> tuple[tuple[str, int], ...]:
+        """Records and numbers of steps that are fitted."""
         return self.together or ((self.record or self.records[0].name, self.step),)
+
+    @cached_property
+    def _windows(self) -> tuple[Window, ...]:
+        """The windows of steps that are fitted."""
+        by_name = {record.name: record for record in self.records}
+        return tuple(
+            Window(
+                by_name[name],
+                number,
+                self.before,
+                self.after,
+                self.part,
+                {n for other, n in self.together if other == name},
+            )
+            for name, number in self._steps
+        )
 
     @property
     def outputs(self) -> Sequence[Output]:
@@ -263,36 +274,27 @@ class Fit(Measure):
     @property
     def _involved(self) -> tuple[Record, ...]:
         """The records that are fitted, each once."""
-        by_name = {record.name: record for record in self.records}
-        return tuple(by_name[name] for name in dict(self._windows))
+        return tuple(dict.fromkeys(window.record for window in self._windows))
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Look for the parameters."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH))
-        parts, firsts, rows, steps = [], [], [], []
-        for name, number in self._windows:
-            record = next(record for record in self._involved if record.name == name)
-            if number > len(record.found):
-                text = f"{name} has {len(record.found)} steps of load point velocity"
-                return Outcome(Status.NO_STEP, message=text)
-            step = record.found[number - 1]
-            seen, loading, wrong = self._part(record, step, scene)
-            if wrong:
-                return Outcome(Status.NOT_APPLICABLE, message=wrong)
-            part = _model(record, seen, step, loading, scene, smooth, meter)
-            parts.append(part)
-            firsts.append(self._first(scene, part, step))
-            rows.append(seen + self._begins(name))
-            steps.append(step)
-        first = dict(firsts[0])
-        for number, guess in enumerate(firsts if self.together else (), start=1):
-            first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
+        windows = self._windows
+        parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
+        distances = self.slip_distance_guess, self.slip_distance_2_guess
+        first: dict[str, float] = {}
+        for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
+            guess = first_guess(part, window.step, self.free, distances)
+            first = guess | first
+            if self.together:
+                first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
         model = Joint(tuple(parts))
         search = Search(model, first, self.parameters, self.noise)
         found = search.run()
-        untold = self._untold(found, parts[0], steps[0])
+        untold = self._untold(found, parts[0], windows[0].step)
+        rows = [window.rows + self._begins(window.record) for window in windows]
         values = self._told(found, np.concatenate(rows), model)
-        values |= self._place(parts[0], rows[0] - self._begins(self._windows[0][0]), steps[0])
+        values |= _place(windows[0])
         for name in self.parameters:
             of = search.bounds if name in untold else search.interval
             values[f"{name}_low"], values[f"{name}_high"] = of(found, name)
@@ -304,111 +306,9 @@ class Fit(Measure):
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         return Outcome(Status.OK, values)
 
-    def _begins(self, name: str) -> int:
+    def _begins(self, record: Record) -> int:
         """First row of a record among those that are fitted together."""
-        names = [record.name for record in self._involved]
-        return sum(map(len, self._involved[: names.index(name)]))
-
-    def _place(self, part: Model, rows: np.ndarray, step: Step) -> dict[str, Value]:
-        """Velocities of a step, and its window."""
-        moved = self._involved[0].columns["displacement"][rows]
-        return {
-            "velocity_before": step.before,
-            "velocity_after": step.after,
-            "window_begins": moved[0],
-            "window_ends": moved[-1],
-        }
-
-    def _part(self, record: Record, step: Step, scene: Scene) -> tuple[np.ndarray, np.ndarray, str]:
-        """Rows and loading around a step; and what is wrong with them, in words."""
-        begins, ends = self._window(record, step)
-        rows = np.flatnonzero((record.time >= begins) & (record.time <= ends))
-        if len(rows) < _ROWS * len(self.free) or not step.begins < ends:
-            text = f"the window holds {len(rows)} rows, too few for {len(self.free)} parameters"
-            return rows, np.empty((0, 4)), text
-        before = record.columns["friction"][rows][record.time[rows] < step.begins]
-        if before.size and not before.mean() > 0.0:
-            text = f"mean friction before the step is {before.mean():.3g}, and must be positive"
-            return rows, np.empty((0, 4)), text
-        loading = loading_of(record, begins, ends, recorded=self.loading == "recorded")
-        if scene.parts.normal_stress.name == "constant":
-            loading[:, 2:] = 1.0, 0.0  # what was recorded is noise
-        if "step_time" in self.free:
-            loading[0, 0] -= _LATE * (step.begins - begins)
-        holds = not loading[0, 1] > 0.0
-        text = "the window begins in a hold: a fit begins with steady sliding" if holds else ""
-        return rows, loading, text
-
-    def _window(self, record: Record, step: Step) -> tuple[float, float]:
-        """Times in s between which rows are fitted."""
-        # a hold is fitted with the sliding that ends it
-        later = [s for s in record.found if s.begins > step.ends and (step.after or s.before)]
-        last = later[0].begins if later else record.time[-1]
-        if later and (record.name, record.found.index(later[0]) + 1) in self.together:
-            # no row is fitted twice
-            last = record.time[record.time < self._opens(record, later[0])][-1]
-        moved = record.columns["displacement"]
-        at = np.interp(step.begins, record.time, moved)
-        if self.after:
-            beyond = (moved > at + self.after) & (record.time > step.begins)
-            last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
-        if self.part < 1.0:
-            until = at + self.part * (np.interp(last, record.time, moved) - at)
-            beyond = (moved > until) & (record.time > step.begins)
-            last = record.time[np.argmax(beyond)]
-        return self._opens(record, step), float(last)
-
-    def _opens(self, record: Record, step: Step) -> float:
-        """Time in s at which the window of a step begins."""
-        earlier = [s.ends for s in record.found if s.ends < step.begins]
-        first = max(earlier, default=record.time[0])
-        begins = step.begins - (_BACK if earlier else 1.0) * (step.begins - first)
-        if self.before:
-            moved = record.columns["displacement"]
-            at = np.interp(step.begins, record.time, moved)
-            begins = max(begins, record.time[np.argmax(moved >= at - self.before)])
-        return float(begins)
-
-    def _first(self, scene: Scene, model: Model, step: Step) -> dict[str, float]:
-        """All parameters to begin with: what the record shows at a glance, else those of the
-        scene.
-        """
-        friction = model.friction
-        before, later = friction[model.time < step.begins], friction[model.time >= step.ends]
-        tail = later[-max(len(later) // 10, 1) :]
-        values = {
-            "a": scene.a,
-            "slip_distance": self.slip_distance_guess,
-            "mu_star": float(np.mean(before)) if len(before) else scene.mu_star,
-            "stiffness": scene.stiffness / self.slip_distance_guess,
-        }
-        effects = {"b": scene.b} if scene.parts.law.states == 1 else self._two(scene)
-        if "mu_star" not in self.free:
-            values["mu_star"] = scene.mu_star
-        if step.after > 0.0 and len(before):
-            ratio = math.log(step.after / step.before)
-            peak = later.max() if ratio > 0.0 else later.min()
-            read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
-            read_b = (peak - float(np.mean(tail))) / ratio
-            seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
-            values |= {n: v for n, v in seen.items() if n in self.free and n in {"a", *effects}}
-            effects |= {n: values.pop(n) for n in effects if n in values}
-        values |= effects
-        for name in ("alpha", "law_exponent"):
-            stated = scene.as_dict().get(name)
-            if stated is not None:
-                values[name] = stated
-        for name in self.free:
-            values.setdefault(name, 0.0)
-        return values
-
-    def _two(self, scene: Scene) -> dict[str, float]:
-        shares = scene.as_dict()
-        return {
-            "b1": scene.a * shares["b1_over_a"],
-            "b2": scene.a * shares["b2_over_a"],
-            "slip_distance_2": self.slip_distance_2_guess,
-        }
+        return sum(map(len, self._involved[: self._involved.index(record)]))
 
     def _untold(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
         """Parameters that the record does not tell; those of too few rows a slip distance too."""
@@ -472,26 +372,15 @@ class Fit(Measure):
         return values
 
 
-def _model(
-    record: Record,
-    rows: np.ndarray,
-    step: Step,
-    loading: np.ndarray,
-    scene: Scene,
-    accuracy: Accuracy,
-    meter: Meter,
-) -> Model:
-    """The model of some rows of a record, with displacement from a step."""
-    time, moved = record.time[rows], record.columns["displacement"][rows]
-    return Model(
-        scene,
-        time,
-        moved - np.interp(step.begins, time, moved),
-        record.columns["friction"][rows],
-        loading,
-        accuracy,
-        meter,
-    )
+def _place(window: Window) -> dict[str, Value]:
+    """Velocities of the step of a window, and its ends."""
+    moved = window.record.columns["displacement"][window.rows]
+    return {
+        "velocity_before": window.step.before,
+        "velocity_after": window.step.after,
+        "window_begins": moved[0],
+        "window_ends": moved[-1],
+    }
 
 
 def _whiteness(innovations: np.ndarray, order: int) -> float:

@@ -13,7 +13,7 @@ from scipy.linalg import solve_toeplitz, toeplitz
 from scipy.stats import t as student
 
 from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, Model, Values, check_free, check_positive
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.errors import InvalidValue
@@ -109,15 +109,11 @@ class SyntheticFit(Measure):
 
     def __post_init__(self) -> None:
         windows = self._windows()
-        for name in self.free:
-            if name not in PARAMETERS:
-                raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS)
+        check_free(self.free)
         if self.process not in ("white", "ar1", "ma3"):
             choices = ("white", "ar1", "ma3")
             raise InvalidValue("process", self.process, "is unknown", choices=choices)
-        for name in ("slip_distance", "noise_size"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise InvalidValue(name, getattr(self, name), "must be positive")
+        check_positive(self, "slip_distance", "noise_size")
         if self.rows < 10 * len(windows[0]):
             raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
         if self.seed < 0:

@@ -77,6 +77,23 @@ _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 _MOST, _MOST_EACH = 50_000, 60
 
 
+def check_free(free: Sequence[str]) -> None:
+    """Raise InvalidValue for names that are no parameters, or not each once."""
+    if not free or len(set(free)) < len(free):
+        raise InvalidValue("free", tuple(free), "must name parameters, each once")
+    for name in free:
+        if name not in PARAMETERS:
+            remedy = f"Write {INSTEAD[name]}." if name in INSTEAD else ""
+            raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS, remedy=remedy)
+
+
+def check_positive(of: object, *names: str) -> None:
+    """Raise InvalidValue for fields of something that are not positive and finite."""
+    for name in names:
+        if not 0.0 < getattr(of, name) < math.inf:
+            raise InvalidValue(name, getattr(of, name), "must be positive and finite")
+
+
 @dataclass(frozen=True)
 class Model:
     """The model of a window of a record.

@@ -1,0 +1,175 @@
+"""The window of a step in a record: its rows, the loading along them, and what parameters the
+record shows at a glance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsfstudy.analysis.fitting.model import Model
+from rsfstudy.analysis.fitting.record import Record, loading_of
+from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+
+#: Part of the way back to the step before that a window begins at, and rows for each parameter.
+_BACK, _ROWS = 0.5, 3
+#: Part of the time before the first step by which loading may come late.
+_LATE = 0.2
+LOADINGS = ("steps", "recorded")
+
+
+@dataclass(frozen=True)
+class Window:
+    """What is fitted around a step.
+
+    Attributes
+    ----------
+    record : Record
+    number : int
+        That of the step, from 1.
+    before, after : float
+        Load point displacement in um before the step and after it. Zero: half the way back to the
+        step before, and up to the next.
+    part : float
+        Part of what follows the step that is taken.
+    others : collection of int
+        Numbers of the steps of this record that have windows too: no row is in two of them.
+    """
+
+    record: Record
+    number: int
+    before: float = 0.0
+    after: float = 0.0
+    part: float = 1.0
+    others: Collection[int] = ()
+
+    @property
+    def step(self) -> Step:
+        """The step.
+
+        Raises
+        ------
+        Halt
+            Where the record has fewer steps.
+        """
+        found = self.record.found
+        if self.number > len(found):
+            text = f"{self.record.name} has {len(found)} steps of load point velocity"
+            raise Halt(Status.NO_STEP, text)
+        return found[self.number - 1]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The rows of the record."""
+        time = self.record.time
+        return np.flatnonzero((time >= self._opens(self.step)) & (time <= self._closes()))
+
+    def _closes(self) -> float:
+        record, step = self.record, self.step
+        # a hold is fitted with the sliding that ends it
+        later = [s for s in record.found if s.begins > step.ends and (step.after or s.before)]
+        last = later[0].begins if later else record.time[-1]
+        if later and record.found.index(later[0]) + 1 in self.others:
+            last = record.time[record.time < self._opens(later[0])][-1]
+        moved = record.columns["displacement"]
+        at = np.interp(step.begins, record.time, moved)
+        if self.after:
+            beyond = (moved > at + self.after) & (record.time > step.begins)
+            last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
+        if self.part < 1.0:
+            until = at + self.part * (np.interp(last, record.time, moved) - at)
+            beyond = (moved > until) & (record.time > step.begins)
+            last = record.time[np.argmax(beyond)]
+        return float(last)
+
+    def _opens(self, step: Step) -> float:
+        record = self.record
+        earlier = [s.ends for s in record.found if s.ends < step.begins]
+        first = max(earlier, default=record.time[0])
+        begins = step.begins - (_BACK if earlier else 1.0) * (step.begins - first)
+        if self.before:
+            moved = record.columns["displacement"]
+            at = np.interp(step.begins, record.time, moved)
+            begins = max(begins, record.time[np.argmax(moved >= at - self.before)])
+        return float(begins)
+
+    def model(
+        self, scene: Scene, free: Collection[str], loading: str, accuracy: Accuracy, meter: Meter
+    ) -> Model:
+        """The model of its rows, with displacement from the step.
+
+        Raises
+        ------
+        Halt
+            For too few rows, friction that is not positive, and a window that begins in a hold.
+        """
+        record, step, rows = self.record, self.step, self.rows
+        time, moved = record.time[rows], record.columns["displacement"][rows]
+        friction = record.columns["friction"][rows]
+        if len(rows) < _ROWS * len(free) or not step.begins < self._closes():
+            text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
+            raise Halt(Status.NOT_APPLICABLE, text)
+        before = friction[time < step.begins]
+        if before.size and not before.mean() > 0.0:
+            text = f"mean friction before the step is {before.mean():.3g}, and must be positive"
+            raise Halt(Status.NOT_APPLICABLE, text)
+        begins, ends = self._opens(step), self._closes()
+        pieces = loading_of(record, begins, ends, recorded=loading == "recorded")
+        if scene.parts.normal_stress.name == "constant":
+            pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
+        if "step_time" in free:
+            pieces[0, 0] -= _LATE * (step.begins - begins)
+        if not pieces[0, 1] > 0.0:
+            text = "the window begins in a hold: a fit begins with steady sliding"
+            raise Halt(Status.NOT_APPLICABLE, text)
+        moved = moved - np.interp(step.begins, time, moved)
+        return Model(scene, time, moved, friction, pieces, accuracy, meter)
+
+
+def first_guess(
+    model: Model, step: Step, free: Sequence[str], distances: tuple[float, float]
+) -> dict[str, float]:
+    """All parameters to begin with: what a record shows at a glance, else those of the scene.
+
+    Parameters
+    ----------
+    model : Model
+    step : Step
+    free : sequence of str
+    distances : (float, float)
+        Slip distances in um, of the first state and of the second; the former is the unit of slip
+        of the scene.
+    """
+    scene, friction = model.scene, model.friction
+    before, later = friction[model.time < step.begins], friction[model.time >= step.ends]
+    stated = scene.as_dict()
+    values = {
+        "a": scene.a,
+        "slip_distance": distances[0],
+        "mu_star": scene.mu_star,
+        "stiffness": scene.stiffness / distances[0],
+    }
+    if scene.parts.law.states == 1:
+        values["b"] = scene.b
+    else:
+        values |= {name: scene.a * stated[f"{name}_over_a"] for name in ("b1", "b2")}
+        values["slip_distance_2"] = distances[1]
+    if "mu_star" in free and len(before):
+        values["mu_star"] = float(np.mean(before))
+    if step.after > 0.0 and len(before):
+        ratio = math.log(step.after / step.before)
+        peak = later.max() if ratio > 0.0 else later.min()
+        read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
+        read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio
+        seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
+        values |= {name: v for name, v in seen.items() if name in free and name in values}
+    named = ("alpha", "law_exponent")
+    values |= {name: stated[name] for name in named if stated.get(name) is not None}
+    return dict.fromkeys(free, 0.0) | values
