@@ -186,10 +186,10 @@ def test_a_law_is_fitted_without_the_compiled_engine(law: str) -> None:
 
 
 def test_the_scene_of_a_fit_moves_as_fitted() -> None:
-    """Stepped as the record was, since a scene of a fit is that of the sliding before the step."""
+    """From the instant of the step on, in units of D_c and of the velocity before it."""
     fit = rsfstudy.fit(record(seed=4), laws=["slowness"], **OPTIONS).squeeze()
-    scene, rows = fit.rsf.scene.with_(load_velocity_ratio=10.0), fit.record_time.values > 40.0
+    rows = fit.record_time.values > 40.0
     times = (fit.record_time.values[rows] - 40.0) / float(fit.slip_distance)
-    motion = rsfstudy.simulate(scene, times=times, engine="compiled")
+    motion = rsfstudy.simulate(fit.rsf.scene, times=times, engine="compiled")
     seen, fitted = motion.friction_coefficient.values, fit.detrended_friction.values[rows]
     assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some

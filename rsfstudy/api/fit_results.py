@@ -137,8 +137,8 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
 
 
 def scene(dataset: xr.Dataset) -> Scene:
-    """The scene of one fit, with the parameters that it found, in units of its slip distance and of
-    the velocity before the step.
+    """The scene of one fit, with the parameters that it found and the velocity step that was fitted,
+    in units of its slip distance and of the velocity before the step.
     """
     found = cells(dataset)
     if len(found) != 1:
@@ -158,5 +158,6 @@ def scene(dataset: xr.Dataset) -> Scene:
     if "slip_distance_2" in value:
         changes["length_ratio"] = value["slip_distance_2"] / distance
     changes["stiffness"] = value.get("stiffness", first.stiffness / guess) * distance
-    changes["reference_rate"] = one["velocity_before"].item() / distance
+    before, after = one["velocity_before"].item(), one["velocity_after"].item()
+    changes |= {"reference_rate": before / distance, "load_velocity_ratio": after / before}
     return first.with_(**changes)
