@@ -94,6 +94,21 @@ def test_independent_samples_of_first_order() -> None:
     assert one.effective_samples == pytest.approx(500 * 0.1 / 1.9)
 
 
+def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
+    """In closed form for first order; else by how the power at zero frequency scatters."""
+    one = Noise(((0, 500, 0),), np.array([[0.9]]), np.ones(1))
+    assert one.degrees == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
+    assert noises.white(np.arange(500.0)).degrees == 500
+    rng, logs = np.random.default_rng(7), []
+    for _ in range(400):
+        drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
+        found = Noise(((0, 3_000, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1))
+        logs.append(math.log(np.var(drawn) / found.effective_samples))
+    exact = Noise(((0, 3_000, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
+    # a variance of 400 draws has a standard error of a fourteenth
+    assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
+
+
 def test_coefficients_are_recovered() -> None:
     """By Burg's recursion, and by REML with what the fit has taken up."""
     rng = np.random.default_rng(3)

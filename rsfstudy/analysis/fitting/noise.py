@@ -96,6 +96,21 @@ class Noise:
             total += max(1.0, (last - first) / max(at_rest, 1.0))
         return total
 
+    @property
+    def degrees(self) -> float:
+        """Degrees of freedom of the power at zero frequency, on which errors of slow trends depend:
+        2 over the variance of its logarithm, in which coefficients that are found count.
+        """
+        total = 0.0
+        for number, partial in enumerate(self.partial):
+            rows = sum(last - first for first, last, n in self.runs if n == number)
+            coefficients, variances = _predictors(partial)
+            at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
+            # coefficients have the covariance (variance left) R^-1/rows
+            ones = _innovations(np.ones((self.order, 1)), coefficients, variances)
+            total += rows / (1.0 + 2.0 * at_rest * float(np.square(ones).sum()))
+        return total
+
     def draw(self, rng: np.random.Generator) -> np.ndarray:
         """One sample of the noise, of unit size."""
         found = np.empty(self.runs[-1][1])

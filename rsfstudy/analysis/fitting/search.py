@@ -244,7 +244,7 @@ class Search:
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _inverse(whitened[:, :-1])
         covariance = size**2 * inverse
-        degrees = max(noise.effective_samples - len(x), _FEWEST)
+        degrees = max(noise.degrees * free_of / len(left), _FEWEST)
         finer = self.model.curve(values, refined=True) - self.model.curve(values)
         with np.errstate(invalid="ignore"):  # of what is not told
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
