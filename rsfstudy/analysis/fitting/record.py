@@ -24,6 +24,9 @@ COLUMNS = (
     Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
 )
 
+#: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
+_RAMP = 16
+
 
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -156,8 +159,9 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
         In s; before the first piece all slides steadily at its velocity, that before the first
         step.
     recorded : bool
-        Row by row, or by steps, at constant normal stress. Where noise moves the load point back it
-        rests: of displacements that never fall the closest ones are taken.
+        Row by row; or by steps, at constant normal stress, those that last at steady acceleration.
+        Where noise moves the load point back it rests: of displacements that never fall the closest
+        ones are taken.
     """
     steps = [step for step in record.found if begins < step.begins and step.ends < ends]
     first = steps[0].before if steps else 0.0
@@ -165,8 +169,10 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
         return _by_rows(record.window(begins, ends), first)
     pieces = [(begins, first)]
     for step in steps:
-        if step.ends > step.begins:
-            pieces.append((step.begins, 0.5 * (step.before + step.after)))
+        for part in np.arange(_RAMP if step.ends > step.begins else 0) / _RAMP:
+            at = step.begins + part * (step.ends - step.begins)
+            speed = step.before + (part + 0.5 / _RAMP) * (step.after - step.before)
+            pieces.append((float(at), float(speed)))
         pieces.append((step.ends, step.after))
     return np.array([(time, speed, 1.0, 0.0) for time, speed in pieces])
 

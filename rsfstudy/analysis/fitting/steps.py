@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +19,9 @@ _FEWEST, _DIFFERS, _MOVES = 5, 0.2, 10.0
 _WORTH = 12.0
 #: Part of the faster velocity below which the load point is held.
 _HELD = 0.01
-#: Part of the piece before and of the rest behind that pieces of a ramp last at most.
-_SHORT = 0.05
+#: Part of the piece before and of the rest behind that pieces of a ramp last at most, and rows that
+#: each holds less than: a fit takes more.
+_SHORT, _FEW = 0.05, 15
 #: Standard deviation over the median of absolute deviations of Gaussian noise.
 _NORMAL = 1.4826
 
@@ -63,7 +65,7 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
         return ()
     t0, x0 = t[0], x[0]
     sums = _Sums(t - t0, x - x0)
-    variance = _noise(t, x)
+    variance = noise_variance(t, x)
     knots = _merged(sums, sorted(_parted(sums, 0, len(t), variance)), t, variance)
     lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
@@ -71,12 +73,20 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
         for n, k in enumerate(knots[1:-1])
     ]
     if every > 1:
-        moved, variance = displacement - x0, _noise(time, displacement)
+        moved, variance = displacement - x0, noise_variance(time, displacement)
         meets = [_refined(time - t0, moved, at, 2 * every, variance) for at in meets]
-    times = [t0 + at for at in meets]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [line[1] if abs(line[1]) > _HELD * fastest else 0.0 for line in lines]
-    return tuple(_steps(times, speeds, (t[0], t[-1])))
+    found = []
+    for first, last in _ramps(meets, speeds, np.diff(knots).tolist(), (0.0, t[-1] - t0)):
+        begins, ends = meets[first], meets[last]
+        if last > first:
+            # the lines before and behind meet in the middle: so displacement behind is theirs
+            (x, v), (y, w) = lines[first], lines[last + 1]
+            late = min(max((x - y) / (w - v), begins), ends) - 0.5 * (begins + ends)
+            begins, ends = begins + late, ends + late
+        found.append(Step(t0 + begins, t0 + ends, speeds[first], speeds[last + 1]))
+    return tuple(found)
 
 
 class _Sums:
@@ -103,7 +113,7 @@ class _Sums:
         return float(mx - tx / tt * mt), float(tx / tt)
 
 
-def _noise(t: np.ndarray, x: np.ndarray) -> float:
+def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     """Variance of the noise: of each sample about the line through its neighbours."""
     share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
     off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
@@ -173,17 +183,23 @@ def _refined(
     return at + _meeting(*lines, (t[best - 1], t[best]), variance)
 
 
-def _steps(times: list[float], speeds: list[float], ends: tuple[float, float]) -> list[Step]:
-    """Steps at the times between pieces; short pieces on the way from one to another are a ramp."""
-    changes, found, n = np.sign(np.diff(speeds)), [], 0
+def _ramps(
+    times: list[float], speeds: list[float], rows: list[int], ends: tuple[float, float]
+) -> Iterator[tuple[int, int]]:
+    """First and last change of velocity of each step: short pieces, or those of few rows, on the
+    way from one velocity to another are a ramp.
+    """
+    changes, n = np.sign(np.diff(speeds)), 0
     while n < len(times):
         last, before = n, times[n] - (times[n - 1] if n else ends[0])
         while (
             last + 1 < len(times)
             and changes[last + 1] == changes[n]
-            and times[last + 1] - times[n] < _SHORT * min(before, ends[1] - times[last + 1])
+            and (
+                rows[last + 1] < _FEW
+                or times[last + 1] - times[n] < _SHORT * min(before, ends[1] - times[last + 1])
+            )
         ):
             last += 1
-        found.append(Step(times[n], times[last], speeds[n], speeds[last + 1]))
+        yield n, last
         n = last + 1
-    return found
