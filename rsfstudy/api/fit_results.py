@@ -137,7 +137,7 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
 
 
 def scene(dataset: xr.Dataset) -> Scene:
-    """The scene of one fit, with the parameters that it found and the velocity step that was fitted,
+    """The scene of one fit, with the parameters that it found and the velocity step that it is of,
     in units of its slip distance and of the velocity before the step.
     """
     found = cells(dataset)

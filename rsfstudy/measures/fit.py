@@ -22,7 +22,7 @@ from rsfstudy.analysis.fitting.model import (
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
-from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.steps import Step, noise_variance
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
@@ -63,6 +63,7 @@ _NUMBERS = (
     Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
     Output("window_begins", "", "um", "load point displacement where the window begins"),
     Output("window_ends", "", "um", "load point displacement where the window ends"),
+    Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
 )
 _ROWS_OF = (
@@ -294,7 +295,7 @@ class Fit(Measure):
         untold = self._untold(found, parts[0], windows[0].step)
         rows = [window.rows + self._begins(window.record) for window in windows]
         values = self._told(found, np.concatenate(rows), model)
-        values |= _place(windows[0])
+        values |= (place := _place(windows[0]))
         for name in self.parameters:
             of = search.bounds if name in untold else search.interval
             values[f"{name}_low"], values[f"{name}_high"] = of(found, name)
@@ -304,7 +305,20 @@ class Fit(Measure):
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
-        return Outcome(Status.OK, values)
+        return Outcome(Status.OK, values, self._remark(found, place["load_point_noise"]))
+
+    def _remark(self, found: Fitted, noise: float) -> str:
+        """What noise of a recorded load point does to the slip distance, where it matters."""
+        if self.loading != "recorded" or "slip_distance" not in found.free:
+            return ""
+        # of second order: ln V of a stiff slider follows the load point by k x/a
+        shift = 0.5 * (found.values["stiffness"] * noise / found.values["a"]) ** 2
+        if shift < found.stderr("slip_distance") / found.values["slip_distance"]:
+            return ""
+        return (
+            f"noise of the recorded load point, {noise:.2g} um, moves slip_distance by some "
+            f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
+        )
 
     def _begins(self, record: Record) -> int:
         """First row of a record among those that are fitted together."""
@@ -372,10 +386,11 @@ class Fit(Measure):
         return values
 
 
-def _place(window: Window) -> dict[str, Value]:
-    """Velocities of the step of a window, and its ends."""
-    moved = window.record.columns["displacement"][window.rows]
+def _place(window: Window) -> dict[str, float]:
+    """Velocities of the step of a window, its ends, and how noisy its load point is."""
+    moved, time = (window.record.columns[n][window.rows] for n in ("displacement", "time"))
     return {
+        "load_point_noise": math.sqrt(noise_variance(time, moved)),
         "velocity_before": window.step.before,
         "velocity_after": window.step.after,
         "window_begins": moved[0],
