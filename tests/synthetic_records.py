@@ -8,11 +8,17 @@ With psi = ln(theta V_0/D_c), w = ln(V/V_0) = (mu - mu_* - b psi)/a and u = psi 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from scipy.integrate import solve_ivp
+
+import rsfstudy
+from rsfstudy.analysis.fitting.record import Record
 
 #: A velocity step up from 1 to 10 um/s after 40 um: parameters in um and s.
 TRUTH = {"a": 0.010, "b": 0.013, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 3e-3}
@@ -20,6 +26,10 @@ STEP = ((0.0, 1.0), (40.0, 10.0))
 #: A step down, and a hold between sliding.
 DOWN = ((0.0, 10.0), (4.0, 1.0))
 HOLD = ((0.0, 1.0), (40.0, 0.0), (140.0, 1.0))
+#: Up and back: the second step at 180 um.
+PAIR = ((0.0, 1.0), (40.0, 10.0), (54.0, 1.0))
+#: Options of their fits.
+OPTIONS: dict[str, Any] = {"stiffness": TRUTH["stiffness"], "noise": "ar1", "engine": "compiled"}
 #: Parameters of which augmented equations tell derivatives; of the last two, by their logarithms.
 SENSITIVE = ("a", "b", "stiffness", "slip_distance")
 
@@ -104,3 +114,26 @@ def correlated(count: int, rho: float, size: float, seed: int) -> np.ndarray:
     for row in range(1, count):
         drawn[row] = rho * drawn[row - 1] + math.sqrt(1.0 - rho * rho) * drawn[row]
     return size * drawn
+
+
+def record(
+    loading: tuple[tuple[float, float], ...] = STEP,
+    law: str = "slowness",
+    trend: float = 0.0,
+    seed: int = 0,
+    count: int = 400,
+    size: float = 3e-4,
+) -> Record:
+    """A record with noise correlated by .5, and a trend from its first step."""
+    times = rows(loading, end(loading), count)
+    moved = load_point(loading, times)
+    friction = motion(law, times, loading)[0] + trend * (moved - 40.0)
+    friction += correlated(count, 0.5, size, seed)
+    arrays = {"time": times, "displacement": moved, "friction": friction}
+    steps = [(t, t, one, other) for (_, one), (t, other) in itertools.pairwise(loading)]
+    return rsfstudy.read_record(arrays, name=f"record_{seed}").with_steps(steps)
+
+
+def off(fit: xr.Dataset, name: str, true: float) -> float:
+    """By how many standard errors a parameter is off."""
+    return float((fit[name] - true) / fit[f"{name}_stderr"])

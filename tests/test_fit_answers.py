@@ -1,0 +1,134 @@
+"""Intervals of fits against closed forms and refits; work that is not done; ramps; noise of a load
+point that is taken as recorded; and the fit of basalt that the page tells.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+from scipy.stats import t as student
+from synthetic_records import LAWS, OPTIONS, STEP, TRUTH, record
+
+import rsfstudy
+from rsfstudy import Scene
+from rsfstudy.analysis.fitting.model import Model
+from rsfstudy.analysis.fitting.record import loading_of
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Meter
+
+WHITE = {**OPTIONS, "noise": "white", "laws": ["slowness"]}
+#: The true parameters where they are not looked for.
+TRUE = {"a": 0.01, "b_over_a": 1.3, "slip_distance": TRUTH["slip_distance"]}
+
+
+def test_intervals_of_linear_parameters_are_those_of_students_t() -> None:
+    """Friction before the step and a trend: a regression with n - 2 degrees of freedom."""
+    fit = rsfstudy.fit(record(count=60), free=("mu_star", "trend1"), **WHITE, **TRUE).squeeze()
+    bare, moved = fit.detrended_friction - fit.mu_star, fit.record_displacement.values
+    moved = moved - np.interp(40.0, fit.record_time.values, moved)
+    columns = np.column_stack([np.ones(60), moved])
+    left = fit.record_friction.values - bare.values
+    exact, (squares,), *_ = np.linalg.lstsq(columns, left)
+    spread = np.sqrt(squares / 58.0 * np.diag(np.linalg.inv(columns.T @ columns)))
+    reach = student.isf(0.025, 58) * spread
+    for name, value, by in zip(("mu_star", "trend1"), exact, reach, strict=True):
+        ends = [float(fit[f"{name}_{end}"]) for end in ("low", "high")]
+        # friction repeats to 1e-11, over 1e-4 of the interval
+        assert ends == pytest.approx([value - by, value + by], abs=1e-6 * by), name
+
+
+def test_ends_of_intervals_are_where_the_likelihood_has_fallen() -> None:
+    """By a fit of all others with the parameter held at an end; noise is too large for a parabola,
+    and the ends of the interval are not alike.
+    """
+    noisy = record(count=100, size=4e-3, seed=2)
+    free = ("a", "b", "slip_distance", "mu_star")
+    fit = rsfstudy.fit(noisy, free=free, **WHITE).squeeze()
+    best = float(fit.noise_size) ** 2 * 96
+    for end in ("low", "high"):
+        held = {"slip_distance": float(fit[f"slip_distance_{end}"]), "free": ("a", "b", "mu_star")}
+        other = rsfstudy.fit(noisy, **WHITE, **held).squeeze()
+        risen = (float(other.noise_size) ** 2 * 97 - best) / float(fit.noise_size) ** 2
+        # a parabola within a fifth is not followed; others move to first order
+        assert risen == pytest.approx(student.isf(0.025, 96) ** 2, rel=0.25), end
+    above, below = (abs(float(fit[f"slip_distance_{e}"] / fit.slip_distance) - 1.0) for e in
+                    ("high", "low"))  # fmt: skip
+    assert above > 1.1 * below
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
+    """(b - a)/D_c is critical for all laws of one state."""
+    fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6}
+    scene = Scene(law=law, a=0.01, b_over_a=1.3, **fields)
+    meter, loading = Meter(10**9), np.array([(t, v, 1.0, 0.0) for t, v in STEP])
+    times = synthetic.rows(STEP, 50.0, 50)
+    model = Model(scene, times, times, times, loading, Accuracy(engine="compiled"), meter)
+    critical = (TRUTH["b"] - TRUTH["a"]) / TRUTH["slip_distance"]
+    soft, stiff = (TRUTH | {"stiffness": part * critical} for part in (0.999, 3.0))
+    assert np.isnan(model.curve(soft, checked=True)).all()
+    assert meter.spent == 0
+    assert np.isfinite(model.curve(stiff, checked=True)).all()
+    assert meter.spent > 0
+
+
+#: A ramp of 0.4 s: the load point moves by 2.2 um, of which a steady velocity misses up to 0.45.
+RAMP = ((0.0, 1.0), *((40.0 + 0.002 * n, 1.0225 + 0.045 * n) for n in range(200)), (40.4, 10.0))
+
+
+def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
+    times = synthetic.rows(RAMP, synthetic.end(RAMP), 400)
+    columns = {"time": times, "displacement": synthetic.load_point(RAMP, times)}
+    columns["friction"] = synthetic.motion("slowness", times, RAMP)[0]
+    one = rsfstudy.read_record(columns).with_steps([(40.0, 40.4, 1.0, 10.0)])
+    pieces = loading_of(one, 0.0, 50.0, recorded=False)
+    ends = np.append(pieces[1:, 0], 50.0)
+    moved = np.cumsum(pieces[:, 1] * (ends - pieces[:, 0]))
+    lasts = np.clip(ends - 40.0, 0.0, 0.4)
+    exact = (ends + 11.25 * lasts**2 + 9.0 * np.maximum(ends - 40.4, 0.0))[:-1]
+    np.testing.assert_allclose(moved[:-1], exact)
+    fit = rsfstudy.fit(one, **WHITE).squeeze()
+    for name in ("a", "b", "slip_distance"):
+        # pieces leave displacement off by 0.45 um/16^2, k of which is 5e-6 of friction
+        assert float(fit[name]) == pytest.approx(TRUTH[name], rel=1e-3), name
+    found = rsfstudy.fit(rsfstudy.read_record(columns), **WHITE).squeeze()
+    # rows are 0.4 s apart before the ramp, so that it seems twice as long
+    assert float(found.slip_distance) == pytest.approx(TRUTH["slip_distance"], rel=0.03)
+
+
+@pytest.mark.parametrize(("noise", "told"), [(0.02, False), (0.3, True)])
+def test_noise_of_a_load_point_that_is_loaded_as_recorded(noise: float, told: bool) -> None:
+    truth = TRUTH | {"stiffness": 0.02}
+    times = synthetic.rows(STEP, synthetic.end(STEP), 600)
+    moved = synthetic.load_point(STEP, times)
+    friction = synthetic.motion("slowness", times, STEP, truth)[0]
+    moved = moved + synthetic.correlated(600, 0.0, noise, 1)
+    columns = {"time": times, "displacement": moved, "friction": friction}
+    one = rsfstudy.read_record(columns).with_steps([(40.0, 40.0, 1.0, 10.0)])
+    fit = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}, loading="recorded").squeeze()
+    assert float(fit.load_point_noise) == pytest.approx(noise, rel=0.2)  # 600 samples, by a median
+    assert ("noise of the recorded load point" in str(fit.message.values)) == told
+    assert (float(fit.slip_distance) > 1.1 * TRUTH["slip_distance"]) == told
+    steps = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}).squeeze()
+    assert float(steps.slip_distance) == pytest.approx(TRUTH["slip_distance"], rel=2e-3)
+    assert str(steps.message.values) == ""
+
+
+def test_basalt_is_what_the_page_tells() -> None:
+    """D_c of 8.7 um by the slip law, errors 2.2 times those of the formula, 561 of 2,863 rows."""
+    one = rsfstudy.read_record(Path(__file__).parent.parent / "studies/records/basalt.txt")
+    free = ("a", "b", "slip_distance", "mu_star", "trend1", "stiffness", "step_time")
+    options = {"laws": ["slip"], "free": free, "before": "60 um", "after": "250 um"}
+    fit, usual = (
+        rsfstudy.fit(one, noise=noise, engine="compiled", **options).squeeze()
+        for noise in ("ar", "white")
+    )
+    rows = int(fit.rows_fitted), float(fit.effective_samples)
+    assert rows == (2863, pytest.approx(561.0, abs=1.0))
+    for name in ("a", "b", "slip_distance"):
+        assert float(fit[f"{name}_stderr"] / usual[f"{name}_stderr"]) == pytest.approx(2.2, abs=0.3)
+    assert float(fit.slip_distance) == pytest.approx(8.7, abs=0.1)
+    assert float(fit.a) == pytest.approx(0.0094, abs=1e-4)
