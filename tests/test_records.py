@@ -96,6 +96,16 @@ def test_what_is_wrong_in_arrays_is_told() -> None:
             rsfstudy.read_record({**arrays, name: np.array(values)})
 
 
+def test_raw_numbers_have_a_scale_and_an_offset(tmp_path: Path) -> None:
+    path = written(tmp_path / "raw.csv", ["t", "lp * 2", "mu"], [TIME, MOVED, FRICTION], ",")
+    named = {"time": "t (min)", "displacement": "lp * 2 (um)", "friction": "mu*-2.0+1.5"}
+    told = rsfstudy.read_record(path, named).columns
+    np.testing.assert_allclose(told["displacement"], MOVED, rtol=1e-11)  # a heading as it stands
+    np.testing.assert_allclose(told["friction"], 1.5 - 2.0 * FRICTION, rtol=1e-11)
+    with pytest.raises(InvalidValue, match="mu"):
+        rsfstudy.read_record(path, {**named, "friction": "mu * 1e-e"})
+
+
 def xlook(path: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
     """A binary file of xlook: texts end at a NUL, and rubbish follows them."""
 
@@ -137,6 +147,8 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
     np.testing.assert_allclose(told["friction"], FRICTION, rtol=1e-6)
     scaled = rsfstudy.read_record(path, {**chosen, "displacement": ("LP_Disp", "um", 0.01)})
     np.testing.assert_allclose(scaled.columns["displacement"], 0.01 * bits, rtol=1e-6)
+    of_text = rsfstudy.read_record(path, {**chosen, "displacement": "LP_Disp (mm) * 1e-5 - 1e-3"})
+    np.testing.assert_array_equal(of_text.columns["displacement"], told["displacement"])
     by_text = {"time": "Time (ms)", "displacement": "LP_Disp (um)", "friction": "mu"}
     plain = rsfstudy.read_record(path, by_text)
     np.testing.assert_allclose(plain.columns["displacement"], bits, rtol=1e-6)

@@ -30,7 +30,8 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     callback=_listed,
     metavar="NAME=HEADING,...",
     help="Which column is which, as in 'time=t (s),displacement=lp (um),friction=mu'; shear_stress "
-    "and normal_stress are others.  [default: by headings that are known]",
+    "and normal_stress are others; of raw numbers, 'lp (um) * 0.1 + 5'.  "
+    "[default: by headings that are known]",
 )
 @click.option("--normal-stress", help="As in '20 MPa', where the record does not hold it.")
 @click.option(

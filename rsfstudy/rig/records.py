@@ -33,6 +33,9 @@ _HEADINGS = {
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",
 }
+_NUMBER = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+#: A heading with the scale and the offset of what is below it.
+_LINE = re.compile(rf"(.*\S)\s*\*\s*(-?){_NUMBER}(?:([-+]){_NUMBER})?")
 _HEADING = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 #: Layout of xlook's files: bytes before the headers of columns and of each, how many there are, and
 #: where columns begin.
@@ -59,8 +62,8 @@ def read_record(
     columns : mapping of str to str or (heading, units), optional
         Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
         "s")``. Without it headings are known by how they begin, and state their units, as in
-        ``Displ (um)``. Columns of xlook's files are named by their heading or number, with a scale
-        and an offset where their numbers are raw: ``{"displacement": ("LP", "um", 0.1, 0.0)}``.
+        ``Displ (um)``. Columns of xlook's files are named by their heading or number. Where numbers
+        are raw, a scale and an offset follow: ``"LP (um) * 0.1 + 5"``, or ``("LP", "um", 0.1, 5)``.
     normal_stress : quantity, optional
         By which shear stress is divided where no normal stress was recorded ("20 MPa").
     name : str
@@ -153,13 +156,15 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
     between = next((c for c in "\t;," if c in header), None)
     headings = [text.strip() for text in header.rstrip("\n").split(between)]
     if columns is not None:
-        return read_table(path, {key: _told(key, of, headings) for key, of in columns.items()})
+        lines = {key: _told(key, of, headings) for key, of in columns.items()}
+        read = read_table(path, {key: line[:2] for key, line in lines.items()})
+        return {key: _scaled(column, *lines[key][2:]) for key, column in read.items()}
     wanted: dict[str, tuple[str, str]] = {}
     for text in headings:
         match = _HEADING.fullmatch(text)
         for key, begins in _HEADINGS.items():
             if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                wanted[key] = _told(key, text, headings)
+                wanted[key] = _told(key, text, headings)[:2]
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (
@@ -172,13 +177,18 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
     return read_table(path, wanted)
 
 
-def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str]:
-    """Heading and units of a column; of one text, units stand in brackets behind the heading, in
-    the file too or not.
+def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str, float, float]:
+    """Heading and units of a column, with the scale and the offset of its numbers; of one text,
+    units stand in brackets behind the heading, in the file too or not, and then "* 0.1 + 5".
     """
     if not isinstance(told, str):
-        heading, units = told
-        return str(heading), str(units)
+        heading, units, scale, offset = (*told, 1.0, 0.0)[:4] if len(told) != 3 else (*told, 0.0)
+        return str(heading), str(units), float(scale), float(offset)
+    scale, offset = 1.0, 0.0
+    line = None if told in headings else _LINE.fullmatch(told)
+    if line:
+        told, scale = line[1], float(line[2] + line[3])
+        offset = float(line[4] + line[5]) if line[4] else 0.0
     match = _HEADING.fullmatch(told)
     units = (match[2] or "").strip() if match else ""
     if not units and key != "friction":
@@ -186,7 +196,11 @@ def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str]:
         remedy = f"Write them in the file, as in {whole}, or here: --columns '{key}={whole},...' "
         remedy += f"(columns={{'{key}': '{whole}', ...}})."
         raise InvalidValue("heading", told, "states no units", remedy=remedy)
-    return told if told in headings or not match else match[1], units
+    return told if told in headings or not match else match[1], units, scale, offset
+
+
+def _scaled(column: Column, scale: float, offset: float) -> Column:
+    return column._replace(values=column.values * scale + offset)
 
 
 def _is_binary(path: Path) -> bool:
@@ -223,13 +237,12 @@ def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Col
         raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
     known = [heading for heading, _units, _values in headings]
     for key, told in columns.items():
-        heading, units, *line = _told(key, told, known) if isinstance(told, str) else told
-        places = [n for n, h in enumerate(known, 1) if heading in (n, str(n), h)]
+        heading, units, *line = _told(key, told, known)
+        places = [n for n, h in enumerate(known, 1) if heading in (str(n), h)]
         if len(places) != 1:
             raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)
-        scale, offset = (*line, 1.0, 0.0)[:2] if len(line) != 1 else (line[0], 0.0)
-        values = headings[places[0] - 1][2] * scale + offset
-        found[key] = Column(np.cumsum(values) if key == "time" else values, units, places[0])
+        column = _scaled(Column(headings[places[0] - 1][2], units, places[0]), *line)
+        found[key] = column._replace(values=np.cumsum(column.values)) if key == "time" else column
     shortest = min(len(column.values) for column in found.values())
     if any(len(column.values) - shortest > 1 for column in found.values()):
         rule = "have lengths that differ by more than one"
