@@ -1,9 +1,5 @@
 """Which experiment tells the parameters? Designs of steps and machines, before any is run."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
 import xarray as xr
 
 from rsfstudy.analysis.fitting.model import LOGARITHMIC
@@ -14,9 +10,9 @@ from rsfstudy.declare.figure import Axes, Figure, Panel
 from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Derivatives, Reduction
 from rsfstudy.slider.scene import Scene
+
+from .law_identification import CHANCE, ScatterOverPromise
 
 RECORDS, DISTANCE = 4, 10.0
 UP, DOWN, HOLD = "1:30, 10:270", "10:30, 1:270", "1:30, 0:1000 s, 1:270"
@@ -30,47 +26,6 @@ DESIGNS = {
 }
 #: Stiffness over normal stress in 1/um.
 MACHINES = (1e-3, 3e-3)
-#: Standard deviations of chance.
-CHANCE = 3.5
-
-
-@dataclass(frozen=True)
-class Kept(Reduction):
-    """Root mean square of deviations over the errors promised, over all of some records.
-
-    Parameters
-    ----------
-    name : str
-        Gives ``<name>``, and ``<name>_off``: how far it is from 1, in its standard deviations.
-    of : str
-        Deviations.
-    """
-
-    kind: ClassVar[str] = "kept"
-
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Over records and designs of each machine, for each parameter."""
-        square = (dataset[self.of] / dataset["promised_spread"]) ** 2
-        found = np.sqrt(square.mean(["seed", "design"]))
-        records = dataset.sizes["seed"] * dataset.sizes["design"]
-        return xr.Dataset(
-            {self.name: found, f"{self.name}_off": (found - 1.0) * np.sqrt(2.0 * records)}
-        )
-
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """By each deviation: that over what is promised, over the mean and the number of all."""
-        over = dataset[self.of] / dataset["promised_spread"] ** 2
-        records = dataset.sizes["seed"] * dataset.sizes["design"]
-        return [(over / (records * self(dataset)[self.name]), {})]
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The ratio, and how far it is from 1."""
-        words = "scatter over what is promised, less 1, in standard deviations"
-        return (
-            Quantity(self.name, "", "1", "scatter of estimates over what is promised"),
-            Quantity(f"{self.name}_off", "", "1", words),
-        )
 
 
 def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
@@ -165,7 +120,7 @@ study = Study(
     measure=SyntheticFit(
         free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
     ),
-    reductions=[Kept("kept", "deviation")],
+    reductions=[ScatterOverPromise("kept", "deviation", ("seed", "design"))],
     claims=[
         promise("step up", 3e-3, 0.087),
         promise("step up", 1e-3, 0.018),

@@ -1,5 +1,6 @@
 """Which steps tell the evolution law? Its exponent, and how well, by three designs."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -40,21 +41,27 @@ class ScatterOverPromise(Reduction):
         ``<name>_off``: how far that is from 1, in its own standard deviations.
     of : str
         Deviations of the estimate.
+    over : tuple of str
+        Dimensions of the records.
     """
 
+    over: tuple[str, ...] = ("seed",)
     kind: ClassVar[str] = "scatter_over_promise"
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Over records."""
         square = (dataset[self.of] / dataset["promised_spread"]) ** 2
-        found = np.sqrt(square.mean("seed"))
-        off = (found - 1.0) * np.sqrt(2.0 * dataset.sizes["seed"])
+        found = np.sqrt(square.mean(self.over))
+        off = (found - 1.0) * math.sqrt(2.0 * self._records(dataset))
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """By each deviation: that over what is promised, over the mean and the number of all."""
         over = dataset[self.of] / dataset["promised_spread"] ** 2
-        return [(over / (dataset.sizes["seed"] * self(dataset)[self.name]), {})]
+        return [(over / (self._records(dataset) * self(dataset)[self.name]), {})]
+
+    def _records(self, dataset: xr.Dataset) -> int:
+        return math.prod(dataset.sizes[name] for name in self.over)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

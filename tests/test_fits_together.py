@@ -17,6 +17,7 @@ from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import Model
 from rsfstudy.errors import Incomplete
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import Meter
 
 ENOUGH = 10**9
@@ -54,13 +55,13 @@ def test_derivatives_of_windows_are_differences() -> None:
     scene = Scene(
         law="slip", a=0.01, b_over_a=1.3, normal_stress="constant", stiffness=0.03, mu_star=0.6
     )
-    accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
+    accuracy, meter = Accuracy(1e-9, ENOUGH, engine=COMPILED), Meter(ENOUGH, engine=COMPILED)
     parts = []
     for loading in (STEP, synthetic.DOWN):
         times = synthetic.rows(loading, synthetic.end(loading), 60)
         pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
         moved = synthetic.load_point(loading, times)
-        parts.append(Model(scene, times, moved, 0.0 * times, pieces, accuracy, Meter(ENOUGH)))
+        parts.append(Model(scene, times, moved, 0.0 * times, pieces, accuracy, meter))
     joint = Joint(tuple(parts))
     plainly = {n: TRUTH[n] for n in ("a", "b", "slip_distance", "stiffness")}
     values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}
