@@ -29,6 +29,8 @@ _BOUNDS = {
 _WIDE = math.log(1e4)
 #: Longest slip distance over the displacement of the window; the shortest is the distance of rows.
 _LONG = 10.0
+#: Difference of logarithms by which the bounds of two slip distances are apart.
+_APART = 1e-6
 #: Slip distances to begin with, over the first guess.
 _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Passes in which noise and parameters are found in turn, until those move by this part of their
@@ -115,14 +117,16 @@ class Search:
         self, model: Model | Joint, values: Values, free: Sequence[str], noise: str
     ) -> None:
         self.model, self.free, self.name = model, tuple(free), noise
-        self.first = dict(values)
+        self.first, self.has_ended = dict(values), True
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
         if name.startswith("slip_distance"):
             moved = self.model.displacement
             extent = float(np.ptp(moved))
-            return math.log(extent / len(moved)), math.log(_LONG * extent)
+            low, high = math.log(extent / len(moved)), math.log(_LONG * extent)
+            # at bounds too the second one is longer
+            return (low + _APART, high) if name.endswith("_2") else (low, high - _APART)
         if name in LOGARITHMIC:
             at = math.log(self.first[name])
             return at - _WIDE, at + _WIDE
@@ -156,7 +160,8 @@ class Search:
         Raises
         ------
         Halt
-            Where no motion fits, the search does not end, or the work budget is spent.
+            Where no motion fits, the search does not end though the record tells all parameters, or
+            the work budget is spent.
         """
         x, noise = self._begin(), noises.white(self.model.time)
         for number in range(1 if self.name == noises.WHITE and len(noise.sizes) == 1 else _PASSES):
@@ -166,7 +171,11 @@ class Search:
             if number and _is_still(x - before, noise.whitened(np.column_stack([jacobian, left]))):
                 break
             noise = noises.fitted(self.name, self.model.time, left, jacobian)
-        return self._ended(x, noise)
+        found = self._ended(x, noise)
+        if not (self.has_ended or found.untold):
+            text = f"the search did not end within {_CURVES} curves"
+            raise Halt(Status.ACCURACY_OUT_OF_REACH, text)
+        return found
 
     def _begin(self) -> np.ndarray:
         """Coordinates to begin with: those of the slip distance with which the least is left."""
@@ -178,6 +187,7 @@ class Search:
         best = (math.inf, self.first)
         for scale in scales:
             values = self.first | {n: self.first[n] * scale for n in distances}
+            values = self.values(np.clip(self.coordinates(values), self.low, self.high))
             left = self.residuals(values, checked=True)
             if columns is not None and np.isfinite(left).all():
                 moved = np.linalg.lstsq(columns, left)[0]
@@ -187,7 +197,7 @@ class Search:
         if not math.isfinite(best[0]):
             text = "no motion with the first guess can be followed, or its spring is softer than "
             raise Halt(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
-        return np.asarray(np.clip(self.coordinates(best[1]), self.low, self.high))
+        return self.coordinates(best[1])
 
     def _least_squares(self, x: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates that leave the least under a noise, and the derivatives there."""
@@ -215,9 +225,7 @@ class Search:
             gtol=1e-12,
             max_nfev=_CURVES,
         )
-        if found.status == 0:
-            text = f"the search did not end within {_CURVES} curves"
-            raise Halt(Status.ACCURACY_OUT_OF_REACH, text)
+        self.has_ended = found.status != 0
         return found.x, derivatives["last"]
 
     def _ended(self, x: np.ndarray, noise: Noise) -> Fitted:
