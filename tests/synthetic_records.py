@@ -108,6 +108,29 @@ def motion(
     return found[:, 0], found[:, 2:6]
 
 
+def two_states(
+    times: np.ndarray, loading: Sequence[tuple[float, float]], truth: Mapping[str, float]
+) -> np.ndarray:
+    """Friction by the slip law with two states, at times around one step; Theta_i is the part of
+    state i in friction: ``dTheta_i/dt = -(V/L_i)(Theta_i + b_i w)``.
+    """
+    (_begins, first), (step, load) = loading
+    mu_star, k, a = (truth[name] for name in ("mu_star", "stiffness", "a"))
+    b = np.array([truth["b1"], truth["b2"]])
+    distances = np.array([truth["slip_distance"], truth["slip_distance_2"]])
+
+    def rates(_t: float, y: np.ndarray) -> np.ndarray:
+        w = (y[0] - mu_star - y[1] - y[2]) / a
+        speed = first * math.exp(w)
+        return np.array([k * (load - speed), *(-speed / distances * (y[1:] + b * w))])
+
+    friction, later = np.full(len(times), mu_star), times >= step
+    begin, span = np.array([mu_star, 0.0, 0.0]), (step, times[-1])
+    solved = solve_ivp(rates, span, begin, "LSODA", times[later], rtol=1e-10, atol=1e-13)
+    friction[later] = solved.y[0]
+    return friction
+
+
 def correlated(count: int, rho: float, size: float, seed: int) -> np.ndarray:
     """Noise of first order, or white noise."""
     drawn = np.random.default_rng(seed).standard_normal(count)

@@ -1,4 +1,4 @@
-"""Fits of several windows as one, of a free exponent; draws, tables and holds."""
+"""Fits of several windows as one, of two states and of a free exponent; draws, tables and holds."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_derivatives_of_windows_are_differences() -> None:
     assert not found[60:, 3].any()
 
 
-@pytest.mark.parametrize(("law", "exponent"), [("family", 0.5), ("slip", 0.0)])
+@pytest.mark.parametrize(("law", "exponent"), [("family", 0.5), ("slip", 0.0), ("slowness", 1.0)])
 def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     free = ("a", "b", "slip_distance", "mu_star", "law_exponent")
     one = record(PAIR, law, seed=3)
@@ -95,8 +95,70 @@ def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     assert high <= 1.0
     assert abs(off(fit, "law_exponent", exponent)) < 4.0
     assert float(fit.law_exponent_stderr) < 0.05  # one step tells it to some .1
-    if exponent == 0.0:
-        assert low == 0.0  # the interval ends at the bound
+    ends = {0.0: low, 1.0: high}
+    assert ends.get(exponent, exponent) == exponent  # the interval ends at the bound
+
+
+#: Of a synthetic test of trends that is published with the code steadystate.
+TWO_STATES = {"a": 0.0012, "b1": 0.010, "b2": 0.007, "slip_distance": 20.0}
+TWO_STATES |= {"slip_distance_2": 500.0, "mu_star": 0.6}
+
+
+@pytest.mark.parametrize("guess", [75.0, 300.0])
+def test_two_states_come_back_in_their_order(guess: float) -> None:
+    loading, size = ((0.0, 1.0), (500.0, 10.0)), 2.5e-4
+    times = np.concatenate([np.linspace(0.0, 499.0, 100), np.linspace(500.0, 650.0, 300)])
+    friction = synthetic.two_states(times, loading, TWO_STATES | {"stiffness": 0.01})
+    arrays = {"time": times, "displacement": synthetic.load_point(loading, times)}
+    arrays["friction"] = friction + synthetic.correlated(400, 0.0, size, 1)
+    one = rsfstudy.read_record(arrays).with_steps([(500.0, 500.0, 1.0, 10.0)])
+    options = {"stiffness": 0.01, "slip_distance": guess, "noise": "white", "engine": COMPILED}
+    free = (*TWO_STATES, "trend1")
+    fit = rsfstudy.fit(one, laws=["two_slip_states"], free=free, **options).squeeze()
+    for name in free:
+        assert abs(off(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
+    assert fit.slip_distance_high < fit.slip_distance_2_low
+
+
+def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
+    curved, times = 1e-6, synthetic.rows(STEP, synthetic.end(STEP) + 10.0, 200)
+    moved = synthetic.load_point(STEP, times)
+    friction = synthetic.motion("slowness", times)[0] + curved * (moved - 40.0) ** 2
+    for seed in range(2):
+        noise = synthetic.correlated(200, 0.0, 2e-4, seed)
+        arrays = {"time": times, "displacement": moved, "friction": friction + noise}
+        one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
+        fits = rsfstudy.fit(one, laws=["slowness"], windows=3, **OPTIONS | {"noise": "white"})
+        fit = fits.squeeze().isel(part=0)
+        for name in SHARED:
+            assert abs(off(fit, name, TRUTH[name])) > 5.0, name
+            # of a trend with x^2, 3/4 of what the whole window is off by is gone in half of it
+            told = math.hypot(fit[f"{name}_stderr"], fit[f"{name}_windows"])
+            assert abs(float(fit[name]) - TRUTH[name]) < 2.0 * told, name
+            apart = float(fits[name].max() - fits[name].min())
+            assert float(fit[f"{name}_windows"]) == pytest.approx(apart, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "free"),
+    [
+        ("slowness", ("a", "b", "slip_distance", "mu_star", "trend1")),
+        ("family", ("a", "b", "slip_distance", "mu_star", "law_exponent")),
+    ],
+)
+def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...]) -> None:
+    times = synthetic.rows(STEP, synthetic.end(STEP), 200)
+    arrays = {"time": times, "displacement": synthetic.load_point(STEP, times)}
+    arrays["friction"] = 0.6 + synthetic.correlated(200, 0.5, 0.02, 0)
+    one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
+    fit = rsfstudy.fit(one, laws=[law], free=free, **OPTIONS).squeeze()
+    assert fit.rsf.table().status.item() == "not_identified"
+    untold = set(str(fit.message.values).partition(":")[0].split(", "))
+    assert untold == set(free) - {"mu_star", "trend1"}
+    assert abs(off(fit, "mu_star", 0.6)) < 4.0
+    for name in untold - {"slip_distance"}:  # nothing within the bounds of the search is excluded
+        bounds = {"a": (1e-4, 1.0), "b": (-1.0, 1.0), "law_exponent": (0.0, 1.0)}[name]
+        assert (float(fit[f"{name}_low"]), float(fit[f"{name}_high"])) == bounds, name
 
 
 def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:

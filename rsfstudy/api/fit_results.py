@@ -65,7 +65,7 @@ def shown(one: xr.Dataset) -> dict[str, tuple[str, str]]:
 def table(dataset: xr.Dataset) -> pd.DataFrame:
     """One row a fit, with the columns that laboratories use; lengths in um.
 
-    ``_std`` are standard errors, ``_windows`` what parameters scatter by among windows; NaN stands
+    ``_std`` are standard errors, ``_windows`` ranges of parameters among windows; NaN stands
     where something was not looked for.
     """
     rows = []

@@ -19,7 +19,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
-from rsfstudy.reduce import StandardDeviation
+from rsfstudy.reduce import Range
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.units import in_si
@@ -83,8 +83,8 @@ def fit(
         Load point displacement that is fitted around each ("100 um"); 0: all up to the next step,
         and half the way back to the one before.
     windows : int
-        Number of windows, from half of what follows each step to all of it. How far parameters
-        scatter among them is told beside their standard errors (``_windows``): where that is more,
+        Number of windows, from half of what follows each step to all of it. The range of each
+        parameter among them is told beside its standard error (``_windows``): where that is more,
         something else than noise is in the record, a trend that is none of those fitted, say.
     noise : str
         "white", "ar" (autoregressive, of an order that a criterion chooses), or "ar1" and so on.
@@ -174,7 +174,7 @@ def fit(
         raise InvalidValue("windows", windows, "must be a whole number, 1 or more")
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
-        reductions = [StandardDeviation(f"{n}_windows", n, over="part") for n in measure.parameters]
+        reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     engine = engine or (COMPILED if is_installed(COMPILED) else SCIPY)
     study = Study(
         name="fit",

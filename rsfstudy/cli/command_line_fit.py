@@ -80,7 +80,7 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     metavar="N",
     default=1,
     show_default=True,
-    help="Windows, from half of what follows a step to all of it: how parameters scatter.",
+    help="Windows, from half of what follows a step to all of it: how parameters differ.",
 )
 @click.option(
     "--noise",

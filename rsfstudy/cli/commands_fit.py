@@ -222,7 +222,7 @@ def _remarks(one: xr.Dataset) -> None:
         each = ", ".join(
             f"{fit_results.SHORT[plain(n)][0]} {v.item():.2g}" for n, v in spreads.items()
         )
-        console.print(f"{law}: among windows parameters scatter by {each}")
+        console.print(f"{law}: among windows parameters differ by {each}")
     chance = one["whiteness"].item()
     if math.isfinite(chance):
         verdict = "white" if chance > _CHANCE else "still correlated"

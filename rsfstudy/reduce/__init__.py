@@ -15,7 +15,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_failures, worst
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.carried import carried
-from rsfstudy.reduce.comparisons import Difference, OverClosedForm, RelativeDifference
+from rsfstudy.reduce.comparisons import Difference, OverClosedForm, Range, RelativeDifference
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.reduce.sobol_indices import SobolIndices
@@ -33,6 +33,7 @@ __all__ = [
     "OverClosedForm",
     "ProportionalFit",
     "Quantile",
+    "Range",
     "Reduction",
     "RelativeDifference",
     "SobolIndices",

@@ -1,4 +1,4 @@
-"""Comparisons: with a reference point of the lattice, and with a closed form."""
+"""Comparisons: with a reference point of the lattice, among points, and with a closed form."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import ClassVar
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Derivatives, Reduction
+from rsfstudy.reduce.base import Derivatives, Reduction, refused
 from rsfstudy.slider.closed_forms import FORMS
 
 Pair = tuple[xr.DataArray, xr.DataArray]
@@ -65,6 +65,35 @@ class _Against(Reduction):
         own, others = self.slopes(values, values.sel(place, drop=True))
         apart = dataset[self.along] != self.reference
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
+
+
+@dataclass(frozen=True)
+class Range(Reduction):
+    """Largest less least value along a dimension.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    of : str
+        Variable to reduce.
+    over : str
+        The dimension.
+    """
+
+    over: str = ""
+    kind: ClassVar[str] = "range"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Reduce along the dimension."""
+        of = dataset[self.of].reset_coords(drop=True)
+        found = (of.max(self.over) - of.min(self.over)).where(~refused(dataset, self.of, self.over))
+        return xr.Dataset({self.name: found.assign_attrs(measured_as=self.of)})
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """1 by the largest, -1 by the least."""
+        of = dataset[self.of].reset_coords(drop=True)
+        return [(1.0 * (of == of.max(self.over)) - 1.0 * (of == of.min(self.over)), {})]
 
 
 @dataclass(frozen=True)
