@@ -67,6 +67,8 @@ WIDE = {
     "displacement_boundary C10": "the paper says 'a few percents'",
     "fit_coverage F1": "chance: binomial standard deviations",
     "fit_coverage F2": "chance: binomial standard deviations",
+    "fit_coverage_joint J1": "chance: binomial standard deviations",
+    "fit_coverage_joint J2": "chance: binomial standard deviations",
     "injection I1": "one bound for all: how far pressure goes in 2 D_c/V_*",
     "law_identification I1": "two digits are told",
     "law_identification I2": "chance: standard deviations of a standard deviation",
