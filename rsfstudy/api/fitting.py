@@ -50,6 +50,7 @@ def fit(
     windows: int = 1,
     noise: str = "ar",
     loading: str = "steps",
+    posterior: int = 0,
     stiffness: Any = None,
     slip_distance: Any = None,
     engine: Any = None,
@@ -91,6 +92,11 @@ def fit(
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).
+    posterior : int
+        Draws from the posterior (``posterior``, along ``draw``), by emcee, with flat priors between
+        the bounds of the search and the noise as the fit found it. A chain of some 1,000 to 10,000
+        motions: where the budget is spent before it is 50 autocorrelation times long, the fit ends
+        as ``work_budget_spent``.
     stiffness : quantity, optional
         Of the machine, where no rig states it: over normal stress ("1.6e-3 1/um", a plain number
         is in 1/um), or in MPa/um, over the mean of the normal stress that the record holds. The
@@ -163,6 +169,7 @@ def fit(
         after=_micrometres("after", after),
         noise=noise,
         loading=loading,
+        posterior=posterior,
     )
     axes = [Axis("law", list(laws))]
     if len(records) > 1 and not together:

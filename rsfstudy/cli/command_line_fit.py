@@ -96,6 +96,13 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     help="The load point by its steps, or as it was recorded.",
 )
 @click.option(
+    "--posterior",
+    type=click.IntRange(0),
+    metavar="N",
+    default=0,
+    help="Draws from the posterior, by emcee.  [default: none]",
+)
+@click.option(
     "--set",
     "settings",
     multiple=True,

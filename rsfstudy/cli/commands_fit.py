@@ -215,6 +215,7 @@ def _worth(one: xr.Dataset) -> str:
 def _remarks(one: xr.Dataset) -> None:
     """Print what a fit does not tell, and whether noise is left that the errors do not count."""
     law, message = _law(one), str(one["message"].item())
+    names = [str(name) for name in one["parameter"].values]
     if message:
         console.print(f"{law}: {fit_results.status(one).replace('_', ' ')}: {message}")
     spreads = {n: one[f"{n}_windows"] for n in fit_results.shown(one) if f"{n}_windows" in one}
@@ -223,6 +224,11 @@ def _remarks(one: xr.Dataset) -> None:
             f"{fit_results.SHORT[plain(n)][0]} {v.item():.2g}" for n, v in spreads.items()
         )
         console.print(f"{law}: among windows parameters differ by {each}")
+    if "posterior" in one and math.isfinite(one["autocorrelation_time"].item()):
+        ends = {n: one["posterior"].sel(parameter=n).quantile([0.025, 0.975]).values for n in names}
+        each = ", ".join(f"{n} {low:.4g} to {high:.4g}" for n, (low, high) in ends.items())
+        time = f"{one['autocorrelation_time'].item():.2g} steps"
+        console.print(f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})")
     chance = one["whiteness"].item()
     if math.isfinite(chance):
         verdict = "white" if chance > _CHANCE else "still correlated"

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.stats import chi2
 
+from rsfstudy.analysis.fitting import posterior
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
     LOGARITHMIC,
@@ -117,6 +118,8 @@ class Fit(Measure):
     loading : {"steps", "recorded"}
         The load point moves steadily between its steps; or as recorded, and normal stress with it,
         unless that of the scene is constant.
+    posterior : int
+        Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
 
     References
     ----------
@@ -135,6 +138,7 @@ class Fit(Measure):
     part: float = 1.0
     noise: str = "ar"
     loading: str = "steps"
+    posterior: int = 0
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
@@ -148,6 +152,7 @@ class Fit(Measure):
         Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
+        Quantity("draw", "", "1", "number of the draw"),
     )
 
     def __post_init__(self) -> None:
@@ -174,6 +179,7 @@ class Fit(Measure):
             rule = "is that of a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise(self.noise)
+        posterior.check(self.posterior)
 
     @property
     def sought(self) -> tuple[str, ...]:
@@ -227,6 +233,11 @@ class Fit(Measure):
                 found.append(Output(f"{name}_{suffix}", "", about.units, text))
         both = "parameter", "other_parameter"
         rows = [Output(q.name, q.symbol, q.units, q.long_name, dims=("row",)) for q in _ROWS_OF]
+        if self.posterior:
+            text = "steps after which a chain has forgotten where it was"
+            found.append(Output("autocorrelation_time", "", "1", text))
+            text = "draws of the parameters from their posterior"
+            found.append(Output("posterior", "", "1", text, dims=("draw", "parameter")))
         return (
             *found,
             *_NUMBERS,
@@ -241,7 +252,8 @@ class Fit(Measure):
         names = np.array(self.parameters, dtype=object)
         together = sum(map(len, self._involved))
         rows = np.arange(together if self.together else max(map(len, self.records)))
-        return {"parameter": names, "other_parameter": names, "row": rows}
+        draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
+        return {"parameter": names, "other_parameter": names, "row": rows, **draws}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The parameter itself, many of its standard errors, or a size that matters where it is 0:
@@ -299,6 +311,8 @@ class Fit(Measure):
         for name in self.parameters:
             of = search.bounds if name in untold else search.interval
             values[f"{name}_low"], values[f"{name}_high"] = of(found, name)
+        if self.posterior:
+            values |= self._drawn(search, found)
         if untold:
             text = f"{', '.join(untold)}: the record does not tell"
             if "a" in untold and found.values["a"] < _LEAST * search.bounds(found, "a")[0]:
@@ -319,6 +333,16 @@ class Fit(Measure):
             f"noise of the recorded load point, {noise:.2g} um, moves slip_distance by some "
             f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
         )
+
+    def _drawn(self, search: Search, found: Fitted) -> dict[str, Value]:
+        """Draws from the posterior; NaN where errors are infinite."""
+        drawn, time = np.full((self.posterior, len(found.free)), math.nan), math.nan
+        if np.isfinite(found.covariance).all():
+            drawn, time = posterior.sample(search, found, self.posterior)
+        for place, name in enumerate(found.free):
+            if name in LOGARITHMIC:
+                drawn[:, place] = np.exp(drawn[:, place])
+        return {"posterior": drawn, "autocorrelation_time": time}
 
     def _begins(self, record: Record) -> int:
         """First row of a record among those that are fitted together."""

@@ -1,0 +1,99 @@
+"""Draws from the posterior of the parameters of a fit, by the ensemble sampler of emcee.
+
+The likelihood is that of the fit, with its noise as it was found. Priors are flat, in the logarithm
+for slip distances and stiffness, between the bounds of the search.
+
+References
+----------
+Foreman-Mackey et al. (2013), Publ. Astron. Soc. Pac. 125, 306-312.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import multivariate_t
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.meter import Halt
+
+if TYPE_CHECKING:
+    from rsfstudy.analysis.fitting.search import Fitted, Search
+
+#: Steps between two looks at a chain, autocorrelation times that it must be long, and times that
+#: are left out at its beginning.
+_STEPS, _LONG, _BURNT = 100, 50.0, 5.0
+#: Degrees of freedom of proposals: their tails are longer than those of the likelihood.
+_TAILS = 5.0
+
+
+def check(draws: int) -> None:
+    """Raise InvalidValue for a number of draws that is none, or without emcee."""
+    if not isinstance(draws, int) or draws < 0:
+        raise InvalidValue("posterior", draws, "must be a whole number, 0 or more")
+    if draws and importlib.util.find_spec("emcee") is None:
+        remedy = "pip install 'rsfstudy[posterior]'."
+        raise InvalidValue("posterior", draws, "needs emcee, which is missing", remedy=remedy)
+
+
+def sample(search: Search, found: Fitted, draws: int, seed: int = 0) -> tuple[np.ndarray, float]:
+    """Draws of the coordinates of the free parameters, shape (draws, parameters), and the longest
+    autocorrelation time of the chain in steps.
+
+    Half of the steps are stretch moves, half are proposed by the errors of the fit. The chain goes
+    on until it is 50 autocorrelation times long and holds as many independent samples as draws.
+
+    Parameters
+    ----------
+    search : Search
+    found : Fitted
+        Of that search, with a covariance that is finite.
+    draws : int
+    seed : int
+
+    Raises
+    ------
+    Halt
+        Where the work budget is spent before: a chain too short tells nothing.
+    """
+    import emcee
+
+    halts: list[Halt] = []
+    errors = multivariate_t(
+        search.coordinates(found.values), found.covariance, _TAILS, allow_singular=True
+    )
+
+    def log_likelihood(x: np.ndarray) -> float:
+        if halts or not ((search.low <= x) & (x <= search.high)).all():
+            return -math.inf
+        try:
+            left = search.residuals(search.values(x), checked=True)
+        except Halt as halt:
+            halts.append(halt)
+            return -math.inf
+        if not np.isfinite(left).all():
+            return -math.inf
+        return -0.5 * float(np.square(found.noise.whitened(left[:, None]) / found.size).sum())
+
+    def proposed(x: np.ndarray, rng: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+        drawn = errors.rvs(len(x), rng).reshape(x.shape)
+        return drawn, errors.logpdf(x) - errors.logpdf(drawn)
+
+    rng = np.random.RandomState(seed)
+    moves = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.MHMove(proposed), 0.5)]
+    walkers = 2 * len(found.free) + 2
+    sampler = emcee.EnsembleSampler(walkers, len(found.free), log_likelihood, moves=moves)
+    begin = errors.rvs(walkers, rng).reshape(walkers, -1)
+    state = emcee.State(np.clip(begin, search.low, search.high), random_state=rng.get_state())
+    while True:
+        state = sampler.run_mcmc(state, _STEPS)
+        if halts:
+            raise halts[0]
+        time = float(np.max(sampler.get_autocorr_time(tol=0)))
+        kept = sampler.iteration - math.ceil(_BURNT * time) if math.isfinite(time) else 0
+        if kept >= _LONG * time and kept * walkers >= draws * time:
+            chain = sampler.get_chain(discard=sampler.iteration - kept, flat=True)
+            return chain[np.linspace(0, len(chain) - 1, draws).round().astype(int)], time
