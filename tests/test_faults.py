@@ -17,6 +17,7 @@ from running import FAULTY, HANGS, QUIET, call, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.api import tables
 from rsfstudy.cli import assignments, terminal
 from rsfstudy.compute import clusters, runner, worker_log, workers
 from rsfstudy.compute.plan import Batches
@@ -307,7 +308,7 @@ def test_cells_with_awkward_labels_alone(tmp_path):
     dataset["status"][:, 1] = int(Status.UNVERIFIED)
     for number, label in enumerate(AWKWARD):
         place = {"study": label, "inertia": dataset.inertia.values[1]}
-        words = shlex.split(terminal._reproducing(dataset, str(tmp_path / "awkward.nc"), place))
+        words = shlex.split(tables.reproducing(dataset, str(tmp_path / "awkward.nc"), place))
         cells = dict(assignments.place(text) for text in words if "=" in text)
         scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
         assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)

@@ -83,7 +83,7 @@ def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
     steps = re.findall(r"^ +[12] +(\d+) +0 ", said, re.MULTILINE)
     assert steps == ["100", "140"]
     for name in ("a", "b", "a_minus_b", r"Dc \(um\)", "mu_0", r"trend \(1/um\)"):
-        row = rf"^ {name} +\S.* \+- \S.*$"
+        row = rf"^{name} +\S.* \+- \S.*$"
         assert len(re.findall(row, said, re.MULTILINE)) == 2, name
     assert "residuals freed of correlation are white" in said
     assert max(len(line.rstrip()) for line in said.splitlines()) <= 80
@@ -124,7 +124,7 @@ def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, 
     assert ran.returncode == 0, ran.stderr
     assert "step 1 of record, step 2 of record" in " ".join(ran.stdout.split())
     for name in ("a", r"Dc \(um\)", "mu_0_1", "mu_0_2", r"trend_2 \(1/um\)"):
-        assert len(re.findall(rf"^ {name} +\S", ran.stdout, re.MULTILINE)) == 1, name
+        assert len(re.findall(rf"^{name} +\S", ran.stdout, re.MULTILINE)) == 1, name
     figure = rsfstudy.open(tmp_path / "fit.nc").rsf.plot()
     curves = [line for line in figure.axes[0].lines if line.get_label() == "slowness law"]
     symbols = [text.get_text() for text in figure.axes[-1].get_xticklabels()]

@@ -353,13 +353,14 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
 
 
 def test_figures_and_tables_show_units(cycles, capsys):
-    from rsfstudy.cli import terminal_numbers
+    from rsfstudy.api import tables
+    from rsfstudy.cli import layout
 
     drawn = rsfstudy.plot(cycles)
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    terminal_numbers.headline(cycles)
+    layout.show(tables.headline(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])

@@ -60,7 +60,7 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
     found = verdicts(xr.Dataset({"slope": 2.05}), claims, {})
     shown = rows(found._repr_html_())
     assert shown[1] == ["C1", "x < y", "2", "2.05", "0.1: rounded", "reproduced"]
-    assert shown[2][5] == "differs, and was expected to be: reproduced"
+    assert shown[2][5] == "differs, expected reproduced"
     lines = repr(found).splitlines()
     assert [re.split(r"\s{2,}", line) for line in lines] == [
         ["id", "claim", "published", "ours", "tolerance", "verdict"],

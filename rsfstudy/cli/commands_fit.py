@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich.table import Column, Table
 
 from rsfstudy import plots
 from rsfstudy.analysis.fitting.joint import plain
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import fit_results, fitting
-from rsfstudy.cli import commands_simulate, terminal
+from rsfstudy.api.tables import Table
+from rsfstudy.cli import commands_simulate, layout, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, store
@@ -73,7 +73,7 @@ def show(dataset: xr.Dataset) -> int:
     about = contents.provenance(dataset)
     console.print(f"{dataset.attrs['title']}\n", style="bold")
     console.print(
-        f"made by {about['command']}, {about['time']}, git {about['git']}", soft_wrap=True
+        f"made by {about['command']}, {about['time']}, git {about['git']}\n", soft_wrap=True
     )
     return tables(dataset)
 
@@ -103,14 +103,12 @@ def _number(text: str) -> int:
 def _steps(record: Record) -> None:
     """Print the steps of a record."""
     console.print(f"{record.name}: {len(record):,} rows, {len(record.found)} steps")
-    table = Table(box=None, pad_edge=False)
-    for name in ("step", "time (s)", "lasts (s)", "V0 (um/s)", "V1 (um/s)"):
-        table.add_column(name, justify="right")
+    heads = ("step", "time (s)", "lasts (s)", "V0 (um/s)", "V1 (um/s)")
+    rows = []
     for number, step in enumerate(record.found[:_MOST_STEPS], start=1):
         values = step.begins, step.ends - step.begins, step.before, step.after
-        table.add_row(str(number), *(f"{value:.6g}" for value in values))
-    if record.found:
-        console.print(table)
+        rows.append(dict(zip(heads, (str(number), *(f"{v:.6g}" for v in values)), strict=True)))
+    layout.show(Table(rows))
     if left := len(record.found) - _MOST_STEPS:
         console.print(f"and {left} more" if left > 0 else "", end="\n" * (left > 0))
 
@@ -143,21 +141,25 @@ def tables(dataset: xr.Dataset) -> int:
 
 def _table(where: str, fits: Sequence[xr.Dataset]) -> None:
     told = [np.isfinite(one["rows_fitted"].item()) for one in fits]
-    console.print()
     for line in (where, _window(fits[told.index(True)]) if any(told) else ""):
         if line:
             console.print(line)
-    table = Table("", *(Column(_law(one), justify="left") for one in fits), box=None)
+    lines: dict[str, list[str]] = {}
     for name, (short, units) in fit_results.shown(fits[0]).items():
-        heading = f"{short} ({units})" if units else short
-        table.add_row(heading, *(with_error(one, name) for one in fits))
-    rows = {"R2": _explained, "criterion": _criterion, "noise": _noise, "worth": _worth}
-    for heading, of in rows.items():
-        table.add_row(
-            heading, *(of(one) if has else "-" for one, has in zip(fits, told, strict=True))
-        )
-    table.add_row("status", *(fit_results.status(one) for one in fits))
-    console.print(table)
+        lines[f"{short} ({units})" if units else short] = [with_error(one, name) for one in fits]
+    for heading, of in {
+        "R2": _explained,
+        "criterion": _criterion,
+        "noise": _noise,
+        "worth": _worth,
+    }.items():
+        lines[heading] = [of(one) if has else "-" for one, has in zip(fits, told, strict=True)]
+    lines["status"] = [fit_results.status(one) for one in fits]
+    laws = [_law(one) for one in fits]
+    layout.show(Table([
+        {"parameter": heading, **dict(zip(laws, texts, strict=True))}
+        for heading, texts in lines.items()
+    ]))  # fmt: skip
 
 
 def _window(one: xr.Dataset) -> str:

@@ -20,7 +20,7 @@ class Plain(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out, and without its middle where it is endless."""
-        return super().render_str(spelt(brief(text, _LONGEST)), **options)
+        return super().render_str(clean(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print; the output may go to a file on a full disk, which is a `RunError`."""
@@ -28,6 +28,11 @@ class Plain(Console):
             super().print(*objects, **options)
         except OSError as error:
             raise RunError(f"cannot print: {error.strerror}.") from error
+
+
+def clean(text: str) -> str:
+    """Text with control characters spelt out, and without its middle where it is endless."""
+    return spelt(brief(text, _LONGEST))
 
 
 console = Plain(markup=False, emoji=False, highlight=False)

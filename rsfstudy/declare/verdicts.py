@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from rsfstudy.quantity import Markup, table
+from rsfstudy.quantity import table
 
 _SIGNS = {"equals": "", "below": "< ", "above": "> "}
 #: Of a line of a terminal, and of an identifier on it, in characters.
@@ -57,17 +57,25 @@ class Verdicts(pd.DataFrame):
         return _aligned([_headed(row) for row in self.to_dict("records")])
 
     def _repr_html_(self) -> str:
-        rows = [self._row(row) for row in self.to_dict("records")]
-        headings = ("claim", "", "published", "ours", "tolerance", "verdict")
-        return table(headings, rows)
+        rows = [told(row) for row in self.to_dict("records")]
+        return (
+            table(list(rows[0]), [list(row.values()) for row in rows])
+            if rows
+            else "<p>no claims</p>"
+        )
 
-    @staticmethod
-    def _row(claim: dict[Any, Any]) -> tuple[object, ...]:
-        published = _published(claim)
-        tolerance = f"{claim['tolerance']:.3g}: {claim['reason']}"
-        verdict = claim["verdict"]
-        if claim["moved"]:
-            verdict = Markup(f"<b>{verdict}</b>, and was expected to be: {claim['expected']}")
-        elif claim["because"]:
-            verdict += f", because {claim['because']}"
-        return claim["id"], claim["claim"], published, claim["ours"], tolerance, verdict
+
+def told(claim: dict[Any, Any]) -> dict[str, str]:
+    """A claim in words, by headings; where there are several studies, with the name of its own."""
+    reason = f"{claim['tolerance']:.3g}: {claim['reason']}"
+    if claim["because"]:
+        reason += f". It differs because {claim['because']}"
+    of = f"{claim['study']}: " if "study" in claim else ""
+    return {
+        "id": str(claim["id"]),
+        "claim": f"{of}{claim['claim']}",
+        "published": _published(claim),
+        "ours": "-" if pd.isna(claim["ours"]) else f"{claim['ours']:.6g}",
+        "tolerance, and why": reason,
+        "verdict": claim["verdict"] + f", expected {claim['expected']}" * bool(claim["moved"]),
+    }

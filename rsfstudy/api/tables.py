@@ -1,0 +1,219 @@
+"""Tables of results, as texts: what commands print, and what a report shows."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.compute import runner
+from rsfstudy.declare import verdicts
+from rsfstudy.declare.wording import short
+from rsfstudy.files import contents, numbers
+from rsfstudy.rig.scales import in_units_of_rig, renamed
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage, quantity
+
+#: Most cells of a lattice that are shown, and most that failed.
+MOST_CELLS, _MOST_FAILURES = 24, 20
+#: What is told of a slope, by the ends of names: headings and formats.
+_OF_SLOPES = {
+    "stderr": ("standard error", ".2g"),
+    "misfit": ("largest misfit", ".2g"),
+    "points": ("points", ".0f"),
+    "error": ("numerical error", ".2g"),
+}
+_LABELS = {int(status): status.label for status in Status}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts under headings.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Each a row, by the headings.
+    caption : str
+        What it shows.
+    prose : collection of str
+        Headings of columns whose texts may be broken between words; no other is.
+    colours : sequence of str
+        Colour of the last cell of each row.
+    """
+
+    rows: Sequence[Mapping[str, str]]
+    caption: str = ""
+    prose: Collection[str] = ()
+    colours: Sequence[str] = ()
+
+
+def number(value: float, form: str = ".8g") -> str:
+    """A number, or a dash where there is none."""
+    return "-" if np.isnan(value) else format(value, form)
+
+
+def with_units(along: xr.DataArray) -> str:
+    """The name of an axis, and its units where it is that of a rig."""
+    name, units = str(along.name), along.attrs.get("units", "1")
+    return name if units in ("1", quantity(name).units) else f"{name} ({units})"
+
+
+def tally(dataset: xr.Dataset) -> str:
+    """How many cells ended how, and their work."""
+    work = int(dataset["rhs_evaluations"].sum())
+    counts = ", ".join(f"{count} {label}" for label, count in runner.counts(dataset).items())
+    return f"{counts}; {work:,} right-hand sides"
+
+
+def origin(dataset: xr.Dataset) -> dict[str, str]:
+    """What the results of a study are of, and where they come from, by what each is."""
+    attrs, about = dataset.attrs, contents.provenance(dataset)
+    dims = dataset["status"].dims
+    reduced = attrs.get("reduced_despite")
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    return {
+        "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
+        "cells": f"{attrs['completeness']}; {tally(dataset)}",
+        **({"reductions": reduced} if reduced else {}),
+        "made by": f"{about['command']}, {about['time']}",
+        "with": f"{versions}; git {about['git']}; {about['machine']}",
+    }
+
+
+def headline(dataset: xr.Dataset) -> Table:
+    """The headline along the axes, with its error estimate and how each cell ended; no row where
+    there is none.
+    """
+    name = numbers.headline(dataset)
+    if name is None:
+        return Table([])
+    dataset = in_units_of_rig(dataset)
+    name = name if name in dataset else renamed(name)
+    status, error = dataset["status"], f"{name}_error"
+    dims = [str(d) for d in status.dims]
+    at = numbers.sample({d: status.sizes[d] for d in dims}, MOST_CELLS)
+    few = dataset[[n for n in (name, error, "status") if n in dataset]].isel(at)
+    few = few.transpose(*dims).load()
+    others = bool((few["status"] != int(Status.OK)).any())
+    rows = []
+    for index in np.ndindex(few["status"].shape):
+        cell = few.isel(dict(zip(dims, index, strict=True)))
+        row = {with_units(dataset[d]): short(cell[d].item()) for d in dims}
+        row[name] = number(cell[name].item())
+        if error in few:
+            row["error"] = number(cell[error].item(), ".1e")
+        if others:
+            row["status"] = _LABELS[int(cell["status"])]
+        rows.append(row)
+    about = dataset[name].attrs
+    units = about.get("scale") or about.get("units", "1")
+    caption = about.get("long_name", name) + (f", in {units}" if units != "1" else "")
+    if len(rows) < status.size:
+        caption += f" ({len(rows)} of {status.size:,} cells)"
+    return Table(rows, caption)
+
+
+def reductions(dataset: xr.Dataset) -> Iterator[Table]:
+    """Slopes and their like, those with a standard error, with one row for each point of their
+    dimensions; and, where integrators were compared, the cheapest for each number of digits.
+    """
+    converted = in_units_of_rig(dataset)
+    for slope in (reduction["name"] for reduction in contents.declaration(dataset).reductions):
+        if {slope, f"{slope}_stderr"} <= set(converted.data_vars):  # else of another kind, or gone
+            yield _slope(converted, slope)
+    work = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
+    if {"cheapest_integrator", *work} <= set(dataset.data_vars):
+        frame = dataset[["cheapest_integrator", *work]].reset_coords(drop=True).to_dataframe()
+        rows = [
+            {
+                "problem": str(place),
+                "digits": f"{digits:g}",
+                "cheapest": str(name),
+                "its work": f"{least:,.0f}",
+                "work of the default": f"{default:,.0f}",
+                "rtol to ask for": f"{10.0**-request:.1g}",
+            }
+            for place, digits, name, least, default, request in (
+                frame.reset_index().itertuples(index=False)
+            )
+        ]
+        yield Table(rows, prose={"problem", "cheapest"})
+
+
+def _slope(dataset: xr.Dataset, name: str) -> Table:
+    slopes = dataset[name]
+    told = {n: about for end, about in _OF_SLOPES.items() if (n := f"{name}_{end}") in dataset}
+    rows = []
+    for at in np.ndindex(slopes.shape):
+        one = dataset[[name, *told]].isel(dict(zip(slopes.dims, at, strict=True)))
+        row = {with_units(dataset[n]): short(one[n].item()) for n in (*slopes.dims, name)}
+        rows.append(row | {head: format(one[n].item(), form) for n, (head, form) in told.items()})
+    prose = {with_units(dataset[d]) for d in slopes.dims}
+    return Table(rows, slopes.attrs.get("comment", name), prose)
+
+
+def claims(frame: pd.DataFrame) -> Table:
+    """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several."""
+    rows = frame.to_dict("records")
+    colours = [
+        "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
+        for row in rows
+    ]
+    return Table(
+        [verdicts.told(row) for row in rows], prose={"claim", "tolerance, and why"}, colours=colours
+    )
+
+
+def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[str, Any]]]:
+    """The first cells that failed, and the place of each on the axes."""
+    status = dataset["status"]
+    failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+    rows, places = [], []
+    for index in np.argwhere(failed.values)[:_MOST_FAILURES]:
+        cell = dataset[["status", "message"]].isel(dict(zip(failed.dims, index, strict=True)))
+        place = {str(d): cell[d].item() for d in failed.dims}
+        places.append(place)
+        rows.append({
+            "cell": ", ".join(f"{name} = {short(value)}" for name, value in place.items()),
+            "status": _LABELS[int(cell["status"])],
+            "message": str(cell["message"].item()),
+        })  # fmt: skip
+    caption = f"{int(failed.sum())} cells failed"
+    if int(failed.sum()) > len(rows):
+        caption += f", of which the first {len(rows)}"
+    return Table(rows, caption, prose={"cell", "message"}), places
+
+
+def reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
+    """The command that computes one cell alone."""
+    words = ["rsfstudy", "rerun", file]
+    declared_in = contents.provenance(dataset)["declared_in"]
+    if declared_in:
+        words += ["--study", declared_in]
+    for name, value in place.items():
+        words += ["--cell", f"{name}={value}"]
+    return shlex.join(words)
+
+
+def undone(dataset: xr.Dataset) -> int:
+    """Number of cells that are not computed yet."""
+    return int((dataset["status"] == int(Status.PENDING)).sum())
+
+
+def held(dataset: xr.Dataset) -> Table:
+    """The results that a file holds, what they are and along what."""
+    rows = [
+        {
+            "it holds": str(name),  # what a notebook added may have no words
+            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
+        }
+        for name, v in dataset.data_vars.items()
+        if coverage(str(name)) == "modelResult"
+    ]
+    return Table(rows, prose={"what"})

@@ -1,0 +1,94 @@
+"""Tables that commands print break no number, name or heading, however narrow the terminal."""
+
+import pytest
+from running import call, named_results
+from test_shown import rows as of_html
+
+import rsfstudy
+from rsfstudy.api import runs, tables
+from rsfstudy.api.tables import Table
+from rsfstudy.cli import layout, terminal
+from rsfstudy.declare import catalogue, names
+
+WIDTHS = (40, 60, 80, 120)
+
+
+@pytest.fixture
+def printed(monkeypatch, capsys):
+    """What is printed at some width, none of whose lines is longer."""
+
+    def at(width, say, *what) -> list[str]:
+        monkeypatch.setenv("COLUMNS", str(width))
+        capsys.readouterr()
+        say(*what)
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines), default=0) <= width
+        return lines
+
+    return at
+
+
+def pieces(table: Table) -> set[str]:
+    """What a reader must find in one piece: each text, but words of sentences and headings."""
+    found = {word for head in table.rows[0] for word in head.split()}
+    for row in table.rows:
+        for head, text in row.items():
+            found |= set(text.split() if head in table.prose else [text])
+    return found
+
+
+def in_one_piece(piece: str, lines: list[str]) -> bool:
+    """Whether it stands on a line, and is no part of a longer word."""
+    return any(f" {piece} " in f" {line} " for line in lines)
+
+
+@pytest.mark.parametrize("name", names.names())
+def test_results_of_every_study(name, printed, tmp_path_factory, cluster):
+    dataset, _path = named_results(name, tmp_path_factory, client=cluster)
+    shown = [tables.headline(dataset), *tables.reductions(dataset), tables.held(dataset)]
+    shown += [tables.claims(runs.check(dataset))]
+    for table in (table for table in shown if table.rows):
+        for width in WIDTHS:
+            lines = printed(width, layout.show, table)
+            assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_declarations_of_every_study(width, printed, tmp_path):
+    """The points of their axes are there, each in one piece."""
+    for name in names.names():
+        study = catalogue.load(name)
+        lines = printed(width, terminal.declaration, study, tmp_path)
+        for axis in study.axes:
+            shown = axis.points if len(axis) <= 40 else [*axis.points[:10], *axis.points[-3:]]
+            words = {word for point in shown for word in f"{point},".split()}
+            last = str(shown[-1]).split()[-1]
+            assert not [w for w in words if not in_one_piece(w, lines) and w != f"{last},"]
+
+
+def test_a_relation_stays_with_its_number(printed):
+    row = {"id": "C1", "claim": "a long sentence " * 9, "published": "< 1", "ours": "-4.56032e-07"}
+    for width in range(16, 121):
+        lines = printed(width, layout.show, Table([row, row], prose={"claim"}))
+        assert sum(in_one_piece("< 1", [line]) for line in lines) == 2
+        assert sum(in_one_piece("-4.56032e-07", [line]) for line in lines) == 2
+
+
+def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
+    path = "/a/very/long/path" * 9
+    lines = printed(40, layout.pairs, {"file": path})
+    assert path in "".join("".join(lines).split())
+
+
+def test_a_column_of_numbers_ends_at_one_place(printed):
+    lines = printed(80, layout.show, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}]))
+    assert [line.rstrip() for line in lines[2:4]] == ["x       1", "yy  -10.5"]
+
+
+def test_notebooks_show_the_same_claims(tmp_path_factory):
+    dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
+    found = rsfstudy.check(dataset)
+    shown = of_html(found._repr_html_())
+    told = tables.claims(found).rows
+    assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
+    assert call("check", _path).returncode == 0
