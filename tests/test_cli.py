@@ -193,9 +193,9 @@ def catalogued(monkeypatch):
     """Puts studies in the place of the named ones."""
 
     def named(*studies):
-        by_name = {study.name: study for study in studies}
+        by_name, load = {study.name: study for study in studies}, catalogue.load
         monkeypatch.setattr(names, "names", lambda: tuple(by_name))
-        monkeypatch.setattr(catalogue, "load", by_name.__getitem__)
+        monkeypatch.setattr(catalogue, "load", lambda name: by_name.get(name) or load(name))
 
     return named
 
@@ -250,6 +250,16 @@ def test_run_all_is_fine_where_every_study_is(catalogued, tmp_path):
     ran = call("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0
     assert [row[-1] for row in rows(ran.stdout).values()] == ["ok", "ok"]
+    assert_short(ran.stdout, 2)
+    assert len(ran.stderr.splitlines()) == 2
+
+
+def assert_short(said: str, studies: int) -> None:
+    """So many blocks of few lines, and one table at the end."""
+    blocks, _rule, table = said.rpartition("───\n")
+    assert len(re.findall(r"^  in .*, wrote ", blocks, re.MULTILINE)) == studies
+    assert len(blocks.splitlines()) <= 6 * studies + 2
+    assert len(table.split("\n\n")[0].splitlines()) == studies
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """How far a run has come: lines in a log file, a bar on a terminal, nothing where not wanted."""
 
 import io
-import re
+import itertools
 
 import pytest
 from running import call
@@ -24,15 +24,31 @@ def told(stream: io.StringIO, monkeypatch, done: list[int], show: bool = True) -
     return stream.getvalue()
 
 
-def test_a_log_file_gets_a_line_for_each_tenth(monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that goes on by so many seconds whenever it is looked at."""
+
+    def goes(by):
+        monkeypatch.setattr(progress.time, "monotonic", itertools.count(0.0, by).__next__)
+
+    return goes
+
+
+def test_a_log_file_gets_a_line_for_each_tenth(monkeypatch, clock):
+    clock(1.0)
     lines = told(io.StringIO(), monkeypatch, list(range(1001))).splitlines()
-    assert [re.sub(r"\d+ s$", "", line) for line in lines] == [
-        f"holds: {count:,} of 1,000 cells after " for count in range(0, 1001, 100)
+    assert lines == [
+        f"holds: {count:,} of 1,000 cells after {count + 1} s" for count in range(100, 1001, 100)
     ]
 
 
-def test_few_cells_are_told_as_they_come(monkeypatch):
-    assert len(told(io.StringIO(), monkeypatch, [0, 1, 2, 2, 3]).splitlines()) == 4
+@pytest.mark.parametrize(("by", "lines"), [(0.005, 1), (0.11, 10), (5.0, 10)])
+def test_lines_are_few(by, lines, monkeypatch, clock):
+    """A run of 10 s, or less, has its last one; a long one has no more than ten."""
+    clock(by)
+    said = told(io.StringIO(), monkeypatch, [0, *range(1001), 1000]).splitlines()
+    assert len(said) == lines
+    assert said[-1].startswith("holds: 1,000 of 1,000 cells")
 
 
 def test_a_terminal_gets_a_bar(monkeypatch):

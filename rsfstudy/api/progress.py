@@ -15,8 +15,8 @@ from rsfstudy.compute.runner import Progress
 from rsfstudy.motion.engines import compiled_engine, compiling
 from rsfstudy.slider.scene import Scene
 
-#: Lines of a whole run, where there is no bar.
-_LINES = 10
+#: Most lines of a whole run, where there is no bar, and s between two of them.
+_LINES, _BETWEEN = 10, 10.0
 
 
 @contextlib.contextmanager
@@ -56,15 +56,18 @@ def _bar(name: str, console: Console) -> Iterator[Progress]:
 
 
 def _lines(name: str, console: Console) -> Progress:
-    """A line for each tenth of the cells, for log files and pipes."""
-    began, told = time.monotonic(), -1
+    """A line for each tenth of the cells, but no two at once, for log files and pipes; a run that
+    is soon over has one.
+    """
+    began = said = time.monotonic()
+    told = 0
 
     def update(done: int, total: int) -> None:
-        nonlocal told
-        if (part := _LINES * done // total) > told:
-            told = part
-            seconds = time.monotonic() - began
-            text = f"{name}: {done:,} of {total:,} cells after {seconds:.0f} s"
+        nonlocal said, told
+        now, part = time.monotonic(), _LINES * done // total
+        if part > told and (part == _LINES or now - said >= _BETWEEN):
+            said, told = now, part
+            text = f"{name}: {done:,} of {total:,} cells after {now - began:.0f} s"
             console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     return update

@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
-from rsfstudy.declare.wording import short
+from rsfstudy.declare.wording import listed, short
 from rsfstudy.files import contents, numbers
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import Status
@@ -119,14 +119,33 @@ def headline(dataset: xr.Dataset) -> Table:
     return Table(rows, caption)
 
 
+def in_short(dataset: xr.Dataset) -> list[str]:
+    """The headline and the slopes in a line each, and how cells ended in another."""
+    lines, converted = [], in_units_of_rig(dataset)
+    if (name := numbers.headline(dataset)) is not None:
+        values = converted[name if name in converted else renamed(name)]
+        told = np.unique(values.values[np.isfinite(values.values)])
+        least_and_most = " to ".join(
+            short(value) for value in dict.fromkeys((*told[:1], *told[-1:]))
+        )
+        units = values.attrs.get("scale") or values.attrs.get("units", "1")
+        text = f"{values.name}: {least_and_most or 'no number'}"
+        lines.append(text + f" {units}" * bool(least_and_most and units != "1"))
+    slopes = {slope: converted[slope].values.ravel().tolist() for slope in _slopes(converted)}
+    return [
+        *lines,
+        *(f"{n}: {listed(values, ', ')}" for n, values in slopes.items()),
+        tally(dataset),
+    ]
+
+
 def reductions(dataset: xr.Dataset) -> Iterator[Table]:
     """Slopes and their like, those with a standard error, with one row for each point of their
     dimensions; and, where integrators were compared, the cheapest for each number of digits.
     """
     converted = in_units_of_rig(dataset)
-    for slope in (reduction["name"] for reduction in contents.declaration(dataset).reductions):
-        if {slope, f"{slope}_stderr"} <= set(converted.data_vars):  # else of another kind, or gone
-            yield _slope(converted, slope)
+    for slope in _slopes(converted):
+        yield _slope(converted, slope)
     work = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
     if {"cheapest_integrator", *work} <= set(dataset.data_vars):
         frame = dataset[["cheapest_integrator", *work]].reset_coords(drop=True).to_dataframe()
@@ -144,6 +163,12 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
             )
         ]
         yield Table(rows, prose={"problem", "cheapest"})
+
+
+def _slopes(dataset: xr.Dataset) -> list[str]:
+    """Names of the reductions that have a standard error."""
+    named = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
 def _slope(dataset: xr.Dataset, name: str) -> Table:

@@ -114,16 +114,26 @@ class Look:
         return results.with_name(".".join(filter(None, words)))
 
 
-def _run(study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping, look: Look) -> Ended:
-    """Compute a study, draw it and print what came out."""
+def _run(
+    study: Study,
+    compute: Callable[[], xr.Dataset],
+    keeping: Keeping,
+    look: Look,
+    one_of_many: bool = False,
+) -> Ended:
+    """Compute a study, draw it and print what came out, in short where others follow."""
     assert keeping.output is not None
     began = time.monotonic()
     dataset = compute()
     file = keeping.output / f"{study.name}.{_ENDINGS[keeping.format]}"
     own = None if isinstance(study.plot, str) else study.plot
     drawn = _drawn(dataset, look.beside(file), look, own)
-    terminal.report(dataset, study.name, [file, *drawn])
-    return terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
+    end = terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
+    if one_of_many:
+        terminal.in_short(dataset, end, [file, *drawn])
+    else:
+        terminal.report(dataset, study.name, [file, *drawn])
+    return end
 
 
 def _left_out(studies: Sequence[Study]) -> list[Ended]:
@@ -150,7 +160,7 @@ def _run_all(
         for study, compute in ready:
             began = time.monotonic()
             try:
-                ends.append(_run(study, compute, keeping, look))
+                ends.append(_run(study, compute, keeping, look, one_of_many=True))
             except Interrupted:
                 raise
             except RsfStudyError as error:

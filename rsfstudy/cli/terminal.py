@@ -122,6 +122,21 @@ def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
     console.print(f"wrote {' and '.join(map(str, files))}", soft_wrap=True)
 
 
+def in_short(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
+    """Print what one of many runs ends with: as much as `report`, in a line for each table, but for
+    verdicts that have moved and cells that failed.
+    """
+    console.print(f"{end.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
+    if overrides := contents.declaration(dataset).overrides:
+        console.print(f"  not as declared: {settings(overrides)}", soft_wrap=True)
+    claimed = f"claims: {end.verdicts or 'none applies'}"
+    where = f"in {cost.clock(end.seconds)}, wrote {' and '.join(map(str, files))}"
+    for line in (*tables.in_short(dataset), claimed, where):
+        console.print(f"  {line}", soft_wrap=True)
+    moved(runs.check(dataset))
+    failures(dataset, str(files[0]))
+
+
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
     """End of a run, in few words."""
     claimed = runs.check(dataset)
@@ -139,16 +154,11 @@ def summary(ends: Sequence[Ended]) -> None:
     rows = [
         {
             "study": end.study,
-            "time": cost.clock(end.seconds),
+            "time": "-" if end.left_out else cost.clock(end.seconds),
             "verdicts": end.verdicts or "-",
-            "status": end.wrong or "ok",
-        }
-        if not end.left_out
-        else {
-            "study": end.study,
-            "time": "-",
-            "verdicts": "-",
-            "status": f"left out: {end.left_out.partition(' (')[0]}",
+            "status": f"left out: {end.left_out.partition(' (')[0]}"
+            if end.left_out
+            else end.wrong or "ok",
         }
         for end in ends
     ]
