@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.events import events
     from rsfstudy.api.fitting import fit
     from rsfstudy.api.one_scene import critical_step, limit_cycle, to_si
+    from rsfstudy.api.report import report
     from rsfstudy.api.runs import cell, check, compare, open, plot, rerun, run, studies
     from rsfstudy.api.trajectory import simulate
     from rsfstudy.declare.axis import Axis
@@ -48,6 +49,7 @@ _HOMES = {
     "open": "api.runs",
     "check": "api.runs",
     "compare": "api.runs",
+    "report": "api.report",
     "plot": "api.runs",
     "studies": "api.runs",
     "simulate": "api.trajectory",
@@ -78,6 +80,7 @@ __all__ = [
     "read_protocol",
     "read_record",
     "read_table",
+    "report",
     "rerun",
     "run",
     "simulate",

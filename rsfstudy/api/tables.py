@@ -195,6 +195,15 @@ def claims(frame: pd.DataFrame) -> Table:
     )
 
 
+def ended(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
+    """How many claims have which verdict, and what went wrong, in words."""
+    wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
+    if not len(found):
+        return "", wrong
+    wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
+    return ", ".join(f"{n} {v}" for v, n in found["verdict"].value_counts().items()), wrong
+
+
 def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[str, Any]]]:
     """The first cells that failed, and the place of each on the axes."""
     status = dataset["status"]

@@ -24,7 +24,7 @@ from rsfstudy.cli import (
     options,
 )
 from rsfstudy.declare import names
-from rsfstudy.defaults import FORMATS
+from rsfstudy.defaults import FORMATS, OUTPUT
 from rsfstudy.doors import in_words
 from rsfstudy.errors import (
     Incomplete,
@@ -239,6 +239,20 @@ def plot(**given: Any) -> int:
     from rsfstudy.cli import commands
 
     return commands.plot(**given)
+
+
+@cli.command()
+@click.argument("directory", default=OUTPUT, type=click.Path(path_type=Path))
+@click.option("--output", metavar="FILE", help="The page.  [default: DIRECTORY/report.html]")
+def report(**given: Any) -> int:
+    """Write one page of HTML of all results in a directory.
+
+    With verdicts, figures, slopes, failed cells, and where each file comes from, for a browser or a
+    printer; it needs no other file. Fails where a file cannot be read, which the page tells.
+    """
+    from rsfstudy.cli import commands
+
+    return commands.report(**given)
 
 
 @cli.command()

@@ -17,6 +17,7 @@ import click
 import xarray as xr
 
 from rsfstudy.api import exchange, runs
+from rsfstudy.api import report as reports
 from rsfstudy.cli import assignments, commands_fit, commands_simulate, terminal, terminal_numbers
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.options import RIG
@@ -204,6 +205,15 @@ def rerun(
             time_limit=time_limit,
         )
     return terminal.agreement(table)
+
+
+def report(directory: Path, output: str | None) -> int:
+    """Write a page of all results."""
+    page, unread = reports.written(directory, output)
+    console.print(f"wrote {page}", soft_wrap=True)
+    for file in unread:
+        console.print(f"{file} cannot be read: the page says why", style="red", soft_wrap=True)
+    return FAILED if unread else OK
 
 
 def compare(first: str, second: str, output: Path) -> int:

@@ -14,7 +14,6 @@ from rsfstudy.api import runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
 from rsfstudy.cli.console import console
-from rsfstudy.compute import runner
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
@@ -139,12 +138,7 @@ def in_short(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
     """End of a run, in few words."""
-    claimed = runs.check(dataset)
-    wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
-    verdicts = ""
-    if len(claimed):
-        wrong += [f"{claim} moved" for claim in dict.fromkeys(claimed["id"][claimed["moved"]])]
-        verdicts = ", ".join(f"{n} {v}" for v, n in claimed["verdict"].value_counts().items())
+    verdicts, wrong = tables.ended(dataset, runs.check(dataset))
     wrong += [] if drawn else ["no figure"]
     return Ended(name, seconds, ", ".join(wrong), verdicts)
 

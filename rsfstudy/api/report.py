@@ -1,0 +1,250 @@
+"""One page of HTML of all results in a directory, complete by itself."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+from urllib.parse import quote
+
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.api import fit_results, runs, tables
+from rsfstudy.api.accessor import Accessor
+from rsfstudy.api.tables import Table
+from rsfstudy.compute import provenance
+from rsfstudy.declare.wording import settings, short
+from rsfstudy.defaults import FIGURES, OUTPUT
+from rsfstudy.doors import door, in_words
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
+from rsfstudy.files import contents, places, store
+from rsfstudy.quantity import Markup, table
+
+_UNREAD = "cannot be read"
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class _Result:
+    """One results file: what the summary tells, and what the page shows below."""
+
+    path: Path
+    title: str = ""
+    verdicts: str = ""
+    wrong: str = ""
+    shown: tuple[str, ...] = ()
+
+    @property
+    def anchor(self) -> str:
+        return re.sub(r"\W+", "-", self.path.name)
+
+
+@door
+def report(directory: str | Path = OUTPUT, output: str | Path | None = None) -> Path:
+    """Path of one page of HTML, which is written: it shows all results in a directory.
+
+    The page holds verdicts, figures, reductions, failed cells and where each file comes from. It
+    needs no other file and no network, and prints. A file that cannot be read is told on it.
+
+    Parameters
+    ----------
+    directory : path
+        With files of studies, fits and motions, as `run`, `fit` and `simulate` write them.
+    output : path, optional
+        The file to write; ``report.html`` in the directory, unless stated.
+
+    Raises
+    ------
+    InvalidValue
+        If the directory is none, or the page has another ending than ``.html``.
+    DataError
+        If the directory holds no results, or the page cannot be written.
+    """
+    return written(directory, output)[0]
+
+
+def written(directory: str | Path, output: str | Path | None = None) -> tuple[Path, list[Path]]:
+    """Path of the page, which is written, and the files that could not be read."""
+    from rsfstudy.plots import write_image
+
+    place = places.directory(directory)
+    if place is None or not place.is_dir():
+        raise InvalidValue("directory", str(directory), "is no directory")
+    page = place / "report.html" if output is None else places.directory(output)
+    if page is None or page.suffix != ".html" or page.is_dir():
+        raise InvalidValue("output", str(output), "must be a file that ends in .html")
+    try:
+        files = sorted(file for ending in ("nc", "zarr") for file in place.glob(f"[!.]*.{ending}"))
+        if not files:
+            raise DataError(f"{brief(place)} holds no results, which end in .nc or .zarr.")
+        found = [_result(file, page.parent) for file in files]
+        write_image(_page(place, found).encode(), page)
+    except OSError as error:
+        raise DataError(f"{brief(page)} cannot be written ({error})") from error
+    return page, [one.path for one in found if one.title == _UNREAD]
+
+
+def _page(directory: Path, found: list[_Result]) -> str:
+    """The whole page."""
+    rows = [
+        {
+            "results": Markup(f'<a href="#{one.anchor}">{_text(one.path.stem)}</a>'),
+            "title": one.title,
+            "claims": one.verdicts or "-",
+            "status": one.wrong or "ok",
+        }
+        for one in found
+    ]
+    colours = ["red" if one.wrong else "green" for one in found]
+    made = provenance.attributes("rsfstudy report")
+    when, by = made["history"].split()[0], made["source"].partition(",")[0]
+    sections = (
+        f'<section id="{one.anchor}">\n<h2>{_text(one.path.stem)}: {_text(one.title)}</h2>\n'
+        + "\n".join(one.shown)
+        + "\n</section>"
+        for one in found
+    )
+    page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
+    return page.substitute(
+        title=f"Results in {_text(directory.resolve().name)}",
+        made=_text(f"{len(found)} files, read by {by}, {when}"),
+        summary=f"<nav>{_table(Table(rows, colours=colours))}</nav>",
+        sections="\n".join(sections),
+    )
+
+
+def _result(path: Path, beside: Path) -> _Result:
+    """What is told of a file, whatever it holds."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            found = _read(path, store.read_any(path))
+        except Exception as error:  # damaged files raise almost anything
+            why = str(error) if isinstance(error, RsfStudyError) else in_words(error)
+            found = _Result(path, _UNREAD, "", _UNREAD, (_said(why, "red"),))
+    remarks = {str(one.message) for one in caught if issubclass(one.category, UserWarning)}
+    links = _links(path, beside)
+    return replace(found, shown=(*found.shown, *map(_said, sorted(remarks)), links))
+
+
+def _read(path: Path, dataset: xr.Dataset) -> _Result:
+    if contents.is_of_a_scene(dataset):
+        return _of_a_scene(path, dataset)
+    about = contents.declaration(dataset)
+    first = [_said(about.summary)] if about.summary else []
+    if about.overrides:
+        first.append(_said(f"Not as declared: {settings(about.overrides)}", "yellow"))
+    figure = _figure(path, lambda: runs.plot(dataset))
+    if "rows_fitted" in dataset:
+        shown = _table(_fits(dataset))
+    else:
+        shown = "\n".join(map(_table, [tables.headline(dataset), *tables.reductions(dataset)]))
+    claimed = runs.check(dataset)
+    undone = tables.undone(dataset)
+    verdicts, wrong = tables.ended(dataset, claimed)
+    wrong += [f"{undone} cells not computed"] if undone else []
+    failed, cells = tables.failures(dataset)
+    commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
+    parts = [*first, figure, shown, _headed("Claims", _table(tables.claims(claimed)))]
+    parts += [_headed("Failures", f"{_table(failed)}<pre>{_text(commands)}</pre>")] if cells else []
+    parts += [_headed("Provenance", _list(tables.origin(dataset)))]
+    title = str(dataset.attrs["title"])
+    return _Result(path, title, verdicts, ", ".join(wrong), tuple(filter(None, parts)))
+
+
+def _of_a_scene(path: Path, answer: xr.Dataset) -> _Result:
+    """A motion, or another answer for one scene."""
+    about, scene = answer.attrs, Accessor(answer).scene
+    numbers = {n: v for n, v in answer.data_vars.items() if not v.dims and v.dtype.kind in "fiu"}
+    plain = {str(name): f"{value.item():.8g}" for name, value in numbers.items()}
+    told = {"status": f"{about['status']} {about.get('message', '')}".strip(), **plain}
+    stated = {n: short(v) for n, v in scene.as_dict().items() if v is not None}
+    told |= {"scene": ", ".join(f"{name} = {value}" for name, value in stated.items())}
+    told |= {"made by": about.get("history", "unknown"), "with": about.get("source", "unknown")}
+    is_motion = "load_point_displacement" in answer
+    figure = _figure(path, Accessor(answer).plot) if is_motion else ""
+    wrong = "" if about["status"] == "ok" else str(about["status"])
+    title = str(about.get("title", "answer for one scene"))
+    return _Result(path, title, "", wrong, (figure, _list(told)))
+
+
+def _fits(dataset: xr.Dataset) -> Table:
+    """Fits as laboratories tabulate them."""
+    rows = fit_results.table(dataset).to_dict("records")
+    return Table([{str(name): _plain(value) for name, value in row.items()} for row in rows])
+
+
+def _plain(value: Any) -> str:
+    return "-" if pd.isna(value) else short(value)
+
+
+# ---- pieces of HTML ------------------------------------------------------------------------------
+
+
+def _text(text: object) -> str:
+    """A text as HTML; control characters, which no browser shows, are spelt out."""
+    return escape(spelt(str(text)))
+
+
+def _said(text: str, colour: str = "") -> str:
+    return f'<p class="{colour}">{_text(text)}</p>'
+
+
+def _headed(heading: str, content: str) -> str:
+    return f"<h3>{heading}</h3>\n{content}" if content else ""
+
+
+def _table(told: Table) -> str:
+    """A table, in a box of its own that scrolls where it is too wide; none without rows."""
+    if not told.rows:
+        return ""
+    rows = []
+    for row, colour in zip(told.rows, told.colours or [""] * len(told.rows), strict=True):
+        *cells, last = (c if isinstance(c, Markup) else Markup(_text(c)) for c in row.values())
+        rows.append([*cells, Markup(f'<span class="{colour}">{last}</span>')])
+    caption = _said(told.caption) if told.caption else ""
+    return f'{caption}<div class="wide">{table(list(told.rows[0]), rows)}</div>'
+
+
+def _list(pairs: Mapping[str, Any]) -> str:
+    rows = "".join(f"<dt>{_text(n)}</dt><dd>{_text(value)}</dd>" for n, value in pairs.items())
+    return f"<dl>{rows}</dl>"
+
+
+def _figure(path: Path, draw: Callable[[], Any]) -> str:
+    """The figure beside results, drawn anew where it is missing or older than they are."""
+    from rsfstudy.plots import rendered, styled
+
+    beside = path.with_suffix(".png")
+    image = b""
+    if beside.is_file() and beside.stat().st_mtime >= path.stat().st_mtime:
+        image = beside.read_bytes()
+    try:
+        if not image.startswith(_PNG):
+            with styled(None):
+                image = rendered(draw(), "png")
+    except Exception as error:  # of whatever kind, the numbers are there
+        return _said(f"no figure: {error}", "yellow")
+    data = base64.b64encode(image).decode()
+    name = _text(f"figure of {path.stem}")
+    return f'<figure><img alt="{name}" src="data:image/png;base64,{data}"></figure>'
+
+
+def _links(path: Path, beside: Path) -> str:
+    """Links to the results and to what lies beside them, from where the page is."""
+    endings = [path.suffix, *(f".{form}" for form in FIGURES), ".csv", ".mat", ".cells.sqlite"]
+    files = [file for ending in endings if (file := path.with_suffix(ending)).exists()]
+    linked = (
+        f'<a href="{quote(Path(os.path.relpath(file, beside)).as_posix())}">{_text(file.name)}</a>'
+        for file in files
+    )
+    return f"<p>Files: {', '.join(linked)}</p>"
