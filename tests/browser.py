@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
 import contextlib
 import json
 import os
@@ -68,7 +67,7 @@ class _Tab:
         return json.loads(text)
 
 
-async def _look(address: str, page: Path, width: int, picture: Path | None) -> Opened:
+async def _look(address: str, page: Path, width: int, media: str) -> Opened:
     tab = _Tab(await websocket_connect(address, max_message_size=2**28))
     target = await tab.ask("Target.createTarget", url="about:blank")
     attached = await tab.ask("Target.attachToTarget", flatten=True, **target)
@@ -77,6 +76,7 @@ async def _look(address: str, page: Path, width: int, picture: Path | None) -> O
         await tab.ask(f"{domain}.enable")
     screen = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
     await tab.ask("Emulation.setDeviceMetricsOverride", **screen)
+    await tab.ask("Emulation.setEmulatedMedia", media=media)
     await tab.ask("Page.navigate", url=page.resolve().as_uri())
     await tab.until("Page.loadEventFired")
     found = await tab.ask("Runtime.evaluate", expression=LOOK)
@@ -91,17 +91,12 @@ async def _look(address: str, page: Path, width: int, picture: Path | None) -> O
             opened.errors.append(json.dumps(about))
         if what == "Network.requestWillBeSent":
             opened.asked.append(about["request"]["url"])
-    if picture is not None:
-        shot = await tab.ask("Page.captureScreenshot", format="png")
-        picture.write_bytes(base64.b64decode(shot["data"]))
     tab.socket.close()
     return opened
 
 
-def opened(
-    page: Path, widths: list[int], scratch: Path, picture: Path | None = None
-) -> list[Opened]:
-    """A page opened at some widths of a screen, by the browser that is installed."""
+def opened(page: Path, looks: list[tuple[int, str]], scratch: Path) -> list[Opened]:
+    """A page opened at some widths, on a screen or in print, by the browser that is installed."""
     browser = installed()
     assert browser
     words = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]
@@ -114,7 +109,7 @@ def opened(
             assert process.stderr is not None
             lines = iter(process.stderr.readline, "")
             address = next(line for line in lines if "DevTools listening on" in line).split()[-1]
-            return [asyncio.run(_look(address, page, width, picture)) for width in widths]
+            return [asyncio.run(_look(address, page, *look)) for look in looks]
         finally:
             process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):

@@ -105,6 +105,7 @@ def _page(directory: Path, found: list[_Result]) -> str:
         for one in found
     ]
     colours = ["red" if one.wrong else "green" for one in found]
+    summary = Table(rows, prose={"title", "claims", "status"}, colours=colours)
     made = provenance.attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
     sections = (
@@ -117,7 +118,7 @@ def _page(directory: Path, found: list[_Result]) -> str:
     return page.substitute(
         title=f"Results in {_text(directory.resolve().name)}",
         made=_text(f"{len(found)} files, read by {by}, {when}"),
-        summary=f"<nav>{_table(Table(rows, colours=colours))}</nav>",
+        summary=f"<nav>{_table(summary)}</nav>",
         sections="\n".join(sections),
     )
 
@@ -209,8 +210,10 @@ def _table(told: Table) -> str:
         return ""
     rows = []
     for row, colour in zip(told.rows, told.colours or [""] * len(told.rows), strict=True):
-        *cells, last = (c if isinstance(c, Markup) else Markup(_text(c)) for c in row.values())
-        rows.append([*cells, Markup(f'<span class="{colour}">{last}</span>')])
+        whole = {head: "" if head in told.prose else "whole" for head in row}
+        whole[list(row)[-1]] += f" {colour}"
+        texts = {head: c if isinstance(c, Markup) else _text(c) for head, c in row.items()}
+        rows.append([Markup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
     caption = _said(told.caption) if told.caption else ""
     return f'{caption}<div class="wide">{table(list(told.rows[0]), rows)}</div>'
 

@@ -1,0 +1,166 @@
+"""The page of all results in a directory: whole, complete by itself, and the same on any screen."""
+
+import base64
+import os
+import shutil
+from html.parser import HTMLParser
+from urllib.parse import unquote
+
+import browser
+import pytest
+import xarray as xr
+from running import call, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.declare.claims import Claim
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.files import store
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.status import Status
+
+#: Widths in CSS pixels: of a phone and of a desk, and of a sheet of A4 within its margins.
+LOOKS = [(390, "screen"), (1280, "screen"), (680, "print")]
+#: Elements that have no end.
+VOID = {"meta", "link", "img", "br"}
+MOVED = Scene(load_velocity_ratio=2.0, normal_stress="constant")
+EVIL = "</p><script>alert(1)</script> & \x1b[31m"
+
+
+class Page(HTMLParser):
+    """Elements of a page; each that begins, ends where it should."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.found, self.texts = [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+    def all(self, tag):
+        return [about for name, about in self.found if name == tag]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A directory with all kinds of files, and what the command said of it."""
+    place = tmp_path_factory.mktemp("results")
+    claim = Claim(id="C1", statement=f"k {EVIL}", source="", variable="critical_stiffness",
+                  published=1.0, tolerance=0.5, reason="a test", relation="below",
+                  where={"law": "slip", "b_over_a": 2.0})  # fmt: skip
+    axes = [Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])]
+    study = Study(name="fine", title=f"Fine {EVIL}", base=Scene(), axes=axes,
+                  measure=LinearStability(), claims=[claim])  # fmt: skip
+    fine = run(study, output=place)
+    other = fine.copy(deep=True)
+    other["status"][0, 1], other["message"][0, 1] = int(Status.INTEGRATION_FAILED), EVIL
+    other["critical_stiffness"][0, 1] = 7.0  # the claim moves
+    store.write(other, place / "failed here.nc")
+    motion = rsfstudy.simulate(
+        Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
+    )
+    motion.to_netcdf(place / "motion.nc")
+    (place / "cut.nc").write_bytes((place / "fine.nc").read_bytes()[:2000])
+    xr.Dataset({"x": 1.0}).to_netcdf(place / "foreign.nc")
+    run(study.with_(law="slip"), output=place / "zarr", format="zarr")
+    shutil.move(place / "zarr" / "fine.zarr", place / "pieces.zarr")
+    shutil.rmtree(place / "zarr")
+    shown = rsfstudy.plot(fine)
+    shown.savefig(place / "fine.png", dpi=50)
+    ran = call("report", place)
+    return place, ran, (place / "report.html").read_text()
+
+
+RESULTS = ("fine.nc", "failed here.nc", "motion.nc", "cut.nc", "foreign.nc", "pieces.zarr")
+
+
+def test_it_is_well_formed_and_has_a_section_for_every_file(written):
+    place, ran, text = written
+    page = Page(text)
+    sections = {about["id"] for about in page.all("section")}
+    assert len(sections) == len(RESULTS) == sum(text.count(f">{name}</a>") for name in RESULTS)
+    linked = [about["href"] for about in page.all("a")]
+    assert {f"#{name}" for name in sections} <= set(linked)
+    for link in linked:
+        assert link.removeprefix("#") in sections or (place / unquote(link)).exists(), link
+    assert f"wrote {place / 'report.html'}" in ran.stdout
+
+
+def test_it_needs_nothing_else(written):
+    """Figures are in it, and nothing is asked of anywhere."""
+    place, _ran, text = written
+    page = Page(text)
+    for _tag, about in page.found:
+        for name in ("src", "srcset", "data", "action", "poster"):
+            assert about.get(name, "data:").startswith("data:")
+    assert [about["href"] for about in page.all("link")] == ["data:,"]
+    assert not {"script", "iframe", "object"} & {tag for tag, _about in page.found}
+    assert "url(" not in text
+    assert "@import" not in text
+    images = [about["src"].removeprefix("data:image/png;base64,") for about in page.all("img")]
+    assert len(images) == 4  # of three studies and a motion
+    shown = [base64.b64decode(image) for image in images]
+    assert all(image.startswith(b"\x89PNG") for image in shown)
+    assert (place / "fine.png").read_bytes() in shown  # which is there, and newer than its results
+
+
+def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
+    place, ran, text = written
+    said = " ".join(" ".join(Page(text).texts).split())
+    assert "1 reproduced" in said
+    assert "1 integration_failed, C1 moved" in said
+    assert "differs, expected reproduced" in said
+    assert "rsfstudy rerun 'failed here.nc' --cell law=slip --cell b_over_a=2.0" in said
+    assert r"</p><script>alert(1)</script> & \x1b[31m" in said  # to read, and not to run
+    critical = rsfstudy.open(place / "fine.nc")["critical_stiffness"].sel(law="slip", b_over_a=1.5)
+    assert f" {float(critical):.8g} " in said
+    assert "< 1" in said
+    assert ran.returncode == 1
+    assert said.count("cannot be read") >= 4
+    for name in ("cut.nc", "foreign.nc"):
+        assert f"{name} cannot be read: the page says why" in ran.stdout
+
+
+def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
+    with pytest.raises(DataError, match="holds no results"):
+        rsfstudy.report(tmp_path)
+    motion = rsfstudy.simulate(
+        Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
+    )
+    (tmp_path / "in").mkdir()
+    motion.to_netcdf(tmp_path / "in" / "one.nc")
+    page = rsfstudy.report(tmp_path / "in", tmp_path / "all.html")
+    assert page == tmp_path / "all.html"
+    assert 'href="in/one.nc"' in page.read_text()
+    with pytest.raises(InvalidValue, match=r"ends in \.html"):
+        rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
+    with pytest.raises(InvalidValue, match="is no directory"):
+        rsfstudy.report(tmp_path / "nowhere")
+
+
+def test_a_browser_shows_it_on_a_phone_a_desk_and_paper(written, tmp_path):
+    """Nothing is wider than the screen, every figure is there, and nothing is complained of."""
+    place, _ran, _text = written
+    if browser.installed() is None:
+        missing = f"the report was NOT opened in a browser: none of {browser.NAMES} is installed"
+        if os.environ.get("CI"):
+            pytest.fail(missing)
+        pytest.skip(missing)
+    for look in browser.opened(place / "report.html", LOOKS, tmp_path):
+        assert look.inner == look.width
+        assert look.scroll <= look.inner
+        assert look.errors == []
+        assert len(look.images) == 4
+        assert min(look.images) > 0
+        assert {asked.partition(":")[0] for asked in look.asked} <= {"file", "data"}
