@@ -6,7 +6,7 @@ import base64
 import os
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from html import escape
 from importlib import resources
@@ -15,10 +15,9 @@ from string import Template
 from typing import Any
 from urllib.parse import quote
 
-import pandas as pd
 import xarray as xr
 
-from rsfstudy.api import fit_results, runs, tables
+from rsfstudy.api import fit_tables, runs, tables
 from rsfstudy.api.accessor import Accessor
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
@@ -145,10 +144,10 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
     if about.overrides:
         first.append(_said(f"Not as declared: {settings(about.overrides)}", "yellow"))
     figure = _figure(path, lambda: runs.plot(dataset))
+    numbers: Iterable[Table | str] = [tables.headline(dataset), *tables.reductions(dataset)]
     if "rows_fitted" in dataset:
-        shown = _table(_fits(dataset))
-    else:
-        shown = "\n".join(map(_table, [tables.headline(dataset), *tables.reductions(dataset)]))
+        numbers = fit_tables.told(dataset)
+    shown = "\n".join(_said(one) if isinstance(one, str) else _table(one) for one in numbers)
     claimed = runs.check(dataset)
     undone = tables.undone(dataset)
     verdicts, wrong = tables.ended(dataset, claimed)
@@ -176,16 +175,6 @@ def _of_a_scene(path: Path, answer: xr.Dataset) -> _Result:
     wrong = "" if about["status"] == "ok" else str(about["status"])
     title = str(about.get("title", "answer for one scene"))
     return _Result(path, title, "", wrong, (figure, _list(told)))
-
-
-def _fits(dataset: xr.Dataset) -> Table:
-    """Fits as laboratories tabulate them."""
-    rows = fit_results.table(dataset).to_dict("records")
-    return Table([{str(name): _plain(value) for name, value in row.items()} for row in rows])
-
-
-def _plain(value: Any) -> str:
-    return "-" if pd.isna(value) else short(value)
 
 
 # ---- pieces of HTML ------------------------------------------------------------------------------
