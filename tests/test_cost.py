@@ -3,6 +3,7 @@
 import sqlite3
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from running import SMALL, call, run
 
@@ -71,3 +72,39 @@ def test_show_tells_it(tmp_path):
 )
 def test_a_time_as_one_says_it(seconds, said):
     assert cost.clock(seconds) == said
+
+
+# ---- advice on the engine ------------------------------------------------------------------------
+
+#: So many cells that SciPy takes above a minute.
+MANY = SMALL.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
+
+
+def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
+    assert cost.estimated_cost(Plan(MANY))[1] > 60.0
+    advice = cost.faster(Plan(MANY), tmp_path)
+    assert advice == "--engine compiled is about 10 times faster here"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cost, "_FASTER", {"limit_cycle": 30})
+        assert cost.faster(Plan(MANY), tmp_path).endswith(
+            "as a rule: about 30 times with limit_cycle"
+        )
+    (tmp_path / FILE).touch()  # its cells would all be computed anew
+    assert cost.faster(Plan(MANY), tmp_path) == ""
+
+
+def test_it_is_not_where_it_would_save_little_or_is_not_there(tmp_path, monkeypatch):
+    assert cost.faster(Plan(SMALL), tmp_path) == ""
+    compiled = replace(MANY, accuracy=replace(MANY.accuracy, engine="compiled"))
+    assert cost.faster(Plan(compiled), tmp_path) == ""
+    monkeypatch.setattr(cost, "lacking", lambda _engine: "needs Numba")
+    assert cost.faster(Plan(MANY), tmp_path) == ""
+
+
+def test_show_and_run_say_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(cost, "_WORTH", 0.0)
+    few = ("rate_step_boundary", "--set", "b_over_a=2", "--output", tmp_path)
+    said = "--engine compiled is about 10 times faster here"
+    assert said in " ".join(call("show", *few).stdout.split())
+    assert f"note: {said}" in " ".join(call("run", *few, "--serial").stderr.split())
+    assert said not in " ".join(call("show", *few).stdout.split())

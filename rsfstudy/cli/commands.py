@@ -18,11 +18,19 @@ import xarray as xr
 
 from rsfstudy.api import exchange, runs
 from rsfstudy.api import report as reports
-from rsfstudy.cli import assignments, commands_fit, commands_simulate, terminal, terminal_numbers
+from rsfstudy.cli import (
+    assignments,
+    commands_fit,
+    commands_simulate,
+    cost,
+    terminal,
+    terminal_numbers,
+)
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.options import RIG
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
+from rsfstudy.compute.plan import Plan
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import SharedProcesses, Workers
 from rsfstudy.declare import catalogue, names
@@ -95,6 +103,8 @@ def run(
         ready = [(study, runs.prepared(study, keeping, where, not quiet)) for study in studies]
         for study in studies if rtol is not None else ():
             terminal.announce(study)
+        if not (every or quiet) and (advice := cost.faster(Plan(studies[0]), output)):
+            stderr.print(f"note: {advice}")
         if every:
             return _run_all(ready, keeping, look, left_out)
         return OK if _run(*ready[0], keeping, look).is_fine else FAILED

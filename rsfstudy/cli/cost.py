@@ -9,6 +9,15 @@ import numpy as np
 
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.files import journal
+from rsfstudy.motion.engines import COMPILED, SCIPY, lacking
+
+#: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
+#: has 7 to 12 times, and 31 to 72 times, the more the more accurate.
+_FASTER = {"critical_step": 10, "limit_cycle": 30}
+#: The measure that compares integrators of SciPy.
+_OF_SCIPY = "work_precision"
+#: Time in s above which another engine is worth a word.
+_WORTH = 60.0
 
 
 def in_words(plan: Plan, output: Path) -> str:
@@ -34,6 +43,21 @@ def in_words(plan: Plan, output: Path) -> str:
     missing = (cells - len(known)) * float(np.mean(list(took.seconds.values())))
     by = f"by the {len(took.seconds):,} cells in {kept}"
     return text + f"about {clock(math.fsum(known) + missing)} on one core, {by}"
+
+
+def faster(plan: Plan, output: Path) -> str:
+    """Advice to take the compiled engine; empty where it is not installed, where cells of another
+    engine are kept, or where little time is to be saved.
+    """
+    measure, engine = plan.study.measure.describe()["name"], plan.study.accuracy.engine
+    kept = output / f"{plan.study.name}.cells.sqlite"
+    saves = engine == SCIPY and measure != _OF_SCIPY and estimated_cost(plan)[1] > _WORTH
+    if not saves or kept.exists() or lacking(COMPILED):
+        return ""
+    if measure in _FASTER:
+        return f"--engine compiled is about {_FASTER[measure]} times faster here"
+    each = ", ".join(f"{times} times with {name}" for name, times in _FASTER.items())
+    return f"--engine compiled is faster as a rule: about {each}"
 
 
 def guessed(seconds: float) -> str:

@@ -62,7 +62,9 @@ def declaration(study: Study, output: Path) -> None:
     different = len(plan.different)
     others = f", of which {different:,} differ" if different < study.size else ""
     about["cells"] = f"{study.size:,}{others}"
-    about["cost"] = cost.in_words(plan, output)
+    about["cost"] = "; ".join(
+        filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
+    )
     layout.pairs({name: text or "-" for name, text in about.items()})
 
 
