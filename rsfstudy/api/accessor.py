@@ -45,6 +45,13 @@ class Accessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
+    def _repr_html_(self) -> str:
+        """The numbers of a dataset and the verdicts on them, or of the parameters of fits."""
+        from rsfstudy.api import report
+
+        self._must_be_ours()
+        return report.tables_of(self._dataset)
+
     @property
     @door
     def scene(self) -> Scene:

@@ -6,7 +6,7 @@ import base64
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from html import escape
 from importlib import resources
@@ -18,7 +18,6 @@ from urllib.parse import quote
 import xarray as xr
 
 from rsfstudy.api import fit_tables, runs, tables
-from rsfstudy.api.accessor import Accessor
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
 from rsfstudy.declare.wording import settings, short
@@ -137,44 +136,58 @@ def _result(path: Path, beside: Path) -> _Result:
 
 
 def _read(path: Path, dataset: xr.Dataset) -> _Result:
+    """What is told of a file that can be read."""
+    title = str(dataset.attrs.get("title", "answer for one scene"))
+    numbers = tables_of(dataset)
+    # the accessor, which this module cannot import: it shows these tables
     if contents.is_of_a_scene(dataset):
-        return _of_a_scene(path, dataset)
+        is_motion = "load_point_displacement" in dataset
+        figure = _figure(path, dataset.rsf.plot) if is_motion else ""
+        status = str(dataset.attrs["status"])
+        return _Result(path, title, "", "" if status == "ok" else status, (figure, numbers))
     about = contents.declaration(dataset)
-    first = [_said(about.summary)] if about.summary else []
+    parts = [_said(about.summary)] if about.summary else []
     if about.overrides:
-        first.append(_said(f"Not as declared: {settings(about.overrides)}", "yellow"))
-    figure = _figure(path, lambda: runs.plot(dataset))
-    numbers: Iterable[Table | str] = [tables.headline(dataset), *tables.reductions(dataset)]
-    if "rows_fitted" in dataset:
-        numbers = fit_tables.told(dataset)
-    shown = "\n".join(_said(one) if isinstance(one, str) else _table(one) for one in numbers)
-    claimed = runs.check(dataset)
-    undone = tables.undone(dataset)
-    verdicts, wrong = tables.ended(dataset, claimed)
-    wrong += [f"{undone} cells not computed"] if undone else []
+        parts.append(_said(f"Not as declared: {settings(about.overrides)}", "yellow"))
+    parts += [_figure(path, dataset.rsf.plot), numbers]
+    verdicts, wrong = tables.ended(dataset, runs.check(dataset))
+    if undone := tables.undone(dataset):
+        wrong.append(f"{undone} cells not computed")
     failed, cells = tables.failures(dataset)
-    commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
-    parts = [*first, figure, shown, _headed("Claims", _table(tables.claims(claimed)))]
-    parts += [_headed("Failures", f"{_table(failed)}<pre>{_text(commands)}</pre>")] if cells else []
-    parts += [_headed("Provenance", _list(tables.origin(dataset)))]
-    title = str(dataset.attrs["title"])
-    return _Result(path, title, verdicts, ", ".join(wrong), tuple(filter(None, parts)))
+    if cells:
+        commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
+        parts.append(f"<h3>Failures</h3>\n{_table(failed)}<pre>{_text(commands)}</pre>")
+    parts.append(f"<h3>Provenance</h3>\n{_list(tables.origin(dataset))}")
+    return _Result(path, title, verdicts, ", ".join(wrong), tuple(parts))
 
 
-def _of_a_scene(path: Path, answer: xr.Dataset) -> _Result:
-    """A motion, or another answer for one scene."""
-    about, scene = answer.attrs, Accessor(answer).scene
+def tables_of(dataset: xr.Dataset) -> str:
+    """The numbers of a dataset in HTML: fits, or headline, slopes and verdicts, or those of one
+    scene.
+    """
+    if contents.is_of_a_scene(dataset):
+        return _list(_of_a_scene(dataset))
+    told: list[Table | str] = [tables.headline(dataset), *tables.reductions(dataset)]
+    if "rows_fitted" in dataset:
+        told = list(fit_tables.told(dataset))
+    claimed = tables.claims(runs.check(dataset))
+    parts = [_said(one) if isinstance(one, str) else _table(one) for one in told]
+    parts += ["<h3>Claims</h3>", _table(claimed)] if claimed.rows else []
+    return "\n".join(filter(None, parts))
+
+
+def _of_a_scene(answer: xr.Dataset) -> dict[str, str]:
+    """What is told of a motion, or of another answer for one scene."""
+    about = answer.attrs
     numbers = {n: v for n, v in answer.data_vars.items() if not v.dims and v.dtype.kind in "fiu"}
-    plain = {str(name): f"{value.item():.8g}" for name, value in numbers.items()}
-    told = {"status": f"{about['status']} {about.get('message', '')}".strip(), **plain}
-    stated = {n: short(v) for n, v in scene.as_dict().items() if v is not None}
-    told |= {"scene": ", ".join(f"{name} = {value}" for name, value in stated.items())}
-    told |= {"made by": about.get("history", "unknown"), "with": about.get("source", "unknown")}
-    is_motion = "load_point_displacement" in answer
-    figure = _figure(path, Accessor(answer).plot) if is_motion else ""
-    wrong = "" if about["status"] == "ok" else str(about["status"])
-    title = str(about.get("title", "answer for one scene"))
-    return _Result(path, title, "", wrong, (figure, _list(told)))
+    stated = {n: short(v) for n, v in answer.rsf.scene.as_dict().items() if v is not None}
+    return {
+        "status": f"{about['status']} {about.get('message', '')}".strip(),
+        **{str(name): f"{value.item():.8g}" for name, value in numbers.items()},
+        "scene": ", ".join(f"{name} = {value}" for name, value in stated.items()),
+        "made by": about.get("history", "unknown"),
+        "with": about.get("source", "unknown"),
+    }
 
 
 # ---- pieces of HTML ------------------------------------------------------------------------------
@@ -187,10 +200,6 @@ def _text(text: object) -> str:
 
 def _said(text: str, colour: str = "") -> str:
     return f'<p class="{colour}">{_text(text)}</p>'
-
-
-def _headed(heading: str, content: str) -> str:
-    return f"<h3>{heading}</h3>\n{content}" if content else ""
 
 
 def _table(told: Table) -> str:

@@ -33,6 +33,7 @@ from rsfstudy.files.comparison import (
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
+from rsfstudy.quantity import table
 from rsfstudy.slider.registry import completed
 from rsfstudy.slider.scene import Scene
 
@@ -40,10 +41,21 @@ if TYPE_CHECKING:
     from rsfstudy import plots
 
 
+class Studies(dict[str, Study]):
+    """Studies by name; a notebook shows what each is about."""
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
+            for name, study in self.items()
+        ]
+        return table(("study", "title", "cells", "claims"), rows)
+
+
 @door
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
-    return {name: catalogue.load(name) for name in names.names()}
+    return Studies({name: catalogue.load(name) for name in names.names()})
 
 
 @completed()

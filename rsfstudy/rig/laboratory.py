@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -12,6 +12,7 @@ import xarray as xr
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.rig import lattice
 from rsfstudy.rig.quantities import (
     FIELDS,
@@ -38,9 +39,21 @@ SEGMENT = {
     "normal_stress": "sigma_*",
 }  # fmt: skip
 
+#: Symbols of what a rig states, and what each is.
+_SHOWN = {
+    "normal_stress": (r"$\sigma_*$", "normal stress"),
+    "slip_distance": ("$D_c$", "slip distance"),
+    "reference_velocity": ("$V_*$", "velocity of the load point before the test"),
+    "stiffness": ("$k$", "stiffness of the machine with its sample"),
+    "period": ("$T$", "period of free oscillation"),
+    "mass": ("$m$", "mass over the area of the fault"),
+    "shear_modulus": ("$G$", "shear modulus of the medium"),
+    "density": (r"$\rho$", "density of the medium"),
+}
+
 
 @dataclass(frozen=True, kw_only=True)
-class Laboratory:
+class Laboratory(ShownAsTable):
     """A rig, in its own units.
 
     Every quantity is a plain number in SI units, a text with units ("5 MPa", "10 um", "1 um/s"), or
@@ -87,6 +100,12 @@ class Laboratory:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, stated(name, getattr(self, name), self._stress))
         check_together(self.as_dict())
+
+    def shown(self) -> Iterator[tuple[Quantity, object]]:
+        """What the rig states, in SI units."""
+        for name, value in self.as_dict().items():
+            symbol, meaning = _SHOWN[name]
+            yield Quantity(name, symbol, STATED[name][0], meaning), value
 
     @property
     def scales(self) -> dict[str, Scale]:
