@@ -17,11 +17,12 @@ def check_single_step(scene: Scene) -> None:
 
 
 def check_leaves_alone(scene: Scene) -> None:
-    """Refuse a loading that changes normal stress other than at once: nothing settles or repeats by
+    """Refuse a loading that changes stress other than at once: nothing settles or repeats by
     itself under it.
     """
     loading = scene.parts.loading
     if loading.unknowns:
-        rule = "changes normal stress all along, so that no motion settles or repeats by itself"
+        what = "load point velocity" if loading.displaces else "normal stress"
+        rule = f"changes {what} all along, so that no motion settles or repeats by itself"
         remedy = "Read its motion by simulate, or that of an oscillation by normal_stress_response."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

@@ -23,6 +23,8 @@ OBSERVED = (
     "normal_stress_ratio",
     "state_variable",
 )
+#: Those that are shear stress.
+STRESSES = slice(OBSERVED.index("shear_stress"), OBSERVED.index("frictional_stress") + 1)
 #: The same, and what a rig reads.
 READ = (*OBSERVED, "friction_coefficient")
 #: Columns behind those: the regime; the place within a step, 0 where a regime begins and `SAMPLES`

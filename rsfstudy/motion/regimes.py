@@ -67,7 +67,7 @@ def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:
     """States with those of the loading, behind those of the law, as it begins with them; without
     those of a loading that has ended.
     """
-    begun, of_law = scene.parts.loading.beginning, scene.parts.law.states
+    begun, of_law = scene.parts.loading.begins(scene), scene.parts.law.states
     return (*psis[:of_law], *begun, *psis[of_law + len(begun) : scene.states])
 
 

@@ -19,12 +19,12 @@ from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.loop import advance
 from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Account, Halt, Meter
-from rsfstudy.motion.recording import SAMPLES, STATES, Recording
+from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
 from rsfstudy.motion.regimes import Regimes, halted
 from rsfstudy.motion.regimes import regimes as regimes_of
 from rsfstudy.slider.equations import Equations, without_mass
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import ENDS_AT, RELIEF
+from rsfstudy.slider.places import ENDS_AT, LOADING, RELIEF
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -191,9 +191,34 @@ def chain(
         How many segments, the last ones, are told to begin.
     """
     plan = _planned(scene, accuracy, meter, clock=clock)
-    begins = np.empty(2 * plan.unknowns), _columns_of(start)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
-    return _events(plan, (lasts, *origin), begins, meter, watches, recording, (table[1:], told))
+    if scene.parts.loading.displaces:
+        return _displaced(scene, plan, (lasts, *origin), start, meter, watches, recording)
+    begins, kinks = (np.empty(2 * plan.unknowns), _columns_of(start)), (table[1:], told)
+    return _events(plan, (lasts, *origin), begins, meter, watches, recording, kinks)
+
+
+def _displaced(
+    scene: Scene,
+    plan: _Plan,
+    times: tuple[float, ...],
+    start: Point,
+    meter: Meter,
+    watches: Sequence[Watch],
+    recording: Recording | None,
+) -> Iterator[Event]:
+    """Events where the load point imposes shear stress, which is the last unknown: spring stress
+    and friction in the loop are those without it.
+    """
+    first = scene.numbers[LOADING + 2]
+    start = _pushed(start, first - start.psis[-1])
+    begins, times = (np.empty(2 * plan.unknowns), _columns_of(start)), (*times[:3], start.spring)
+    for event in _events(plan, times, begins, meter, watches, recording, _NO_KINKS, first):
+        yield event._replace(point=_pushed(event.point, event.point.psis[-1] - first))
+
+
+def _pushed(point: Point, by: float) -> Point:
+    return point._replace(spring=point.spring + by, friction=point.friction + by)
 
 
 def path(
@@ -273,6 +298,7 @@ def _events(
     watches: Sequence[Watch],
     recording: Recording | None,
     kinks: tuple[np.ndarray, int],
+    imposed: float | None = None,
 ) -> Iterator[Event]:
     """Events of a motion, a table of them by each call of the loop.
 
@@ -285,6 +311,8 @@ def _events(
         point at which it begins, if it is that which the plan begins with.
     kinks : tuple of ndarray and int
         Those of the loading, and how many of the last ones are told.
+    imposed : float, optional
+        What the last unknown is less of where it is shear stress that is to be recorded.
 
     Raises
     ------
@@ -312,7 +340,10 @@ def _events(
         slow, fast, steps, happened, recorded, jacobians = state.says()
         before = account.settle(slow, fast, steps, jacobians)
         if recording is not None and recorded:
-            recording.take(rows[:recorded].copy(), regimes)
+            kept = rows[:recorded].copy()
+            if imposed is not None:
+                kept[:, STRESSES] += kept[:, -1:] - imposed
+            recording.take(kept, regimes)
         for line in events[:happened].tolist():
             code, regime, clock, time, slip, spent = line[: layout.POINT]
             psis = tuple(line[_OF_STATES:])

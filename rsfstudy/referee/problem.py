@@ -232,7 +232,7 @@ class Problem:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
         taken = steady_states_of(before, 0.0, relation_of(before)(friction)[2])
-        psis = (*map(add, states, taken), *taken[len(states) :], *scene.parts.loading.beginning)
+        psis = (*map(add, states, taken), *taken[len(states) :], *scene.parts.loading.begins(scene))
         radiated = before.dynamics.radiated(x)
         point = on_slow_manifold(acting, friction + radiated + acting.spring_stress_step, psis)
         point = at_rate(acting, point, x) if scene.has_mass else point

@@ -15,6 +15,9 @@ the effects of stress on the state know of it. P stands last among the states, b
 law, which alone are part of Theta. What a loading goes on imposing is the same with a P of its own;
 the pressure that it imposes around a fluid stands first behind the law.
 
+A load point that runs ahead of its mean motion by D imposes shear stress K D. Of such a scene f and
+g are those without it, which friction, and it alone, adds: mass and waves know of f - g.
+
 Functions here take the functions of the parts of a scene, and return one that is made of them: the
 plainest that holds all effects there are. What they return takes floats, and the numbers of a scene
 as ``p`` (see `places`); it holds none of them, and serves every scene of the same parts.
@@ -29,6 +32,7 @@ from typing import NamedTuple
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.places import (
     LARGEST_RATIO,
+    LOADING,
     MU_STAR,
     SMALLEST_RATIO,
     STRESS_DEPENDENCE,
@@ -75,6 +79,10 @@ class Friction(NamedTuple):
         ``(g, psis, p)``: derivatives of strength and of shift with respect to P.
     states_at : callable
         ``(strength, log_rate, others, p)``: all states; the first is what the others leave of it.
+    imposed : callable
+        ``(psis, p) -> K D`` that is no part of g, and
+    imposed_change : callable
+        its change, ``(changes)``.
     states : int
         How many states there are.
     """
@@ -89,6 +97,8 @@ class Friction(NamedTuple):
     contribution: Function
     by_pressure: Function
     states_at: Function
+    imposed: Function
+    imposed_change: Function
     states: int
 
 
@@ -272,6 +282,36 @@ def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
     return with_state_effect
 
 
+def no_stress(psis: Numbers, p: Numbers) -> float:
+    """K D where the load point moves steadily."""
+    return 0.0
+
+
+def ahead(psis: Numbers, p: Numbers) -> float:
+    """K D of an oscillation, which begins where D is 0."""
+    return psis[-1] - p[LOADING + 2]
+
+
+def under(function: Function) -> Function:
+    """A function ``(g, psis, p)`` of frictional stress, of g without what is `ahead`."""
+
+    def pushed(g: float, psis: Numbers, p: Numbers) -> Numbers:
+        values: Numbers = function(g + ahead(psis, p), psis, p)
+        return values
+
+    return pushed
+
+
+def slopes_of(strength: Function) -> Function:
+    """Derivatives of strength and of the shift with respect to K D, which are those by g."""
+
+    def slopes(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+        _value, slope, _shift, shift_slope = strength(g, psis, p)
+        return slope, shift_slope
+
+    return slopes
+
+
 # ---- all of it -----------------------------------------------------------------------------------
 
 
@@ -298,6 +338,8 @@ class Parts(NamedTuple):
     outside : int
         Place of the pressure outside the fault, which a rig knows of, among all states and from
         their end: -1 where P is that; 0 where there is none.
+    displaces : bool
+        Whether the unknown that stands last is shear stress K D, and no pressure.
     """
 
     states: int
@@ -311,13 +353,14 @@ class Parts(NamedTuple):
     auxiliary_rates: Function | None
     auxiliary_steady_states: Function | None
     outside: int
+    displaces: bool = False
 
 
 @cache
 def friction_of(parts: Parts) -> Friction:
     """Friction, made of what the parts of a scene say of it."""
     effect = reduce(both, parts.state_effects) if parts.state_effects else None
-    pressure, outside = parts.unknowns > 0, parts.outside
+    pressure, outside = parts.unknowns > 0 and not parts.displaces, parts.outside
     total, dry = parts.normal_stress or constant, stress_of(parts.normal_stress)
     wet = less_pressure(total) if pressure else dry
     around = wet if outside == -1 else less_pressure(total, outside) if outside else dry
@@ -331,7 +374,10 @@ def friction_of(parts: Parts) -> Friction:
     if parts.auxiliary_rates is not None and parts.auxiliary_steady_states is not None:
         evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
         steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)
-    by_pressure = by_pressure_of(wet, effect)
+    by_last = by_pressure_of(wet, effect) if pressure else None
+    if parts.displaces:
+        strength, wet, around = under(strength), under(wet), under(around)
+        by_last = slopes_of(strength)
     return Friction(
         strength=strength,
         effective_stress=wet,
@@ -340,8 +386,10 @@ def friction_of(parts: Parts) -> Friction:
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=sum_of(parts.states),
-        contribution=contribution_of(parts.states, by_pressure if pressure else None),
-        by_pressure=by_pressure,
+        contribution=contribution_of(parts.states, by_last),
+        by_pressure=by_last or by_pressure_of(wet, effect),
         states_at=states_at_of(parts.states),
+        imposed=ahead if parts.displaces else no_stress,
+        imposed_change=pressure_at(-1) if parts.displaces else no_pressure,
         states=parts.states + parts.unknowns,
     )

@@ -119,10 +119,9 @@ class Scene(ShownAsTable):
         Time in D_c/V_* at which an oscillation begins, of normal stress or of the load point, angle
         in degrees by which it is ahead of a sine then, and number of cycles after which it ends,
         whole or not. Default: it begins at once, as a sine, and goes on for ever.
-    velocity_oscillation, velocity_oscillation_stairs : float, optional
+    velocity_oscillation : float, optional
         Amplitude of an oscillation of load point velocity, over its mean at `load_velocity_ratio`,
-        of the period, begin, phase and (to be stated) number of cycles above, and number of stairs
-        that stand for each of them (64).
+        of the period, begin, phase and number of cycles above.
     normal_stress_ramp, ramp_duration : float
         Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
         takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of

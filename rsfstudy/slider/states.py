@@ -113,7 +113,7 @@ def of_one(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
 
 def contribution_of(count: int, by_pressure: Function | None) -> Function:
     """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
-    less what the change of P gives, if there is any.
+    less what the change of P, or of imposed shear stress, gives, if there is any.
     """
     state_sum = sum_of(count)
     if by_pressure is not None:

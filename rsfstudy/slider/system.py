@@ -94,7 +94,7 @@ def against_displacement(made: Friction, balance: Function, *, reverses: bool) -
     Where slip may reverse, so may the load point, and displacement is the magnitudes of both
     together: ``df/ds = K (V_0 - V)/(|V| + |V_0|)``, V having the sign of shear stress.
     """
-    evolutions, end = made.evolutions, 1 + made.states
+    evolutions, imposed, end = made.evolutions, made.imposed, 1 + made.states
 
     def forward(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
         psis = state[1:end]
@@ -107,7 +107,7 @@ def against_displacement(made: Friction, balance: Function, *, reverses: bool) -
     def either_way(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
         _loading, changes, ratios = forward(state, p)
         _x, slower, fraction = ratios
-        slip = math.copysign(1.0, p[MU_STAR] + state[0])
+        slip = math.copysign(1.0, p[MU_STAR] + state[0] + imposed(state[1:end], p))
         load = math.copysign(slower, p[LOAD_VELOCITY])
         return p[STIFFNESS] * (load - slip) * fraction, changes, ratios
 
@@ -186,6 +186,7 @@ def reading_of(made: Friction) -> Function:
     derivative, where f, g and the states change so.
     """
     stress, pressure = made.outer_stress, made.outer_pressure
+    imposed, imposed_change = made.imposed, made.imposed_change
 
     def reading(
         spring: float,
@@ -197,9 +198,10 @@ def reading_of(made: Friction) -> Function:
         p: Numbers,
     ) -> tuple[float, float]:
         excess, slope = stress(g, psis, p)
-        ratio, ratio_change = 1.0 + excess, slope * g_change - pressure(changes)
-        read = (p[MU_STAR] + spring) / ratio
-        return read, (spring_change - read * ratio_change) / ratio
+        pushed = imposed_change(changes)
+        ratio, ratio_change = 1.0 + excess, slope * (g_change + pushed) - pressure(changes)
+        read = (p[MU_STAR] + spring + imposed(psis, p)) / ratio
+        return read, (spring_change + pushed - read * ratio_change) / ratio
 
     return reading
 
@@ -208,6 +210,7 @@ def point_of(made: Friction) -> Function:
     """The point at x = ln(V/V_*), with its growth, f, g, the states, and what a rig reads."""
     strength, effective_stress = made.strength, made.effective_stress
     steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
+    imposed = made.imposed
 
     def point_at(
         x: float,
@@ -234,7 +237,7 @@ def point_of(made: Friction) -> Function:
             psi - shift,
             psi - state_sum(steady),
             distance,
-            (p[MU_STAR] + g) / ratio,
+            (p[MU_STAR] + g + imposed(psis, p)) / ratio,
             ratio,
             reading[0],
             reading[1],
@@ -393,6 +396,7 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
         unknowns=len(source.unknowns),
         auxiliary_rates=source.auxiliary_rates,
         auxiliary_steady_states=source.auxiliary_steady_states,
-        outside=-1 - len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0,
+        outside=-1 - len(scene.parts.fluid.unknowns) if scene.parts.loading.presses else 0,
+        displaces=scene.parts.loading.displaces,
     )
     return system_of(parts, acting.slip_rate, acting.rupture_rate)

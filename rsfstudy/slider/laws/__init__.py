@@ -132,8 +132,8 @@ class LawOfStates(Part):
                 f"is known for normal stress in proportion to shear stress, not for {unknown}",
                 remedy="Leave it out, or state `coupling` where the proportion is constant.",
             )
-        reverses = scene.dynamics.reverses
-        one_way = source if source.unknowns else None if reverses else scene.dynamics
+        pressed = source.unknowns and not loading.displaces
+        one_way = source if pressed else None if scene.dynamics.reverses else scene.dynamics
         if self.regularised and one_way:
             raise InvalidValue(
                 "regularised",

@@ -71,6 +71,9 @@ class Loading(Part):
     """
 
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
+    #: motion, less what stands as third of its numbers.
+    displaces: ClassVar[bool] = False
     #: Of a history that was sampled: its numbers, and what tells them.
     samples: ClassVar[bytes] = b""
     digest: ClassVar[str] = ""
@@ -85,6 +88,15 @@ class Loading(Part):
     def beginning(self) -> Numbers:
         """Initial values of its unknowns."""
         return ()
+
+    def begins(self, scene: Scene) -> Numbers:
+        """Initial values of its unknowns in a scene."""
+        return self.beginning
+
+    @property
+    def presses(self) -> bool:
+        """True if it has unknowns that change normal stress."""
+        return bool(self.unknowns) and not self.displaces
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -140,7 +152,7 @@ class Loading(Part):
     @property
     def imposes(self) -> bool:
         """True if it changes normal stress."""
-        return bool(self.unknowns) or any(segment.normal_stress for segment in self.segments)
+        return self.presses or any(segment.normal_stress for segment in self.segments)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

@@ -6,13 +6,13 @@ It begins as ``sin(2 pi (t - t_b)/T_o + phase)`` at the time t_b, and ends after
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import number
+from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -63,9 +63,44 @@ def cycles() -> Any:
     )
 
 
+def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
+    and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
+
+    What numerical errors make of the amplitude decays in a period: to both is added ``(omega/2) [1
+    - (y**2 + P**2)/A**2]`` times y or P, which vanishes along the exact solution.
+
+    Parameters
+    ----------
+    log_rate : float
+        ln(V/V_*).
+    states : tuple of float
+        y and P.
+    share : float
+        What the changes are multiplied by (see `fluid.dilatant.auxiliary_rates`).
+    p : tuple of float
+        omega D_c/V_* at LOADING, and A behind it.
+    """
+    ahead, relief = states
+    turn = p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
+    missing = 0.5 * (1.0 - over * over - relative * relative)
+    return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
+
+
+def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
+    """No oscillation in steady sliding."""
+    return 0.0, 0.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Train(Loading):
-    """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated."""
+    """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated: a
+    harmonic pair of unknowns.
+    """
+
+    auxiliary_rates = staticmethod(auxiliary_rates)
+    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     if TYPE_CHECKING:
         oscillation_period: float
@@ -96,9 +131,9 @@ class Train(Loading):
         return math.radians(self.oscillation_phase or 0.0)
 
     @property
-    def waves(self) -> Iterator[Segment]:
-        """The segments that oscillate."""
-        yield Segment(self.mean_velocity, duration=self.lasts)
+    def frequency(self) -> float:
+        """omega D_c/V_*."""
+        return 2.0 * math.pi / self.oscillation_period
 
     @property
     def lasts(self) -> float:
@@ -111,4 +146,18 @@ class Train(Loading):
         """What is before it, itself, and what follows."""
         steady, begin = Segment(self.mean_velocity), self.oscillation_begin
         before = [steady._replace(duration=begin)] if begin else []
-        return (*before, *self.waves, *([steady] if self.lasts < math.inf else []))
+        after = [steady] if self.lasts < math.inf else []
+        return (*before, steady._replace(duration=self.lasts), *after)
+
+    @property
+    def jumps(self) -> list[bool]:
+        """Its unknowns are those of itself alone, and its phase is one at once."""
+        return [True] * len(self.segments)
+
+    def alone(self, number: int) -> Loading | Segment:
+        segments = self.segments
+        if number % len(segments) != bool(self.oscillation_begin):
+            return segments[number]
+        if len(segments) == 1:
+            return self
+        return replace(self, oscillation_begin=None, oscillation_cycles=None)

@@ -5,47 +5,16 @@ cycles.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import Loading, Segment, _train, last_velocity, refuse_fluid
+from rsfstudy.slider.loading import _train, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number
-from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-
-def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
-    and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
-
-    What numerical errors make of the amplitude decays in a period: to both is added ``(omega/2) [1
-    - (y**2 + P**2)/A**2]`` times y or P, which vanishes along the exact solution.
-
-    Parameters
-    ----------
-    log_rate : float
-        ln(V/V_*).
-    states : tuple of float
-        y and P.
-    share : float
-        What the changes are multiplied by (see `fluid.dilatant.auxiliary_rates`).
-    p : tuple of float
-        omega D_c/V_* at LOADING, and A behind it.
-    """
-    ahead, relief = states
-    turn = p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
-    over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
-    missing = 0.5 * (1.0 - over * over - relative * relative)
-    return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
-
-
-def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
-    """No oscillation in steady sliding."""
-    return 0.0, 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,8 +44,6 @@ class Oscillation(_train.Train):
         Quantity("oscillation_ahead", "$y$", "1", "oscillation a quarter ahead", "sigma_*"),
         Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
     )
-    auxiliary_rates = staticmethod(auxiliary_rates)
-    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: Scene) -> None:
         """Normal stress that stays positive, slow enough where there is no mass, and is not that of
@@ -92,19 +59,6 @@ class Oscillation(_train.Train):
         super().check(scene)
 
     @property
-    def jumps(self) -> list[bool]:
-        """Its unknowns are those of itself alone, and its phase is one at once."""
-        return [True] * len(self.segments)
-
-    def alone(self, number: int) -> Loading | Segment:
-        segments = self.segments
-        if number % len(segments) != bool(self.oscillation_begin):
-            return segments[number]
-        if len(segments) == 1:
-            return self
-        return replace(self, oscillation_begin=None, oscillation_cycles=None)
-
-    @property
     def beginning(self) -> Numbers:
         """y and P of its phase."""
         amplitude, angle = self.oscillation_amplitude, self.angle
@@ -112,4 +66,4 @@ class Oscillation(_train.Train):
 
     def numbers(self, scene: Scene) -> Numbers:
         """omega D_c/V_*, and A."""
-        return 2.0 * math.pi / self.oscillation_period, self.oscillation_amplitude
+        return self.frequency, self.oscillation_amplitude
