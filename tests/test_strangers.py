@@ -287,6 +287,7 @@ def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_pat
         ("axes.1.values", replaced([1.0, 2.0]), "has 2 points in the declaration, and 3 in the"),
         ("axes.1.dimension", replaced("a"), "a has 3 points in the declaration, and None in the"),
         ("axes.1.values", replaced([1.0, 2.0, 3.0]), "load_velocity_ratio is not that axis of the"),
+        ("axes.1.values", replaced([1.0, 1.0, 2.0]), "axes.load_velocity_ratio is refused .*twice"),
         ("plot", replaced("a\0b"), "declaration makes no study .*must be a text"),
     ],
 )

@@ -20,7 +20,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FORMATS
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import pieces, store
-from rsfstudy.files.journal import Columns, Journal, Layout
+from rsfstudy.files.journal import Columns, Journal
 from rsfstudy.files.lattice import assemble
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
@@ -99,7 +99,7 @@ class Run:
         """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
         Unless values were overridden, each claim must name a variable and a place of the result.
         """
-        pending = Columns.pending(self.study.size, Layout(self.study.measure).width)
+        pending = Columns.pending(self.study.size, self.task.layout.width)
         lattice = assemble(self.study, pending, self.about)
         for reduction in self.study.reductions:
             try:
@@ -144,8 +144,8 @@ class Run:
         if keeping.format == "zarr":
             pieces.check_free(self.path(".zarr"))
         path = None if keeping.output is None else self.path(".cells.sqlite")
-        layout = Layout(self.study.measure)
-        with Journal(path, self.about["fingerprint"], layout, fresh=keeping.fresh) as journal:
+        fingerprint, layout = self.about["fingerprint"], self.task.layout
+        with Journal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
                 self._compute_missing(journal, mapper, progress)
                 return self._finished(journal)

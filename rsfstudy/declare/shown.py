@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.wording import listed
-from rsfstudy.measures import Measure
 from rsfstudy.quantity import (
     HEADINGS,
     Quantity,
@@ -19,35 +19,23 @@ from rsfstudy.quantity import (
     unit,
 )
 from rsfstudy.slider import registry
-from rsfstudy.slider.scene import Scene
 from rsfstudy.vocabulary import quantity
 
+if TYPE_CHECKING:
+    from rsfstudy.declare.study import Study
 
-def study_html(
-    caption: str,
-    axes: Sequence[Axis],
-    base: Scene,
-    measure: Measure,
-    known: Mapping[str, Quantity],
-) -> str:
-    """The axes of a study and what it measures; what all cells share is folded away.
 
-    Parameters
-    ----------
-    caption : str
-    axes, base, measure
-        Of the study.
-    known : mapping of str to Quantity
-        Quantities that the vocabulary does not have.
-    """
-    varied = {name for axis in axes for name in axis.fields}
+def study_html(study: Study) -> str:
+    """The axes of a study and what it measures; what all cells share is folded away."""
+    base, measure, known = study.base, study.measure, study.quantities
+    varied = {name for axis in study.axes for name in axis.fields}
     fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
     shared = registry.shown(fixed, base.own_parts)
-    along = [described(_about(a, known), _along(a)) for a in axes]
+    along = [described(_about(a, known), _along(a)) for a in study.axes]
     measured = [quantity(name, known) for name in measure.variables]
     numbers = [(q.name, symbol(q.symbol), unit(q), q.long_name) for q in measured]
     return (
-        table(HEADINGS, along, caption)
+        table(HEADINGS, along, f"{study.name}: {study.title} ({study.size:,} cells)")
         + folded("what all cells share", quantities_table(shared))
         + folded(
             f"what {measure.name} gives in each",

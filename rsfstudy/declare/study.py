@@ -390,8 +390,7 @@ class Study:
         }
 
     def _repr_html_(self) -> str:
-        caption = f"{self.name}: {self.title} ({self.size:,} cells)"
-        return study_html(caption, self.axes, self.base, self.measure, self.quantities)
+        return study_html(self)
 
 
 def _rows(name: str, value: Any) -> list[Row]:

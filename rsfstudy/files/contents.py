@@ -70,7 +70,7 @@ class PlainAxis(TypedDict):
 def axis(plain: PlainAxis) -> Axis:
     """An axis, on which parts of the user's own are named; raises DataError for what is none."""
     try:
-        return Axis(**plain)
+        return Axis(plain["dimension"], plain["values"], plain.get("units"), plain.get("drawn"))
     except InvalidValue as error:
         raise refused(f"declaration.axes.{plain['dimension']}", f"is refused ({error})") from error
 
