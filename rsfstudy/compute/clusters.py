@@ -29,15 +29,13 @@ def _script_not_imported() -> Iterator[None]:
     Multiprocessing finds the script by these two names. What the script defines still reaches the
     workers, by value.
     """
-    main = sys.modules["__main__"]
-    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
-    for name in hidden:
-        setattr(main, name, None)
+    main: dict[str, Any] = vars(sys.modules["__main__"])
+    hidden = {name: main[name] for name in {"__file__", "__spec__"} & set(main)}
+    main.update(dict.fromkeys(hidden))
     try:
         yield
     finally:
-        for name, value in hidden.items():
-            setattr(main, name, value)
+        main.update(hidden)
 
 
 @contextlib.contextmanager

@@ -247,16 +247,16 @@ def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
 
 def _statuses(shared: Sequence[xr.Dataset], known: np.ndarray) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
-    status = [one["status"] for one in shared]
-    dims = [str(d) for d in status[0].dims]
+    first, second = (one["status"].values for one in shared)
+    places = np.nonzero(known & (first != second))
     labels = {int(s): s.label for s in Status}
-    rows = []
-    for index in np.argwhere(known & (status[0].values != status[1].values)).tolist():
-        at = zip(dims, index, strict=True)
-        ends = (labels[int(values.values[tuple(index)])] for values in status)
-        place = {d: shared[0][d].values[i] for d, i in at}
-        rows.append(place | dict(zip(("first", "second"), ends, strict=True)))
-    return pd.DataFrame(rows, columns=[*dims, "first", "second"])
+    dims = map(str, shared[0]["status"].dims)
+    columns: dict[str, Any] = {
+        d: shared[0][d].values[at] for d, at in zip(dims, places, strict=True)
+    }
+    for name, ended in (("first", first), ("second", second)):
+        columns[name] = [labels[code] for code in ended[places].tolist()]
+    return pd.DataFrame(columns)
 
 
 def _flat(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -45,11 +45,8 @@ def assemble(study: Study, columns: Columns, provenance: Mapping[str, Any]) -> x
         What else decided the numbers, as plain data.
     """
     dataset = xr.Dataset(variables(study, columns, study.shape), coordinates(study))
-    return dataset.assign_attrs(attributes(study, _known(columns), provenance))
-
-
-def _known(columns: Columns) -> int:
-    return int((columns.status != int(Status.PENDING)).sum())
+    known = int((columns.status != int(Status.PENDING)).sum())
+    return dataset.assign_attrs(attributes(study, known, provenance))
 
 
 def variables(
