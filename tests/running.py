@@ -97,6 +97,7 @@ ENOUGH = {
     "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},
     # one motion of the draw left out takes as long as all the others
     "coverage": {"sample": [0, 1, 3]},
+    "design_of_steps": {"seed": [0, 1]},
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
     "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
