@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting import posterior
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
@@ -20,7 +19,7 @@ from rsfstudy.analysis.fitting.model import (
     check_free,
     check_positive,
 )
-from rsfstudy.analysis.fitting.noise import check_noise
+from rsfstudy.analysis.fitting.noise import check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
@@ -37,8 +36,6 @@ from rsfstudy.status import Status
 _SMOOTH = 1e-9
 #: Least slip distance over the distance of rows.
 _POINTS = 3.0
-#: Lags at which residuals freed of correlation are tested for what is left of it.
-_LAGS = 20
 #: Standard errors that numerical errors are held to as to the parameter itself: at the default
 #: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
 _SMALL = 1000.0
@@ -383,7 +380,7 @@ class Fit(Measure):
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
             "degrees_of_freedom": found.degrees,
-            "whiteness": _whiteness(found.innovations, found.noise.order),
+            "whiteness": whiteness(found.innovations, found.noise.order),
             "r_squared": 1.0 - float(np.var(left)) / variance,
             "rows_fitted": len(rows),
             "criterion": found.criterion,
@@ -420,12 +417,3 @@ def _place(window: Window) -> dict[str, float]:
         "window_begins": moved[0],
         "window_ends": moved[-1],
     }
-
-
-def _whiteness(innovations: np.ndarray, order: int) -> float:
-    """The chance that residuals freed of correlation are white (Ljung and Box, 1978)."""
-    count, seen = len(innovations), innovations - innovations.mean()
-    lags = np.arange(1, min(_LAGS + order, count // 4) + 1)
-    correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
-    size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
-    return float(chi2.sf(size, max(len(lags) - order, 1)))

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from rsfstudy.errors import InvalidValue
 
@@ -30,6 +31,8 @@ _LARGEST, _ENOUGH = 0.999, 0.02
 #: Sampling intervals that differ by less than this factor are one; fewer samples than so many at
 #: another, or in runs shorter than so many, do not tell a process of their own: clocks are uneven.
 _ALIKE, _RARE, _SHORT = 2.0, 300, 30
+#: Lags at which residuals freed of correlation are tested for what is left of it.
+_LAGS = 20
 
 
 def check_noise(name: str) -> None:
@@ -165,6 +168,15 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
         return noise(x)
     found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
+
+
+def whiteness(innovations: np.ndarray, order: int) -> float:
+    """The chance that residuals freed of correlation are white (Ljung and Box, 1978)."""
+    count, seen = len(innovations), innovations - innovations.mean()
+    lags = np.arange(1, min(_LAGS + order, count // 4) + 1)
+    correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
+    size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
+    return float(chi2.sf(size, max(len(lags) - order, 1)))
 
 
 class _Products:
