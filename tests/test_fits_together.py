@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from typing import Any
 
@@ -15,7 +16,7 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import Model
-from rsfstudy.errors import Incomplete
+from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import Meter
@@ -229,3 +230,47 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
     motion = rsfstudy.simulate(fit.rsf.scene, times=times, engine="compiled")
     seen, fitted = motion.friction_coefficient.values, fit.detrended_friction.values[rows]
     assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some
+
+
+#: What is looked for, posterior draws, and by how many errors of sampling they may be off: 5.
+POSTERIOR = [(("mu_star", "trend1"), 400), (("a", "b", "slip_distance"), 100)]
+
+
+@pytest.mark.parametrize(("free", "draws"), POSTERIOR)
+def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) -> None:
+    """In closed form where friction is linear in parameters; next to it for a step with some 100
+    independent rows, whose likelihood is nearly a parabola.
+    """
+    known = {"slip_distance": 10.0, "a": 0.01, "b_over_a": 1.3, "mu_star": 0.6}
+    options = OPTIONS | {n: v for n, v in known.items() if n not in free}
+    one = record(seed=4, count=200)
+    fits = [
+        rsfstudy.fit(one, laws=["slowness"], free=free, posterior=draws, **options).squeeze()
+        for _ in range(2)
+    ]
+    assert np.array_equal(*(fit.posterior for fit in fits))
+    fit, drawn = fits[0], fits[0].posterior
+    spread = np.sqrt(np.diag(fit.covariance))
+    off = (drawn.mean("draw") - np.array([float(fit[n]) for n in free])) / spread
+    slack = 0.0 if free[0] == "mu_star" else 0.15
+    assert np.abs(off).max() < 5.0 / math.sqrt(draws) + slack
+    ratio = drawn.std("draw") / spread
+    assert np.abs(ratio - 1.0).max() < 5.0 / math.sqrt(2.0 * draws) + slack
+    correlation = np.corrcoef(drawn.values, rowvar=False)
+    assert np.abs(correlation - fit.correlation).max() < 5.0 / math.sqrt(draws) + slack
+    assert 1.0 < fit.autocorrelation_time < 20.0
+
+
+def test_a_chain_that_is_too_short_is_refused() -> None:
+    one, options = record(seed=4, count=200), {"laws": ["slowness"], **OPTIONS}
+    enough = int(rsfstudy.fit(one, **options).rhs_evaluations.item()) + 20_000
+    with pytest.warns(Incomplete):
+        fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
+    assert fit.rsf.table().status.item() == "work_budget_spent"
+    assert np.isnan(fit.posterior).all()
+
+
+def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "emcee", None)
+    with pytest.raises(InvalidValue, match=r"needs emcee.*pip install 'rsfstudy\[posterior\]'"):
+        rsfstudy.fit(record(seed=4), posterior=1, **OPTIONS)

@@ -149,7 +149,6 @@ class Fit(Measure):
         Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
-        Quantity("draw", "", "1", "number of the draw"),
     )
 
     def __post_init__(self) -> None:
@@ -242,6 +241,12 @@ class Fit(Measure):
             Output("correlation", "", "1", "correlation of parameters", dims=both),
             *rows,
         )
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Meaning of its numbers, dimensions and fields."""
+        draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
+        return (*super().quantities, *draws)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
