@@ -233,7 +233,7 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
 
 
 #: What is looked for, posterior draws, and by how many errors of sampling they may be off: 5.
-POSTERIOR = [(("mu_star", "trend1"), 400), (("a", "b", "slip_distance"), 100)]
+POSTERIOR = [(("mu_star", "trend1"), 200), (("a", "b", "slip_distance"), 100)]
 
 
 @pytest.mark.parametrize(("free", "draws"), POSTERIOR)
@@ -244,12 +244,8 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     known = {"slip_distance": 10.0, "a": 0.01, "b_over_a": 1.3, "mu_star": 0.6}
     options = OPTIONS | {n: v for n, v in known.items() if n not in free}
     one = record(seed=4, count=200)
-    fits = [
-        rsfstudy.fit(one, laws=["slowness"], free=free, posterior=draws, **options).squeeze()
-        for _ in range(2)
-    ]
-    assert np.array_equal(*(fit.posterior for fit in fits))
-    fit, drawn = fits[0], fits[0].posterior
+    fit = rsfstudy.fit(one, laws=["slowness"], free=free, posterior=draws, **options).squeeze()
+    drawn = fit.posterior
     spread = np.sqrt(np.diag(fit.covariance))
     off = (drawn.mean("draw") - np.array([float(fit[n]) for n in free])) / spread
     slack = 0.0 if free[0] == "mu_star" else 0.15
