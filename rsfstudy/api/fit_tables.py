@@ -123,8 +123,11 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
         yield f"{law}: among windows parameters differ by {each}"
     if "posterior" in one and math.isfinite(one["autocorrelation_time"].item()):
         drawn = one["posterior"].quantile([0.025, 0.975], "draw")
-        ends = {n: drawn.sel(parameter=n).values for n in one["parameter"].values}
-        each = ", ".join(f"{n} {low:.4g} to {high:.4g}" for n, (low, high) in ends.items())
+        ends = {n: drawn.sel(parameter=n).values for n in map(str, one["parameter"].values)}
+        short = fit_results.shown(one)
+        each = ", ".join(
+            f"{short[n][0]} {low:.4g} to {high:.4g}" for n, (low, high) in ends.items()
+        )
         time = f"{one['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
     chance = one["whiteness"].item()
