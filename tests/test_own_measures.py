@@ -259,7 +259,8 @@ def test_numbers_named_as_those_of_a_fit_are_only_numbers(tmp_path, capsys):
     class Likely(Own):
         variables = dict.fromkeys(("total", "total_stderr", "cheapest_integrator"), ())
 
-    terminal.report(run(study(Likely())), "own", [tmp_path / "own.nc"])
+    done = run(study(Likely()))
+    terminal.report(done, terminal.ended(done, "own", 1.0, True), [tmp_path / "own.nc"])
     said = capsys.readouterr().out
     assert "own: 2 ok" in said
     assert "standard error" not in said

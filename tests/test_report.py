@@ -145,6 +145,11 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     assert 'href="in/one.nc"' in page.read_text()
     with pytest.raises(InvalidValue, match=r"ends in \.html"):
         rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
+    assert rsfstudy.report(tmp_path / "in", page) == page  # again
+    page.write_text("<!DOCTYPE html><p>mine</p>")
+    with pytest.raises(InvalidValue, match="is there already, and no report"):
+        rsfstudy.report(tmp_path / "in", page)
+    assert "mine" in page.read_text()
     with pytest.raises(InvalidValue, match="is no directory"):
         rsfstudy.report(tmp_path / "nowhere")
 

@@ -28,6 +28,8 @@ from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, table
 
 _UNREAD = "cannot be read"
+#: What begins a page of ours, and a figure.
+_OURS = b'<meta name="generator" content="rsfstudy">'
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -81,6 +83,11 @@ def written(directory: str | Path, output: str | Path | None = None) -> tuple[Pa
     if page is None or page.suffix != ".html" or page.is_dir():
         raise InvalidValue("output", str(output), "must be a file that ends in .html")
     try:
+        if page.exists() and _OURS not in page.read_bytes()[:1000]:
+            remedy = "Choose another output, or move it away first."
+            raise InvalidValue(
+                "output", str(page), "is there already, and no report", remedy=remedy
+            )
         files = sorted(file for ending in ("nc", "zarr") for file in place.glob(f"[!.]*.{ending}"))
         if not files:
             raise DataError(f"{brief(place)} holds no results, which end in .nc or .zarr.")

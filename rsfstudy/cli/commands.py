@@ -18,19 +18,11 @@ import xarray as xr
 
 from rsfstudy.api import exchange, runs
 from rsfstudy.api import report as reports
-from rsfstudy.cli import (
-    assignments,
-    commands_fit,
-    commands_simulate,
-    cost,
-    terminal,
-    terminal_numbers,
-)
+from rsfstudy.cli import assignments, commands_fit, commands_simulate, terminal, terminal_numbers
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.options import RIG
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
-from rsfstudy.compute.plan import Plan
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import SharedProcesses, Workers
 from rsfstudy.declare import catalogue, names
@@ -101,13 +93,11 @@ def run(
             shared = stack.enter_context(SharedProcesses(where.processes, log))
             where = replace(where, shared=shared)
         ready = [(study, runs.prepared(study, keeping, where, not quiet)) for study in studies]
-        for study in studies if rtol is not None else ():
-            terminal.announce(study)
-        if not (every or quiet) and (advice := cost.faster(Plan(studies[0]), output)):
-            stderr.print(f"note: {advice}")
+        for study in studies:
+            terminal.announce(study, output, accuracy=rtol is not None, advice=not (every or quiet))
         if every:
             return _run_all(ready, keeping, look, left_out)
-        return OK if _run(*ready[0], keeping, look).is_fine else FAILED
+        return OK if _run(*ready[0], keeping, look, many=False).is_fine else FAILED
 
 
 @dataclass(frozen=True)
@@ -126,11 +116,7 @@ class Look:
 
 
 def _run(
-    study: Study,
-    compute: Callable[[], xr.Dataset],
-    keeping: Keeping,
-    look: Look,
-    one_of_many: bool = False,
+    study: Study, compute: Callable[[], xr.Dataset], keeping: Keeping, look: Look, many: bool
 ) -> Ended:
     """Compute a study, draw it and print what came out, in short where others follow."""
     assert keeping.output is not None
@@ -140,10 +126,7 @@ def _run(
     own = None if isinstance(study.plot, str) else study.plot
     drawn = _drawn(dataset, look.beside(file), look, own)
     end = terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
-    if one_of_many:
-        terminal.in_short(dataset, end, [file, *drawn])
-    else:
-        terminal.report(dataset, study.name, [file, *drawn])
+    (terminal.in_short if many else terminal.report)(dataset, end, [file, *drawn])
     return end
 
 
@@ -171,7 +154,7 @@ def _run_all(
         for study, compute in ready:
             began = time.monotonic()
             try:
-                ends.append(_run(study, compute, keeping, look, one_of_many=True))
+                ends.append(_run(study, compute, keeping, look, many=True))
             except Interrupted:
                 raise
             except RsfStudyError as error:

@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.api import runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
-from rsfstudy.cli.console import console
+from rsfstudy.cli.console import console, stderr
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
@@ -73,15 +73,19 @@ def _brief(value: Any) -> str:
     return f"{len(value)} of them" if isinstance(value, tuple | list) else str(value)
 
 
-def announce(study: Study) -> None:
-    """Print what a run at this accuracy will cost, before it starts."""
-    work, seconds = estimated_cost(Plan(study))
-    ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
-    console.print(
-        f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
-        f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
-        f"{cost.guessed(seconds)}",
-    )
+def announce(study: Study, output: Path, accuracy: bool, advice: bool) -> None:
+    """Print what a run at another accuracy will cost, and what would be faster."""
+    plan = Plan(study)
+    if accuracy:
+        work, seconds = estimated_cost(plan)
+        ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
+        console.print(
+            f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
+            f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
+            f"{cost.guessed(seconds)}",
+        )
+    if advice and (text := cost.faster(plan, output)):
+        stderr.print(f"note: {text}")
 
 
 @dataclass(frozen=True)
@@ -113,13 +117,13 @@ class Ended:
         return not self.wrong
 
 
-def report(dataset: xr.Dataset, name: str, files: Sequence[Path]) -> None:
+def report(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
     """Print what a run ends with: slopes, claims, failures and where the files are."""
     for table in tables.reductions(dataset):
         layout.show(table)
     claims(dataset)
     failures(dataset, str(files[0]))
-    console.print(f"{name}: {tables.tally(dataset)}")
+    console.print(f"{end.study}: {tables.tally(dataset)}")
     console.print(f"wrote {' and '.join(map(str, files))}", soft_wrap=True)
 
 
@@ -147,17 +151,15 @@ def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
 
 def summary(ends: Sequence[Ended]) -> None:
     """Print how several runs ended."""
-    rows = [
-        {
+    rows = []
+    for end in ends:
+        left_out = f"left out: {end.left_out.partition(' (')[0]}" if end.left_out else ""
+        rows.append({
             "study": end.study,
-            "time": "-" if end.left_out else cost.clock(end.seconds),
+            "time": "-" if left_out else cost.clock(end.seconds),
             "verdicts": end.verdicts or "-",
-            "status": f"left out: {end.left_out.partition(' (')[0]}"
-            if end.left_out
-            else end.wrong or "ok",
-        }
-        for end in ends
-    ]
+            "status": left_out or end.wrong or "ok",
+        })  # fmt: skip
     colours = ["yellow" if e.left_out else "green" if e.is_fine else "red" for e in ends]
     layout.show(Table(rows, prose={"verdicts", "status"}, colours=colours))
 
