@@ -18,7 +18,7 @@ RECORDS, DISTANCE = 4, 10.0
 UP, DOWN, HOLD = "1:30, 10:270", "10:30, 1:270", "1:30, 0:1000 s, 1:270"
 #: Rows of a step, and white noise.
 ROWS, NOISE = 500, 5e-4
-DESIGNS = {
+DESIGNS: dict[str, dict[str, str | float]] = {
     "step up": {"protocol": UP},
     "4 times the rows": {"protocol": UP, "rows": 4 * ROWS},
     "half the noise": {"protocol": UP, "noise_size": 0.5 * NOISE},

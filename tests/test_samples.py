@@ -260,6 +260,18 @@ REFUSED = {
         {"a": 0.01, "mu_star": 0.6}, 8,
         {"covariance": [[1e-6, 1e-5], [1e-5, 1e-2]], "method": "saltelli"},
     ),
+    "covariance = 'x': must be 1 by 1": ({"a": 0.01}, 8, {"covariance": "x"}),
+    "covariance = .*: must be 2 by 2 finite": (
+        {"a": 0.01, "mu_star": 0.6}, 8, {"covariance": [[1e-6], [0.0, 1e-2]]},
+    ),
+    "a = 'norm.0.01, -1.': has no finite quantiles": ({"a": norm(0.01, -1)}, 8, {}),
+    "a = 'norm.*': has no finite quantiles": ({"a": norm([0.01, 0.02], 1e-3)}, 8, {}),
+    "a = '<lambda>': gives no number for each sample .*complex": (
+        {"x": norm(0.0, 1.0)}, 8, {"fields": {"a": lambda d: d["x"] + 1j}},
+    ),
+    "a = '<lambda>': gives no number for each sample .*shape": (
+        {"x": norm(0.0, 1.0)}, 8, {"fields": {"a": lambda d: d["x"][:3]}},
+    ),
     "a = 'b': is not drawn.*Choices: ln_a": ({"ln_a": norm(-4, 0.1)}, 8, {"fields": {"a": "b"}}),
     "a = '<lambda>': gives no number for each sample .KeyError": (
         {"ln_a": norm(-4, 0.1)}, 8, {"fields": {"a": lambda d: d["ln_b"]}},
@@ -387,8 +399,9 @@ def test_too_few_samples_for_a_quantile():
     found = reduced(measured(np.arange(18.0)), (Quantile("q", "y", level=0.05),))
     assert np.isnan(found["q"])
     assert found["q"].attrs["refused"] == "needs 19 samples with a number"
-    with pytest.raises(InvalidValue, match="level = 1.0: must be between 0 and 1"):
-        Quantile("q", "y", level=1.0)
+    for level in (1.0, "half"):
+        with pytest.raises(InvalidValue, match=f"level = .*{level}.*: must be between 0 and 1"):
+            Quantile("q", "y", level=level)
     with pytest.raises(InvalidValue, match="over = 'draw': is no dimension of y"):
         reduced(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
 

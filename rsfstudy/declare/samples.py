@@ -42,7 +42,7 @@ def draw(
         if _is_estimate(drawn):
             found[name] = drawn + deviation * score
         else:
-            found[name] = np.asarray(_quantiles(drawn)(ndtr(score)), dtype=float)
+            found[name] = _values(name, drawn, ndtr(score))
     how = {
         "method": method,
         "n": n * (len(distribution) + 2) if method == "saltelli" else n,
@@ -83,7 +83,10 @@ def _spread(
             remedy = "Give covariance=, or a distribution in its place."
             raise InvalidValue(estimates[0], distribution[estimates[0]], rule, remedy=remedy)
         return np.ones(count), np.eye(count)
-    given = np.asarray(covariance, dtype=float)
+    try:
+        given = np.asarray(covariance, dtype=float)
+    except (TypeError, ValueError):
+        given = np.empty(0)
     if given.shape != (count, count) or not np.isfinite(given).all():
         rule = f"must be {count} by {count} finite numbers, in the order {', '.join(distribution)}"
         raise InvalidValue("covariance", covariance, rule)
@@ -136,6 +139,17 @@ def _quantiles(drawn: Any) -> Any:
     return getattr(drawn, "ppf", None) if hasattr(drawn, "dist") else getattr(drawn, "icdf", None)
 
 
+def _values(name: str, drawn: Any, probabilities: np.ndarray) -> np.ndarray:
+    """The quantiles of a distribution."""
+    try:
+        found = np.asarray(_quantiles(drawn)(probabilities), dtype=float)
+    except ValueError:  # of parameters that are arrays
+        found = np.empty(0)
+    if found.shape != probabilities.shape or not np.isfinite(found).all():
+        raise InvalidValue(name, _said(drawn), "has no finite quantiles: look at its parameters")
+    return found
+
+
 def _said(drawn: Any) -> Any:
     """A distribution in words; an estimate as it is."""
     if _is_estimate(drawn):
@@ -166,7 +180,8 @@ def set_by(
 def _made(name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]) -> np.ndarray:
     count = len(next(iter(drawn.values())))
     try:
-        return np.broadcast_to(np.asarray(by(drawn), dtype=float), count)
+        made = np.asarray(by(drawn)).astype(float, casting="same_kind")
+        return np.broadcast_to(made, count)
     except Exception as error:
         rule = f"gives no number for each sample ({type(error).__name__}: {error})"
         raise InvalidValue(name, getattr(by, "__name__", by), rule, choices=drawn) from error

@@ -146,7 +146,7 @@ class Quantile(_Statistic):
     kind: ClassVar[str] = "quantile"
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.level < 1.0:
+        if not isinstance(self.level, int | float) or not 0.0 < self.level < 1.0:
             raise InvalidValue("level", self.level, "must be between 0 and 1")
 
     @property
