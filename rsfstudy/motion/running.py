@@ -192,29 +192,15 @@ def chain(
     """
     plan = _planned(scene, accuracy, meter, clock=clock)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
-    if scene.parts.loading.displaces:
-        return _displaced(scene, plan, (lasts, *origin), start, meter, watches, recording)
+    first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
+    if first is not None:  # in the loop stresses are without what the load point imposes
+        start = _pushed(start, first - start.psis[-1])
+        origin = *origin[:2], start.spring
     begins, kinks = (np.empty(2 * plan.unknowns), _columns_of(start)), (table[1:], told)
-    return _events(plan, (lasts, *origin), begins, meter, watches, recording, kinks)
-
-
-def _displaced(
-    scene: Scene,
-    plan: _Plan,
-    times: tuple[float, ...],
-    start: Point,
-    meter: Meter,
-    watches: Sequence[Watch],
-    recording: Recording | None,
-) -> Iterator[Event]:
-    """Events where the load point imposes shear stress, which is the last unknown: spring stress
-    and friction in the loop are those without it.
-    """
-    first = scene.numbers[LOADING + 2]
-    start = _pushed(start, first - start.psis[-1])
-    begins, times = (np.empty(2 * plan.unknowns), _columns_of(start)), (*times[:3], start.spring)
-    for event in _events(plan, times, begins, meter, watches, recording, _NO_KINKS, first):
-        yield event._replace(point=_pushed(event.point, event.point.psis[-1] - first))
+    happens = _events(plan, (lasts, *origin), begins, meter, watches, recording, kinks, first)
+    if first is None:
+        return happens
+    return (e._replace(point=_pushed(e.point, e.point.psis[-1] - first)) for e in happens)
 
 
 def _pushed(point: Point, by: float) -> Point:
