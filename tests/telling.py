@@ -187,8 +187,12 @@ def tell_files(answers: Answers, folder: Path) -> None:
         axes = []
         for axis in study.axes:
             rows = axis.rows[:2]
-            plain = [row[axis.dimension] for row in rows] if axis.labels is None else None
-            axes.append(Axis(axis.dimension, plain or dict(zip(axis.labels, rows, strict=False))))
+            if axis.labels is not None:
+                values = dict(zip(axis.labels, rows, strict=False))
+            else:  # values of the axis itself, or numbered points
+                values = {name: [row[name] for row in rows] for name in rows[0]}
+                values = values.get(axis.dimension, values)
+            axes.append(Axis(axis.dimension, values))
         small = replace(study, axes=axes, reductions=(), claims=())
         small = replace(small, accuracy=replace(small.accuracy, rtol=1e-3, budget=5_000))
         how = {"workers": 0, "progress": False, "fresh": True, "keep_going": True}
