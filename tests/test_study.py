@@ -168,7 +168,7 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
     task = cells.Task(study.base, study.measure, study.accuracy)
     monkeypatch.setattr(cells, "_received", lambda _sent: task)
-    monkeypatch.setattr(cells, "_WORKER_HANDS_OVER", np.inf)
+    monkeypatch.setattr(cells, "_HAND_OVER", np.inf)
     monkeypatch.setattr(task.layout, "finished", lambda *finished: finished)
     monkeypatch.setattr(cells, "computed", lambda _task, cell: (cell, 0.0))
     found = pickle.loads(cells.on_worker(b"", cells.packed(Batch(plan, numbers))))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.wording import short
+from rsfstudy.declare.wording import is_list, short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
@@ -345,12 +345,6 @@ def check_text(name: str, text: object) -> None:
         text.encode()
     except UnicodeError as error:
         raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
-
-
-def is_list(value: Any) -> bool:
-    if isinstance(value, np.ndarray):
-        return value.ndim == 1
-    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def plain_values(field: str, value: Any) -> Any:

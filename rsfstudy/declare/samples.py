@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from rsfstudy.declare.axis import is_list
+from rsfstudy.declare.wording import is_list
 from rsfstudy.errors import InvalidValue
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.

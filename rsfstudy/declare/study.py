@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.declare import checks
-from rsfstudy.declare.axis import Axis, Row, check_text, is_list, plain_values, select, spread
+from rsfstudy.declare.axis import Axis, Row, check_text, plain_values, select, spread
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
+from rsfstudy.declare.wording import is_list
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy

@@ -1,4 +1,4 @@
-"""Values as a reader wants them: in tables, titles and messages."""
+"""Values as they are given, and as a reader wants them: in tables, titles and messages."""
 
 from __future__ import annotations
 
@@ -9,6 +9,13 @@ import numpy as np
 
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
+
+
+def is_list(value: Any) -> bool:
+    """True of several values, which an axis lays out."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def settings(overrides: Mapping[str, Any]) -> str:

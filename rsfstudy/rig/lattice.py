@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import Axis, Row, alike, columns, is_list, plain, spread
+from rsfstudy.declare.axis import Axis, Row, alike, columns, plain, spread
+from rsfstudy.declare.wording import is_list
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import (
