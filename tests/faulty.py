@@ -33,13 +33,6 @@ def _raise(error: BaseException):
     raise error
 
 
-def _eat_memory():
-    """More than a worker may have, and no more than the machine has."""
-    eaten = [np.ones(2_000_000) for _ in range(60)]
-    _hang()
-    return eaten
-
-
 def _hang():
     while True:
         time.sleep(0.01)
@@ -91,7 +84,6 @@ FAULTS: dict[str, Callable] = {
     "unprintable message": lambda _meter: Outcome(Status.OK, {"total": 1.0}, Unprintable()),
     "dies": lambda _meter: os._exit(1),
     "segfaults": lambda _meter: ctypes.string_at(0),
-    "eats memory": lambda _meter: _eat_memory(),
     "sleeps": lambda _meter: (time.sleep(3.0), Outcome(Status.OK, {"total": 1.0}))[1],
     "hangs": lambda _meter: _hang(),
     "hangs in C": lambda _meter: ctypes.PyDLL(None).sleep(10**6),

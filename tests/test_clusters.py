@@ -37,12 +37,22 @@ from rsfstudy.compute import clusters, provenance
 from rsfstudy.errors import RunError
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
-DASK = [sys.executable, "-m", "dask"]
+#: What the page has for Kubernetes, by kind and name.
+PARTS = {
+    (part["kind"], part["metadata"]["name"]): part
+    for part in yaml.safe_load_all((CLUSTERS / "kubernetes.yaml").read_text())
+}
+
+
+def container(name):
+    """Labels of a deployment, and the container that it starts."""
+    template = PARTS["Deployment", name]["spec"]["template"]
+    return template["metadata"]["labels"], template["spec"]["containers"][0]
 
 
 class Cluster:
-    """A scheduler and workers as processes, each worker in an empty directory of its own; what a
-    test kills is started again for the next.
+    """A scheduler and workers as processes, by the commands of the file for Kubernetes, each worker
+    in an empty directory of its own; what a test kills is started again for the next.
     """
 
     def __init__(self, place, stack):
@@ -66,8 +76,9 @@ class Cluster:
     def _start_scheduler(self):
         file = self.place / "scheduler.json"
         file.unlink(missing_ok=True)
-        words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file"]
-        self.scheduler = self._start("scheduler", *words, str(file), cwd=self.place)
+        words = [word.replace("8786", "0") for word in container("rsfstudy-scheduler")[1]["args"]]
+        words += ["--host", "127.0.0.1", "--scheduler-file", str(file)]
+        self.scheduler = self._start(*words, cwd=self.place)
         until(lambda: file.exists() and file.stat().st_size > 0, self.scheduler)
         self.address = json.loads(file.read_text())["address"]
 
@@ -75,12 +86,13 @@ class Cluster:
         place = self.place / f"worker{self.started}"
         place.mkdir()
         self.started += 1
-        words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        self.workers.append(self._start(*words, cwd=place))
+        there, words = "tcp://rsfstudy-scheduler:8786", container("rsfstudy-workers")[1]["args"]
+        words = [word.replace(there, self.address) for word in words]
+        self.workers.append(self._start(*words, "--no-nanny", cwd=place))
 
     def _start(self, *words, cwd):
         process = subprocess.Popen(
-            [*DASK, *words],
+            [sys.executable, "-m", *words],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
@@ -183,7 +195,7 @@ def encrypted():
 
     pytest.importorskip("cryptography")
     security = Security.temporary()
-    with LocalCluster(1, protocol="tls", security=security, **QUIET) as encrypted:
+    with LocalCluster(1, processes=False, protocol="tls", security=security, **QUIET) as encrypted:
         yield encrypted
 
 
@@ -278,49 +290,19 @@ def test_the_slurm_script_runs_a_study(tmp_path):
     assert (accuracy.rtol, accuracy.engine) == (1e-5, "compiled")
 
 
-def test_the_kubernetes_file_starts_a_cluster(tmp_path):
-    """Its own commands, as processes of this machine."""
-    parts = list(yaml.safe_load_all((CLUSTERS / "kubernetes.yaml").read_text()))
-    named = {(part["kind"], part["metadata"]["name"]): part for part in parts}
-    service = named["Service", "rsfstudy-scheduler"]
-
-    def container(name):
-        template = named["Deployment", name]["spec"]["template"]
-        return template["metadata"]["labels"], template["spec"]["containers"][0]
-
+def test_the_kubernetes_file_joins_its_parts():
+    """Its commands are those by which the cluster above is started."""
+    service = PARTS["Service", "rsfstudy-scheduler"]["spec"]
     labels, scheduler = container("rsfstudy-scheduler")
     workers, worker = container("rsfstudy-workers")
-    assert service["spec"]["selector"] == labels
-    port = service["spec"]["ports"][0]["targetPort"]
+    assert service["selector"] == labels
+    port = service["ports"][0]["targetPort"]
     assert {"containerPort": port} in scheduler["ports"]
-    assert f"tcp://rsfstudy-scheduler:{service['spec']['ports'][0]['port']}" in worker["args"]
-
-    policy = named["NetworkPolicy", "rsfstudy"]["spec"]
+    assert str(port) in scheduler["args"]
+    assert f"tcp://rsfstudy-scheduler:{service['ports'][0]['port']}" in worker["args"]
+    policy = PARTS["NetworkPolicy", "rsfstudy"]["spec"]
     (allowed,) = policy["podSelector"]["matchExpressions"]
     assert allowed == {
         "key": "app", "operator": "In", "values": [labels["app"], workers["app"]]
     }  # fmt: skip
     assert policy["ingress"] == [{"from": [{"podSelector": policy["podSelector"]}]}]
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        free = str(server.getsockname()[1])
-    started = []
-    try:
-        for found in (scheduler, worker):
-            words = [word.replace("rsfstudy-scheduler", "127.0.0.1").replace(str(port), free)
-                     for word in found["args"]]  # fmt: skip
-            started.append(
-                subprocess.Popen(
-                    [sys.executable, "-m", *words],
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    cwd=tmp_path,
-                    start_new_session=True,
-                )
-            )
-        with clusters.existing_cluster(f"tcp://127.0.0.1:{free}", timeout=HANGS) as client:
-            same_numbers(run(client=client), run())
-    finally:
-        for process in started:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait(HANGS)
