@@ -10,10 +10,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level, reference_line
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
@@ -27,7 +26,6 @@ from rsfstudy.motion.steppers.scipy import METHODS
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce import LinearFit
 from rsfstudy.reduce.base import Reduction
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 from . import _references as known

@@ -9,15 +9,13 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Difference
 from rsfstudy.reduce.base import Reduction, failed
-from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import mark_reversed, mark_steady

@@ -9,10 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
@@ -27,7 +26,6 @@ from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce.base import Reduction
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: What draws a number.

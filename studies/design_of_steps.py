@@ -2,15 +2,13 @@
 
 import xarray as xr
 
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.scene import Scene
 
 from .law_identification import CHANCE, ScatterOverPromise
 

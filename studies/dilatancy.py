@@ -3,10 +3,9 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.linear_stability import LinearStability
 
 from ._fluids import FAULT, REFERENCE, SEGALL_RICE

@@ -5,10 +5,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel, level, reference_line
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit, RelativeDifference
-from rsfstudy.slider.scene import Scene
 
 from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
 

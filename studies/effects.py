@@ -9,10 +9,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Draw, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -20,7 +19,6 @@ from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import RelativeDifference
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
-from rsfstudy.slider.scene import Scene
 
 #: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
 #: stress.

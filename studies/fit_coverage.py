@@ -6,16 +6,14 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import ONE, TWO, SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
-from rsfstudy.slider.scene import Scene
 
 RECORDS = 24
 PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")

@@ -1,12 +1,10 @@
 """Do the errors of fits with two states cover the truth, of one step and of two fitted as one?"""
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.scene import Scene
 
 from .fit_coverage import CHANCE, INTERVALS, ShareInside, mark_shares
 

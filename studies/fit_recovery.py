@@ -10,19 +10,17 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values
 from rsfstudy.analysis.fitting.search import Search
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Slip distance in um, rows of a record, and the accuracy of its motion.

@@ -8,10 +8,9 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
@@ -20,7 +19,6 @@ from rsfstudy.motion.recording import OBSERVED, Recording
 from rsfstudy.quantity import Output
 from rsfstudy.rig.history import history
 from rsfstudy.slider.history import TIME, History
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Initial departure of spring stress, over a; samples in D_c/V_*; and part of the record around an

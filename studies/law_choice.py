@@ -6,15 +6,13 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
-from rsfstudy.slider.scene import Scene
 
 RECORDS = 6
 LAWS = ("slip", "slowness")

@@ -1,12 +1,10 @@
 """Laws: how much of stick-slip hangs on the state evolution law."""
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import Difference, LinearFit, OverClosedForm
-from rsfstudy.slider.scene import Scene
 
 from ._laws import (
     COMPOSITE,

@@ -2,13 +2,11 @@
 
 import numpy as np
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import RelativeDifference
-from rsfstudy.slider.scene import Scene
 
 from ._laws import (
     COMPOSITE,

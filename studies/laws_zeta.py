@@ -3,13 +3,11 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit
-from rsfstudy.slider.scene import Scene
 
 from ._laws import REFERENCES, shade
 from ._paper import PAPER, REFERENCE

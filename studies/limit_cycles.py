@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import LN10, constant_state_line, coupling, mark_reversed, scene_of, steady_line

@@ -8,13 +8,11 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import Inverse, LinearFit
-from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.slider.steady import slowest_steady
 

@@ -7,13 +7,11 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import quad
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.scene import Scene
 
 from ._phase_plane import scene_of
 

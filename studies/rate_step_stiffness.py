@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, reference_line
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, RelativeDifference
-from rsfstudy.slider.scene import Scene
 
 from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
 

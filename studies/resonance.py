@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Inverse
-from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import response_to_normal_stress
 
 from ._phase_plane import scene_of

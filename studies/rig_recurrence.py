@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Laboratory, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit
-from rsfstudy.rig.laboratory import Laboratory
 
 #: Normal stresses in MPa.
 STRESSES = (5.0, 10.0, 20.0)

@@ -7,14 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.reduce import RelativeDifference
 from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
-from rsfstudy.slider.scene import Scene
 
 from ._paper import PAPER, REFERENCE
 

@@ -5,13 +5,11 @@ import math
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.healing import Healing
 from rsfstudy.reduce import DecadeFit
-from rsfstudy.slider.scene import Scene
 
 SLIP, SLOWNESS, STRENGTHENING = "slip law", "slowness law", "slowness law, b < a"
 CASES: dict[str, dict[str, str | float]] = {

@@ -10,17 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
 from rsfstudy.slider.registry import FIELDS, KINDS, SLOT_NAMES, without_meaning
-from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 

@@ -8,13 +8,11 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 from ._paper import PAPER, REFERENCE

@@ -16,11 +16,10 @@ from typing import Any, ClassVar
 
 import xarray as xr
 
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.swing import settles
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level, reference_line
-from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -28,7 +27,6 @@ from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import LinearFit
 from rsfstudy.slider.closed_forms import effective_friction, normal_stress_step
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 from ._paper import REFERENCE

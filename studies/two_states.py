@@ -10,13 +10,12 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy import Axis, Scene, Segment, Study
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events
 from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import STEP, Orbit, ReturnMap, section
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_leaves_alone
@@ -33,8 +32,6 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce import Boundary, Inverse
-from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.

@@ -5,11 +5,9 @@ friction that strengthens with slip rate.
 import math
 from typing import Any
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.slider.scene import Scene
 
 GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 RUINA = "Ruina (1983), J. Geophys. Res. 88, 10359-10370"

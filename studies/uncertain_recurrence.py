@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Laboratory, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
-from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.reductions import InUnits
 
 # ---- what a fit says ----------------------------------------------------------------------------

@@ -5,13 +5,11 @@ import math
 import xarray as xr
 from scipy.integrate import quad
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.reduce import OverClosedForm
-from rsfstudy.slider.scene import Scene
 
 #: Stiffness over critical stiffness, compliant to stiff.
 RATIOS = [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0]

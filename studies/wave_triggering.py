@@ -11,12 +11,11 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from rsfstudy import Axis, Scene, Segment, Study
 from rsfstudy.analysis.approach import Approach
 from rsfstudy.analysis.return_map import ReturnMap
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Figure, Panel, level
-from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
@@ -24,10 +23,8 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Watch, rise
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
-from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.loading.oscillation import Oscillation
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Displacement step in D_c that sets free motion off, and most events until its cycle repeats.

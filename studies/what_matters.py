@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 from scipy.stats import norm
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.declare.study import Study
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -20,7 +19,6 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import Logarithm, SobolIndices
-from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Independent quantities, each uncertain by a tenth; the stiffness is that of the cycles.
