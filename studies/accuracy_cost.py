@@ -449,7 +449,6 @@ def cheapest(label: str, digits: float) -> Claim:
         where={"problem": label, "digits": digits},
         relation="below",
         published=1.25,
-        tolerance=0.0,
         reason="right-hand sides over those of the cheapest for the same error",
     )
 

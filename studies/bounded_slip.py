@@ -201,8 +201,6 @@ def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str)
         },
         relation="below",
         published=1.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -294,7 +292,6 @@ study = Study(
             where=LARGEST,
             relation="above",
             published=0.0,
-            tolerance=0.0,
             reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
         ),
         Claim(
@@ -305,7 +302,6 @@ study = Study(
             where={**LARGEST, "inertia": True},
             relation="above",
             published=4.73,
-            tolerance=0.0,
             reason="an inequality: the norm V T/(2 pi D_c) = 5e-4 is at 10^4.73 V_*",
         ),
     ],

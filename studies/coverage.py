@@ -391,8 +391,6 @@ def claims(digits: int) -> list[Claim]:
             digits,
             relation="below",
             published=3.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         claim(
             3,

@@ -124,7 +124,6 @@ study = Study(
             where={"dilatancy": 0.012, "drainage": 1e-3},
             relation="below",
             published=1e-4,
-            tolerance=0.0,
             reason="an inequality: a fiftieth of b - a",
         ),
         Claim(
@@ -135,8 +134,6 @@ study = Study(
             where={"dilatancy": 0.012, "drainage": 1.0},
             relation="above",
             published=0.00375,
-            tolerance=0.0,
-            reason="an inequality",
         ),
     ],
     plot=figure,

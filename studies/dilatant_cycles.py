@@ -22,7 +22,6 @@ def peak(law: str, dilatancy: float, relation: str, log10: float, what: str) -> 
         where={"law": law, "drainage": 1.0, "dilatancy": dilatancy},
         relation=relation,
         published=log10,
-        tolerance=0.0,
         reason="an inequality; dynamic ruptures reach 10^9 V_*",
     )
 
@@ -118,7 +117,6 @@ study = Study(
                 where={"law": law, "drainage": 1.0, "dilatancy": 0.008},
                 relation="below",
                 published=0.05,
-                tolerance=0.0,
                 reason="an inequality; 0.24 to 0.27 without dilatancy",
             ),
         )

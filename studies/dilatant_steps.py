@@ -34,8 +34,6 @@ def above_drained(fault: str, drainage: float, by: float) -> Claim:
         minus={"fault": DRAINED, "drainage": drainage},
         relation="above",
         published=by,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -88,8 +86,6 @@ study = Study(
             minus={"fault": "dilatancy 0.004", "drainage": 1.0},
             relation="below",
             published=-1.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         Claim(
             id="D6",
@@ -101,7 +97,6 @@ study = Study(
             minus={"fault": "dilatancy 0.004", "drainage": 0.1},
             relation="above",
             published=-0.5,
-            tolerance=0.0,
             reason="an inequality, 5 % of the boundary",
         ),
     ],

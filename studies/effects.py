@@ -188,8 +188,6 @@ def loses(law: str, dynamics: str, published: float) -> Claim:
         where={"law": law, "coupling": "constant normal stress", "dynamics": dynamics},
         relation="above",
         published=published,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -250,8 +248,6 @@ study = Study(
             where={"law": "slip", **FULL},
             relation="below",
             published=0.9,
-            tolerance=0.0,
-            reason="an inequality",
         ),
     ],
     plot=figure,

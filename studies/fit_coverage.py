@@ -122,7 +122,6 @@ def naive_fails(process: str, law: str) -> Claim:
         where={"process": process, "law": law},
         relation="below",
         published=-CHANCE,
-        tolerance=0.0,
         reason="beyond chance",
     )
 

@@ -286,7 +286,6 @@ def comes_back(case: str, source: str) -> Claim:
         where={"case": case, "record_by": source},
         relation="below",
         published=LEAVES[source],
-        tolerance=0.0,
         reason=reasons[source],
     )
 

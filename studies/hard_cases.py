@@ -439,7 +439,6 @@ study = Study(
             where={"hard_case": label},
             relation="below",
             published=1e-7,
-            tolerance=0.0,
             reason="an inequality, against an independent computation",
         )
         for label in CASES

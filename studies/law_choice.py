@@ -119,7 +119,6 @@ def seldom_wrong(law: str) -> Claim:
         where={"law": law, "design": "one step up", "noise_size": 5e-3},
         relation="below",
         published=0.5,
-        tolerance=0.0,
         reason="four of six mislead by chance once in 500",
     )
 

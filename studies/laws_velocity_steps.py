@@ -36,8 +36,6 @@ def order(smaller: str, larger: str) -> Claim:
         minus={"evolution": smaller, **STIFF},
         relation="above",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -51,7 +49,6 @@ def lowered(law: str) -> Claim:
         where={"evolution": law, **STIFF, "normal_stress": "variable"},
         relation="above",
         published=0.1,
-        tolerance=0.0,
         reason="an inequality; ours are 0.12 to 0.48",
     )
 
@@ -99,7 +96,6 @@ study = Study(
             where={"evolution": SLOWNESS, "normal_stress": "variable", "stiffness_ratio": 1.75},
             relation="below",
             published=0.0,
-            tolerance=0.0,
             reason="an inequality; ours is -0.03",
         ),
     ],

@@ -39,8 +39,6 @@ def below(exponent: float) -> Claim:
         minus={"law_exponent": exponent, "normal_stress": "constant"},
         relation="below",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 

@@ -163,8 +163,6 @@ study = Study(
             minus=speaks_of("slip", "constant"),
             relation="above",
             published=0.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         Claim(
             id="C13",
@@ -199,7 +197,6 @@ study = Study(
                 where=speaks_of("slowness", stress),
                 relation="above",
                 published=1.5,
-                tolerance=0.0,
                 reason="'strongly asymmetrical'; 1 is symmetrical",
             )
             for stress in ("constant", "variable")
@@ -213,7 +210,6 @@ study = Study(
             minus=speaks_of("slip", "constant"),
             relation="above",
             published=1.0,
-            tolerance=0.0,
             reason="'different to the slip law', whose two drops are within a quarter of equal",
         ),
     ],

@@ -52,8 +52,6 @@ def steepness(phi: float, gentler: float) -> Claim:
         minus={"mass": MASSLESS, "phi": gentler},
         relation="below",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -172,8 +170,6 @@ study = Study(
             where={"mass": MASSLESS, "phi": 60.0},
             relation="below",
             published=0.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         steepness(50.0, 60.0),
         steepness(40.0, 50.0),
@@ -201,7 +197,6 @@ study = Study(
             where={"mass": MASSLESS, "phi": 40.0, "load_velocity_ratio": 1e-4},
             relation="above",
             published=0.8391,
-            tolerance=0.0,
             reason="an inequality: no steady state there, while faster sliding has one",
         ),
         Claim(
@@ -212,7 +207,6 @@ study = Study(
             where={"mass": MASSLESS, "phi": 50.0},
             relation="below",
             published=1000.0,
-            tolerance=0.0,
             reason="an inequality; the limit cycles of that spring end there too",
         ),
         Claim(
@@ -223,7 +217,6 @@ study = Study(
             where={"mass": MASSLESS, "phi": 60.0},
             relation="above",
             published=1000.0,
-            tolerance=0.0,
             reason="'the curve is very flat'",
         ),
     ],

@@ -113,8 +113,6 @@ study = Study(
             where={"case": STRONG},
             relation="below",
             published=1.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         Claim(
             id="C7",
@@ -125,8 +123,6 @@ study = Study(
             minus={"case": WEAK},
             relation="below",
             published=0.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         Claim(
             id="C7",

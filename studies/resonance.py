@@ -79,8 +79,6 @@ def resounds(law: str, period: float) -> Claim:
         minus={**at, "oscillation_period": period},
         relation="above",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -100,8 +98,6 @@ def holds(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Cl
         },
         relation="below" if still else "above",
         published=FAILED,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -118,8 +114,6 @@ def fails_earlier(softer: float, stiffer: float) -> Claim:
         minus={**at, "stiffness_ratio": stiffer},
         relation="below",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 

@@ -57,8 +57,6 @@ def falls_faster(stress: float) -> Claim:
         where={"law": "slowness", "sigma_star": stress},
         relation="below",
         published=-2.0 * weakening,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 

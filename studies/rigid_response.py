@@ -85,7 +85,6 @@ def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
         where={"law": law, "normal_stress": "variable", "load_velocity_ratio": rate},
         relation="below",
         published=0.0,
-        tolerance=0.0,
         reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
     )
 
@@ -168,7 +167,6 @@ study = Study(
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             relation="above",
             published=0.0,
-            tolerance=0.0,
             reason="an inequality, on stress less its future steady value, as the figure plots it",
         ),
         Claim(
@@ -179,8 +177,6 @@ study = Study(
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             relation="above",
             published=0.0,
-            tolerance=0.0,
-            reason="an inequality",
             expected="differs",
             because=(
                 "the jump itself is smaller downward, since strength grows more slowly the higher "
@@ -205,7 +201,6 @@ study = Study(
             where={"law": "slowness", "normal_stress": "variable"},
             relation="above",
             published=0.5 * 0.0145,
-            tolerance=0.0,
             reason="25 times that width",
         ),
         Claim(
@@ -236,7 +231,6 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
             relation="above",
             published=0.3,
-            tolerance=0.0,
             reason="an inequality: at some slip, over 0.3 of the change is left beyond eq. 17b",
         ),
         Claim(

@@ -61,8 +61,6 @@ def falls(case: str) -> Claim:
         where={"law": "slowness", "case": case, "stiffness_ratio": 0.8},
         relation="below",
         published=0.0,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 
@@ -196,8 +194,6 @@ study = Study(
             minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
             relation="below",
             published=0.0,
-            tolerance=0.0,
-            reason="an inequality",
         ),
         Claim(
             id="C16",
@@ -208,7 +204,6 @@ study = Study(
             minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
             relation="above",
             published=0.05,
-            tolerance=0.0,
             reason="an inequality, well above the standard errors",
         ),
         Claim(
@@ -234,7 +229,6 @@ study = Study(
             where={"law": "slip", "case": STEEP, "stiffness_ratio": 0.8},
             relation="below",
             published=10.0,
-            tolerance=0.0,
             reason="an inequality: cells without stick-slip are left out",
         ),
     ],

@@ -274,7 +274,6 @@ def weaker(law: str) -> Claim:
         minus={**where, "case": PLAIN},
         relation="below",
         published=-0.5 * base.a * (0.5 / FRICTION - 0.5 / base.mu_star),
-        tolerance=0.0,
         reason="an inequality: by more than half of what the first order says",
     )
 
@@ -423,7 +422,6 @@ study = Study(
             where={"law": "slip", "case": STRONG, "stiffness_ratio": 2.0},
             relation="above",
             published=0.97,
-            tolerance=0.0,
             reason="an inequality; ours is 0.974",
         ),
         Claim(
@@ -434,7 +432,6 @@ study = Study(
             where={"law": "slowness", "case": STRONG, "stiffness_ratio": 1.25},
             relation="above",
             published=2.0,
-            tolerance=0.0,
             reason="an inequality; ours is 2.40",
         ),
     ],

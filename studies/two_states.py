@@ -477,7 +477,6 @@ study = Study(
             where=at(0.8531),
             relation="above",
             published=0.1,
-            tolerance=0.0,
             reason="an inequality, well above what 32 events leave uncertain",
         ),
         Claim(

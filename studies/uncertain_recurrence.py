@@ -79,8 +79,6 @@ CLAIMS = (
         where={},
         relation="below",
         published=0.25 * AS_IF_INDEPENDENT,
-        tolerance=0.0,
-        reason="an inequality",
     ),
     Claim(
         id="U3",
@@ -90,8 +88,6 @@ CLAIMS = (
         where={},
         relation="below",
         published=OF_NET,
-        tolerance=0.0,
-        reason="an inequality",
     ),
     Claim(
         id="U4",

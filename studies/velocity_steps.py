@@ -62,8 +62,6 @@ def reads_too_little(law: str, ratio: float) -> Claim:
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 10.0},
         relation="below",
         published=0.9 * a,
-        tolerance=0.0,
-        reason="an inequality",
     )
 
 

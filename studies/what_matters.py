@@ -69,7 +69,6 @@ def half(name: str, order: str, end: str) -> Claim:
         where={"input": name},
         relation="below" if end == "low" else "above",
         published=0.5,
-        tolerance=0.0,
         reason="an interval of 95 %",
     )
 

@@ -25,6 +25,8 @@ UNDECIDED = "undecided"
 NOT_APPLICABLE = "not applicable"
 
 RELATIONS = ("equals", "below", "above")
+#: Reason of a tolerance of zero where more cannot be asked for.
+INEQUALITY = "an inequality"
 _EXPECTED = (REPRODUCED, DIFFERS)
 _TEXTS = (
     *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
@@ -57,9 +59,9 @@ class Claim:
     published : float
         The published value.
     tolerance : float
-        How far ours may be from it, and
+        How far ours may be from it, or on the wrong side of it, and
     reason : str
-        why that far.
+        why that far; of an inequality both may be left out.
     expected : str
         The verdict expected today.
     because : str
@@ -72,8 +74,8 @@ class Claim:
     variable: str
     where: Mapping[str, Any]
     published: float
-    tolerance: float
-    reason: str
+    tolerance: float = 0.0
+    reason: str = INEQUALITY
     relation: str = "equals"
     minus: Mapping[str, Any] = field(default_factory=dict)
     minus_variable: str = ""
@@ -87,6 +89,9 @@ class Claim:
                 raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
+        if self.relation == "equals" and self.reason == INEQUALITY:
+            rule = f"must tell why the tolerance is {self.tolerance}, in claim {self.id}"
+            raise InvalidValue("reason", self.reason, rule)
         if self.expected not in _EXPECTED:
             raise InvalidValue("expected", self.expected, "is no verdict", choices=_EXPECTED)
         for name in ("published", "tolerance"):
