@@ -2,7 +2,7 @@
 oscillation, slow slip and stick-slip lie.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -17,12 +17,13 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
+from rsfstudy.reduce import Boundary
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
-from rsfstudy.slider.registry import FIELDS, KINDS, SLOT_NAMES, without_meaning
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
 from ._paper import PAPER, REFERENCE
+from ._phase_plane import scene_of
 
 CASES = [(law, stress) for law in ("slip", "slowness") for stress in ("constant", "variable")]
 
@@ -97,14 +98,10 @@ class CyclingEdge(Reduction):
         if linear is None:
             return xr.Dataset()
         stiffness = dataset[_STIFFNESS].astype(float)
-        stable, unstable, crossings = xr.apply_ufunc(
-            _bracket,
-            answers,
-            stiffness,
-            input_core_dims=[[dimension], [dimension]],
-            output_core_dims=[[], [], []],
-            vectorize=True,
-        )
+        # the change at the stiffest cells counts, and a boundary tells of the first one
+        softening = answers.assign_coords({_STIFFNESS: -stiffness})
+        found = Boundary(self.name, self.of, on=_STIFFNESS).bracketed(softening)
+        stable, unstable, crossings = abs(found[0]), abs(found[1]), found[2]
         edge, width = (0.5 * (stable + unstable)).where(crossings == 1), abs(stable - unstable)
         misplaced = ((answers == 1.0) & (stiffness > linear)) | (
             (answers == 0.0) & (stiffness < linear)
@@ -129,49 +126,19 @@ class CyclingEdge(Reduction):
         )
 
 
-def _bracket(answers: np.ndarray, stiffness: np.ndarray) -> tuple[float, float, float]:
-    """The stiffest of the cells that cycle and the softest of those that settle next to where the
-    answer changes, as (settling, cycling), and how often it does.
-    """
-    order = [i for i in np.argsort(stiffness) if not np.isnan(answers[i])]
-    if not order:
-        return np.nan, np.nan, np.nan
-    cycles, at = answers[order] > 0.5, stiffness[order]
-    changes = np.flatnonzero(cycles[1:] != cycles[:-1])
-    if changes.size == 0:
-        return (np.nan, at[-1], 0.0) if cycles[0] else (at[0], np.nan, 0.0)
-    below, above = at[changes[-1]], at[changes[-1] + 1]
-    ends = (above, below) if cycles[changes[-1]] else (below, above)
-    return *ends, float(changes.size)
-
-
 def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray | None:
     """Critical stiffness at V_0 over that at V_*, at each place of a lattice; None where a scene
     cannot be told from its coordinates alone.
     """
-    named = {name: dataset[name] for name in (*SLOT_NAMES, *FIELDS) if name in dataset.coords}
-    values = np.full(places.shape, np.nan)
+    values, cells = np.full(places.shape, np.nan), dataset.coords.to_dataset()
+    cells = cells.isel({d: 0 for d in cells.dims if d not in places.dims})
     for place in np.ndindex(places.shape):
-        at = dict(zip(places.dims, place, strict=True))
-        here = {
-            name: along.isel({d: i for d, i in at.items() if d in along.dims}).item()
-            for name, along in named.items()
-            if set(along.dims) <= set(at)
-        }
         try:
-            scene = _scene(here)
+            scene = scene_of(cells.isel(dict(zip(places.dims, place, strict=True))))
         except InvalidValue:
             return None
         values[place] = critical_stiffness(scene, scene.log_load_rate) / scene.critical_stiffness
     return places.copy(data=values)
-
-
-def _scene(values: Mapping[str, Any]) -> Scene:
-    """The scene with these values, at critical stiffness; coordinates hold NaN and "" for none."""
-    given = {name: value for name, value in values.items() if value not in ("", None)}
-    given = {n: bool(v) if isinstance(True, KINDS[n]) else v for n, v in given.items()}
-    idle = {*without_meaning(given), "stiffness", _STIFFNESS}
-    return Scene(**{n: v for n, v in given.items() if n not in idle and v == v})
 
 
 PLANE = ("stiffness_ratio", "load_velocity_ratio")

@@ -56,15 +56,7 @@ class Boundary(Reduction):
         values = dataset[self.of].where(~refused(dataset, self.of, dimension))
         if f"{self.of}_error" in dataset:
             values = values.where(~(abs(values - self.level) <= dataset[f"{self.of}_error"]))
-        edges = xr.apply_ufunc(
-            self._bracket,
-            values,
-            dataset[self.on].astype(float),
-            input_core_dims=[[dimension], [dimension]],
-            output_core_dims=[[], [], []],
-            vectorize=True,
-        )
-        stable, unstable, crossings = edges
+        stable, unstable, crossings = self.bracketed(values)
         once = crossings == 1
         note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
         result = xr.Dataset(
@@ -79,6 +71,21 @@ class Boundary(Reduction):
         for name in result:
             result[name].attrs["comment"] = note
         return result
+
+    def bracketed(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
+        """The cells that say no and yes next to the first change of the answer along `on`, and how
+        often it changes; NaN where no cell says so.
+        """
+        dimension = dimension_of(values, self.on)
+        edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
+            self._bracket,
+            values,
+            values[self.on].astype(float),
+            input_core_dims=[[dimension], [dimension]],
+            output_core_dims=[[], [], []],
+            vectorize=True,
+        )
+        return edges
 
     def _bracket(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:
         """Ends of the bracket next to the first change of the answer, and the number of changes."""
