@@ -80,29 +80,25 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     axes.set_xticks(places, names)
 
 
-figure = Figure(
-    [
-        Panel(
-            each=["law"],
-            marks=[mark_shares],
-            x_label="Parameter",
-            y_label="Truth inside 68.3 % interval (%)",
-            y_limits=(0.0, 100.0),
-            alike="share",
-        )
-    ]
+shares = Panel(
+    each=["law"],
+    marks=[mark_shares],
+    x_label="Parameter",
+    y_label="Truth inside 68.3 % interval (%)",
+    y_limits=(0.0, 100.0),
+    alike="share",
 )
 
 
-def covers(process: str, law: str) -> list[Claim]:
-    """F1 and F2: intervals cover what they promise, within chance."""
+def covers(series: str, words: str, **where: str) -> list[Claim]:
+    """Two claims of a series: intervals cover what they promise, within chance."""
     return [
         Claim(
-            id=f"F{number}",
-            statement=f"{process} noise, {law} law: {100 * share:.1f} % intervals cover as much",
+            id=f"{series}{number}",
+            statement=f"{words}: {100 * share:.1f} % intervals cover as much",
             source="this project's promise for the errors of fits",
             variable=f"share_{name.removeprefix('inside_')}_least",
-            where={"process": process, "law": law},
+            where=where,
             relation="above",
             published=0.0,
             tolerance=CHANCE,
@@ -126,6 +122,12 @@ def naive_fails(process: str, law: str) -> Claim:
     )
 
 
+REDUCTIONS = [
+    ShareInside(f"{prefix}share_{name.removeprefix('inside_')}", f"{prefix}{name}", share)
+    for prefix in ("", "naive_")
+    for name, share in INTERVALS.items()
+]
+
 study = Study(
     name="fit_coverage",
     title="Shares of synthetic records whose truth lies within the errors of the fit",
@@ -143,16 +145,17 @@ study = Study(
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(),
-    reductions=[
-        ShareInside(f"{prefix}share_{name.removeprefix('inside_')}", f"{prefix}{name}", share)
-        for prefix in ("", "naive_")
-        for name, share in INTERVALS.items()
-    ],
+    reductions=REDUCTIONS,
     claims=[
-        *(c for process in PROCESSES for law in LAWS for c in covers(process, law)),
+        *(
+            claim
+            for process in PROCESSES
+            for law in LAWS
+            for claim in covers("F", f"{process} noise, {law} law", process=process, law=law)
+        ),
         *(naive_fails(p, law) for p in PROCESSES[1:] for law in LAWS),
     ],
-    plot=figure,
+    plot=Figure([shares]),
     accuracy=Accuracy(budget=50_000_000, engine="compiled"),
     references=[
         "Patterson and Thompson (1971), Biometrika 58, 545-554",

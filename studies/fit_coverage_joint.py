@@ -1,49 +1,18 @@
 """Do the errors of fits with two states cover the truth, of one step and of two fitted as one?"""
 
+from dataclasses import replace
+
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy.declare.figure import Figure
 from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 
-from .fit_coverage import CHANCE, INTERVALS, ShareInside, mark_shares
+from .fit_coverage import REDUCTIONS, covers, shares
 
 RECORDS = 6
 PROCESSES = ("white", "ar1")
 UP, BACK = "1:30, 10:300", "10:30, 1:300"
 DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}"}
-
-figure = Figure(
-    [
-        Panel(
-            each=["design"],
-            marks=[mark_shares],
-            x_label="Parameter",
-            y_label="Truth inside 68.3 % interval (%)",
-            y_limits=(0.0, 100.0),
-            alike="share",
-        )
-    ]
-)
-
-
-def covers(design: str) -> list[Claim]:
-    """J1 and J2: intervals cover what they promise, within chance."""
-    return [
-        Claim(
-            id=f"J{number}",
-            statement=f"white noise, {design}: {100 * share:.1f} % intervals cover as much",
-            source="this project's promise for the errors of fits",
-            variable=f"share_{name.removeprefix('inside_')}_least",
-            where={"process": "white", "design": design},
-            relation="above",
-            published=0.0,
-            tolerance=CHANCE,
-            reason="binomial standard deviations, of the parameter covered least",
-        )
-        for number, (name, share) in enumerate(INTERVALS.items(), start=1)
-    ]
-
 
 study = Study(
     name="fit_coverage_joint",
@@ -73,12 +42,12 @@ study = Study(
     measure=SyntheticFit(
         free=("a", "b1", "b2", "slip_distance", "slip_distance_2", "mu_star", "trend1")
     ),
-    reductions=[
-        ShareInside(f"{prefix}share_{name.removeprefix('inside_')}", f"{prefix}{name}", share)
-        for prefix in ("", "naive_")
-        for name, share in INTERVALS.items()
+    reductions=REDUCTIONS,
+    claims=[
+        claim
+        for design in DESIGNS
+        for claim in covers("J", f"white noise, {design}", process="white", design=design)
     ],
-    claims=[claim for design in DESIGNS for claim in covers(design)],
-    plot=figure,
+    plot=Figure([replace(shares, each=["design"])]),
     accuracy=Accuracy(budget=50_000_000, engine="compiled"),
 )
