@@ -29,7 +29,7 @@ class Problem:
     measure : Measure
         What is asked of it.
     quantity : str
-        The number of the measure that is known.
+        The number of the measure that is known; by default its headline.
     answer : float, optional
         Its value; None where the answer is a status.
     status : Status
@@ -44,12 +44,15 @@ class Problem:
 
     scene: Scene
     measure: Measure
-    quantity: str
+    quantity: str = ""
     answer: float | None = None
     status: Status = Status.OK
     scale: float = 0.0
     uncertainty: float = 0.0
     source: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "quantity", self.quantity or self.measure.headline)
 
     def error_of(self, outcome: Outcome) -> float:
         """Error of an outcome, over the scale."""
@@ -80,6 +83,14 @@ class Problem:
             "uncertainty": self.uncertainty,
             "source": self.source,
         }
+
+
+Fields = dict[str, str | float | bool]
+
+
+def posed(fields: Fields, measure: Measure, **known: Any) -> tuple[Fields, Problem]:
+    """Fields of a scene, and the problem that it poses."""
+    return fields, Problem(scene=Scene(**fields), measure=measure, **known)
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,7 @@ from rsfstudy.reduce.base import Reduction
 from rsfstudy.status import Status
 
 from . import _references as known
-from ._problem import ERRORS, Posing, Problem
-
-Fields = dict[str, str | float | bool]
+from ._problem import ERRORS, Fields, Posing, Problem, posed
 
 QUASI_STATIC: Fields = {"law": "slowness", "normal_stress": "constant"}
 CYCLE: Fields = {
@@ -43,60 +41,45 @@ CYCLE: Fields = {
 cycle = LimitCycle(phases=2)
 
 #: By label: what makes the scene, and the problem. A scene poses one problem.
-PROBLEMS: dict[str, tuple[Fields, Problem]] = {}
-
-
-def pose(label: str, fields: Fields, **answer: object) -> None:
-    """Add a problem."""
-    PROBLEMS[label] = (fields, Problem(scene=Scene(**fields), **answer))  # type: ignore[arg-type]
-
-
-pose(
-    "rigid response",
-    {**QUASI_STATIC, "load_velocity_ratio": 200.0},
-    measure=RigidResponse(points=2),
-    quantity="evolution_distance",
-    answer=known.EVOLUTION_DISTANCE,
-    uncertainty=1e-16,
-    source="closed form (eq. 17a)",
-)
-pose(
-    "oscillation",
-    {**QUASI_STATIC, "load_velocity_ratio": 20.0},
-    measure=StepResponse(peaks=2, phases=2),
-    quantity="max_log10_slip_rate",
-    answer=known.PEAK_AFTER_20,
-    uncertainty=1e-16,
-    source=known.CONSERVED,
-)
-pose(
-    "critical step",
-    {"law": "slip", "normal_stress": "constant", "stiffness_ratio": 1.25},
-    measure=CriticalStep(),
-    quantity="critical_velocity_ratio",
-    answer=known.CRITICAL_VELOCITY,
-    scale=known.CRITICAL_VELOCITY - 1.0,
-    uncertainty=1e-17,
-    source=known.EXTENDED,
-)
-pose(
-    "cycle, slip law: static drop",
-    {**CYCLE, "law": "slip"},
-    measure=cycle,
-    quantity="static_stress_drop",
-    answer=known.SLIP_STATIC_DROP[0],
-    uncertainty=known.SLIP_STATIC_DROP[1],
-    source=known.EXTENDED,
-)
-pose(
-    "cycle, slowness law: recurrence",
-    {**CYCLE, "law": "slowness"},
-    measure=cycle,
-    quantity="recurrence_interval",
-    answer=known.SLOWNESS_RECURRENCE[0],
-    uncertainty=known.SLOWNESS_RECURRENCE[1],
-    source=known.EXTENDED,
-)
+PROBLEMS = {
+    "rigid response": posed(
+        {**QUASI_STATIC, "load_velocity_ratio": 200.0},
+        RigidResponse(points=2),
+        answer=known.EVOLUTION_DISTANCE,
+        uncertainty=1e-16,
+        source="closed form (eq. 17a)",
+    ),
+    "oscillation": posed(
+        {**QUASI_STATIC, "load_velocity_ratio": 20.0},
+        StepResponse(peaks=2, phases=2),
+        answer=known.PEAK_AFTER_20,
+        uncertainty=1e-16,
+        source=known.CONSERVED,
+    ),
+    "critical step": posed(
+        {"law": "slip", "normal_stress": "constant", "stiffness_ratio": 1.25},
+        CriticalStep(),
+        answer=known.CRITICAL_VELOCITY,
+        scale=known.CRITICAL_VELOCITY - 1.0,
+        uncertainty=1e-17,
+        source=known.EXTENDED,
+    ),
+    "cycle, slip law: static drop": posed(
+        {**CYCLE, "law": "slip"},
+        cycle,
+        quantity="static_stress_drop",
+        answer=known.SLIP_STATIC_DROP[0],
+        uncertainty=known.SLIP_STATIC_DROP[1],
+        source=known.EXTENDED,
+    ),
+    "cycle, slowness law: recurrence": posed(
+        {**CYCLE, "law": "slowness"},
+        cycle,
+        answer=known.SLOWNESS_RECURRENCE[0],
+        uncertainty=known.SLOWNESS_RECURRENCE[1],
+        source=known.EXTENDED,
+    ),
+}
 
 #: Seconds after which timings are not repeated.
 _ENOUGH = 0.05

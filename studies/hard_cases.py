@@ -23,14 +23,7 @@ from rsfstudy.quantity import Output
 from rsfstudy.status import Status
 
 from . import _references as known
-from ._problem import ERRORS, Posing, Problem
-
-#: What its numbers are.
-_OUTPUTS = (
-    *ERRORS,
-    Output("answer", "", "1", "the known answer"),
-    Output("ended_as"),
-)
+from ._problem import ERRORS, Fields, Posing, Problem, posed
 
 
 @dataclass(frozen=True)
@@ -44,7 +37,7 @@ class HardCase(Posing):
     name: ClassVar[str] = "hard_case"
     headline = "measured_error"
     typical_work = 15_000
-    outputs = _OUTPUTS
+    outputs = (*ERRORS, Output("answer", "", "1", "the known answer"), Output("ended_as"))
     clocks: ClassVar[tuple[bool, ...]] = (False, True)
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
@@ -72,7 +65,6 @@ class HardCase(Posing):
         return Outcome(Status.OK, numbers)
 
 
-Fields = dict[str, str | float | bool]
 CASES: dict[str, tuple[Fields, Problem]] = {}
 
 CONSTANT: Fields = {"normal_stress": "constant"}
@@ -85,64 +77,33 @@ cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
 
 
 def number(
-    label: str,
-    measure: Measure,
-    quantity: str,
-    answer: float,
-    source: str,
-    fields: Fields,
-    **more: float,
+    label: str, measure: Measure, answer: float, source: str, fields: Fields, **more: float
 ) -> None:
     """A case with a number to come out."""
-    problem = Problem(
-        scene=Scene(**fields),
-        measure=measure,
-        quantity=quantity,
-        answer=answer,
-        source=source,
-        **more,  # type: ignore[arg-type]
-    )
-    CASES[label] = (fields, problem)
+    CASES[label] = posed(fields, measure, answer=answer, source=source, **more)
 
 
 def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
     """A case that must end with a status."""
-    problem = Problem(
-        scene=Scene(**fields),
-        measure=measure,
-        quantity=measure.headline,
-        status=status,
-        source="the physics",
-    )
-    CASES[label] = (fields, problem)
+    CASES[label] = posed(fields, measure, status=status, source="the physics")
 
 
 def critical(label: str, fields: Fields) -> None:
     """A critical step of the slip law by the independent computation."""
     answer = known.HARD_STEPS[label]
-    number(
-        label,
-        step,
-        "critical_velocity_ratio",
-        answer,
-        known.EXTENDED,
-        fields,
-        scale=answer - 1.0,
-        uncertainty=1e-15,
-    )
+    size = answer - 1.0
+    number(label, step, answer, known.EXTENDED, fields, scale=size, uncertainty=1e-15)
 
 
 def recurs(label: str, name: str, fields: Fields) -> None:
     """A limit cycle of the slip law by the independent computation."""
-    answer = known.HARD_CYCLES[label]
-    number(name, cycle, "recurrence_interval", answer, known.EXTENDED, fields, uncertainty=4e-12)
+    number(name, cycle, known.HARD_CYCLES[label], known.EXTENDED, fields, uncertainty=4e-12)
 
 
 # rates and steps beyond what numbers hold
 number(
     "200-fold step, peak at 10^87 V_*",
     peaks,
-    "max_log10_slip_rate",
     known.PEAK_AFTER_200,
     known.CONSERVED,
     {**SLOWNESS, "load_velocity_ratio": 200.0},
@@ -151,7 +112,6 @@ number(
 number(
     "20-fold step, neutral orbit",
     peaks,
-    "max_log10_slip_rate",
     known.PEAK_AFTER_20,
     known.CONSERVED,
     {**SLOWNESS, "load_velocity_ratio": 20.0},
@@ -166,7 +126,6 @@ ends(
 number(
     "rigid, V = 1e12 V_*",
     RigidResponse(slip=60.0),
-    "evolution_distance",
     math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)),
     EXACT,
     {**SLOWNESS, "load_velocity_ratio": 1e12},
@@ -174,7 +133,6 @@ number(
 number(
     "rigid, V = 1e-40 V_*",
     RigidResponse(),
-    "evolution_distance",
     1.0,
     EXACT,
     {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e-40},
@@ -182,7 +140,6 @@ number(
 number(
     "rigid, mu_ss = -0.03",
     RigidResponse(),
-    "evolution_distance",
     1.0,
     EXACT,
     {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e24},
@@ -191,7 +148,6 @@ number(
 number(
     "critical step, k = (1 +1e-08) k_cr",
     step,
-    "critical_velocity_ratio",
     known.JUST_ABOVE_CRITICAL_STIFFNESS,
     known.EXTENDED,
     {**CONSTANT, "stiffness_ratio": 1.0 + 1e-8},
@@ -201,7 +157,6 @@ for off in (-1e-3, 1e-3):
     number(
         f"tiny step, k = (1 {off:+g}) k_cr",
         triggered,
-        "unstable",
         float(off < 0.0),
         "linear theory: every orbit grows below k_cr, and decays above",
         {**CONSTANT, "stiffness_ratio": 1.0 + off, "load_velocity_ratio": 1.0 + 1e-3},
@@ -253,12 +208,7 @@ ends(
     Status.NO_STEADY_STATE,
     {"phi": STEEPEST, "load_velocity_ratio": 0.9},
 )
-ends(
-    "a slider that locks",
-    peaks,
-    Status.LOCKED,
-    {"phi": STEEPEST, "load_velocity_ratio": 0.5},
-)
+ends("a slider that locks", peaks, Status.LOCKED, {"phi": STEEPEST, "load_velocity_ratio": 0.5})
 ends(
     "cycle where k_cr has fallen",
     cycle,
@@ -293,7 +243,6 @@ ends(
 number(
     "step of 1e-14",
     triggered,
-    "unstable",
     0.0,
     "linear theory: it decays",
     {"load_velocity_ratio": 1.0 + 1e-14, "stiffness_ratio": 1.1},
@@ -302,7 +251,6 @@ number(
 number(
     "2361-fold step",
     step,
-    "critical_velocity_ratio",
     known.CRITICAL_VELOCITY_OF_SECTION_4,
     known.EXTENDED,
     {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5},
@@ -310,7 +258,6 @@ number(
 number(
     "slip law, down to 10^-137 V_*",
     cycle,
-    "recurrence_interval",
     known.DOWN_TO_137[0],
     known.EXTENDED,
     {
@@ -331,7 +278,6 @@ number(
 number(
     "slowness law, down to 10^-1745 V_*",
     cycle,
-    "recurrence_interval",
     known.DOWN_TO_1745[0],
     known.EXTENDED,
     {
