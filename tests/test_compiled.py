@@ -16,7 +16,7 @@ import agreement
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
-from rsfstudy.named_studies.coverage import QUESTIONS, random_scene
+from rsfstudy.named_studies._random_scenes import QUESTIONS, random_scene
 from running import LEFT_TO_COMPILED, SMALL, enough, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate

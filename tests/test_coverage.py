@@ -6,7 +6,8 @@ import xarray as xr
 from agreement import LIKE
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies.coverage import QUESTIONS, READINGS, Coverage, Covered, random_scene
+from rsfstudy.named_studies._random_scenes import QUESTIONS, READINGS, random_scene
+from rsfstudy.named_studies.coverage import Coverage, Covered
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue

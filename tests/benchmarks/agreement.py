@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from rsfstudy.named_studies.coverage import QUESTIONS, random_scene
+from rsfstudy.named_studies._random_scenes import QUESTIONS, random_scene
 
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
