@@ -11,8 +11,9 @@ import xarray as xr
 from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
 from rsfstudy.named_studies import accuracy_cost
+from rsfstudy.named_studies._cheapest import Cheapest
 from rsfstudy.named_studies._problem import Problem
-from rsfstudy.named_studies.accuracy_cost import Cheapest, WorkPrecision
+from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
 import rsfstudy
 from rsfstudy import Scene

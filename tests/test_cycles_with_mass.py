@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from full_equations import FullEquations
-from rsfstudy.named_studies.two_states import Bifurcation
+from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.analysis.approach import Approach

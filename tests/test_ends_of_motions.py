@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies.triggering import Triggers
+from rsfstudy.named_studies._triggers import Triggers
 from scipy.optimize import brentq
 
 import rsfstudy

@@ -11,7 +11,7 @@ import agreement
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies.triggering import Triggers
+from rsfstudy.named_studies._triggers import Triggers
 
 import rsfstudy
 from rsfstudy import Scene

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies.triggering import Triggers
+from rsfstudy.named_studies._triggers import Triggers
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue

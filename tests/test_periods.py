@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies.two_states import Bifurcation, _growth
+from rsfstudy.named_studies._bifurcation import Bifurcation, _growth
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map

@@ -9,7 +9,7 @@ import pstats
 import cloudpickle
 import numpy as np
 import pytest
-from rsfstudy.named_studies.two_states import Bifurcation
+from rsfstudy.named_studies._bifurcation import Bifurcation
 from running import run
 
 from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from rsfstudy.named_studies.triggering import TRIGGERS, Triggers
+from rsfstudy.named_studies._triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
 from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point

@@ -1,0 +1,128 @@
+"""The integrator with the least work for a number of correct digits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce.base import Reduction
+
+#: What is given, by the ends of the names: units, and what it is.
+_GIVEN = {
+    "integrator": ("", "integrator with the least right-hand sides"),
+    "work": ("1", "its right-hand sides"),
+    "default_work": ("1", "right-hand sides of the default integrator"),
+    "default_time": ("s", "wall time of the default integrator"),
+    "default_request": ("1", "digits to ask for with the default integrator"),
+    "relative": ("1", "work of an integrator over that of the default one"),
+    "ratio": ("1", "work of the default integrator over the least"),
+}
+
+
+@dataclass(frozen=True)
+class Cheapest(Reduction):
+    """The integrator that reaches a number of correct digits with the least work.
+
+    Work at exactly that many digits is interpolated, in logarithms, between neighbouring runs of
+    one integrator; runs that failed are left out.
+
+    Parameters
+    ----------
+    name : str
+        Gives, along a dimension ``digits``, ``<name>_integrator`` (its name), ``<name>_work``,
+        ``<name>_relative`` (the work of each integrator over that of `default`), and
+        for the integrator `default` ``<name>_default_work``, ``<name>_default_time``,
+        ``<name>_default_request`` (the digits to ask for) and ``<name>_ratio``, its work over the
+        least.
+    of : str
+        Variable that holds the achieved digits along ``integrator`` and ``requested_digits``.
+    default : str
+        Name of the integrator in use.
+    digits : tuple of float
+        Digits wanted.
+    """
+
+    default: str = "DOP853"
+    digits: tuple[float, ...] = (3.0, 6.0, 9.0)
+    kind: ClassVar[str] = "cheapest"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Quantities that are given, and the digits that they are given for."""
+        digits = Quantity("digits", "", "1", "correct decimal digits wanted")
+        return digits, *(Quantity(f"{self.name}_{n}", "", *about) for n, about in _GIVEN.items())
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Compare the integrators; nothing where `default` is not among them."""
+        names = dataset["integrator"].values.astype(str)
+        if self.default not in names:
+            return xr.Dataset()
+        numbers = {
+            "work": np.log(dataset["run_evaluations"]),
+            "default_time": np.log(dataset["run_time"]),
+            "default_request": dataset["requested_digits"].broadcast_like(dataset[self.of]),
+        }
+        wanted = xr.DataArray(
+            np.array(self.digits), dims="digits", coords={"digits": list(self.digits)}
+        )
+        interpolated = {
+            name: xr.apply_ufunc(
+                _at_digits,
+                dataset[self.of],
+                values,
+                wanted,
+                input_core_dims=[["requested_digits"], ["requested_digits"], ["digits"]],
+                output_core_dims=[["digits"]],
+                vectorize=True,
+            )
+            for name, values in numbers.items()
+        }
+        work = np.exp(interpolated["work"])
+        least = work.min("integrator")
+        default = {
+            name: values.sel(integrator=self.default) for name, values in interpolated.items()
+        }
+        known = work.notnull().any("integrator")
+        cheapest = work.fillna(np.inf).argmin("integrator")
+        note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"
+        relative = work / np.exp(default["work"])
+        result = {
+            "integrator": xr.DataArray(names, dims="n")[cheapest].where(known, "none"),
+            "work": least,
+            "default_work": np.exp(default["work"]),
+            "default_time": np.exp(default["default_time"]),
+            "default_request": default["default_request"],
+            "ratio": np.exp(default["work"]) / least,
+        }
+        result = {k: v.drop_vars("integrator", errors="ignore") for k, v in result.items()}
+        result["relative"] = relative.drop_vars("integrator").assign_coords(
+            integrator=dataset["integrator"]
+        )
+        return xr.Dataset(
+            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in result.items()}
+        )
+
+
+def _at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Values at the first run from which on all reach the digits wanted; NaN where none does."""
+    known = np.isfinite(achieved) & np.isfinite(values)
+    achieved, values = achieved[known], values[known]
+    if achieved.size == 0:
+        return np.full(wanted.shape, np.nan)
+    # digits that a loose request reaches by luck do not count, only those all tighter ones reach
+    kept = np.minimum.accumulate(achieved[::-1])[::-1]
+    return np.array([_first(kept, values, digits) for digits in wanted])
+
+
+def _first(kept: np.ndarray, values: np.ndarray, digits: float) -> float:
+    reached = np.flatnonzero(kept >= digits)
+    if reached.size == 0:
+        return float("nan")
+    first = int(reached[0])
+    if first == 0 or kept[first] == kept[first - 1]:
+        return float(values[first])
+    share = (digits - kept[first - 1]) / (kept[first] - kept[first - 1])
+    return float(values[first - 1] + share * (values[first] - values[first - 1]))

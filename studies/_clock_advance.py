@@ -1,0 +1,261 @@
+"""Clock advance of the next event by a train of waves: as measured, and by two theories."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from rsfstudy import Scene, Segment
+from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.return_map import ReturnMap
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event, Watch, rise
+from rsfstudy.motion.meter import Meter
+from rsfstudy.quantity import Output
+from rsfstudy.slider.loading.oscillation import Oscillation
+from rsfstudy.slider.point import Point
+from rsfstudy.status import Status
+
+#: Displacement step in D_c that sets free motion off, and most events until its cycle repeats.
+NUDGE, EVENTS = 0.1, 300
+#: Part of the accuracy asked for to which two runs may agree by chance.
+_BY_CHANCE = 0.06
+#: ln(V/V_*) beyond which what is left of the time to an event is nothing: exp(-9) D_c/V_*.
+FAST = 9.0
+#: Times at which Coulomb stress is looked at.
+TIMES = 2001
+INTERVAL = "recurrence_interval"
+#: Laws of which there are linear equations here.
+LAWS = ("slip", "slowness")
+
+_OUTPUTS = (
+    Output(
+        "clock_advance",
+        r"$\Delta t\,V_*/D_c$",
+        "1",
+        "time by which the next event comes earlier",
+        "D_c/V_*",
+        error=True,
+    ),
+    Output(
+        "linear_clock_advance",
+        r"$\Delta t\,V_*/D_c$",
+        "1",
+        "the same by the equations linear in departures from the free cycle",
+        "D_c/V_*",
+    ),
+    Output(
+        "coulomb_clock_advance",
+        r"$\Delta t\,V_*/D_c$",
+        "1",
+        "the same of an event that comes as soon as shear stress over normal stress reaches what "
+        "it is at the onset of a free one",
+        "D_c/V_*",
+    ),
+    Output("linear_ratio", "", "1", "clock advance over that of the linear equations"),
+    Output("coulomb_ratio", "", "1", "clock advance over that by a threshold of Coulomb stress"),
+    Output("recurrence_interval", error=True),
+)
+
+
+@dataclass(frozen=True)
+class ClockAdvance(Measure):
+    """Time by which a train of waves makes the next event of stick-slip come earlier.
+
+    An event comes as the slip rate reaches the instability norm. The train begins at a part
+    `cycle_phase` of the interval from one event to the next, whatever the scene says of its begin.
+    """
+
+    cycle_phase: float = 0.5
+    name: ClassVar[str] = "clock_advance"
+    headline = "clock_advance"
+    typical_work = 60_000
+    outputs = _OUTPUTS
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.cycle_phase < 1.0:
+            raise InvalidValue("cycle_phase", self.cycle_phase, "must lie between 0 and 1")
+
+    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """From a free cycle, and once more with smaller tolerances for the errors."""
+        if not isinstance(scene.parts.loading, Oscillation):
+            return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
+        runs = [self._next(scene, how, meter) for how in (accuracy, accuracy.refined())]
+        one, again = runs
+        if one is None or again is None:
+            why = "the motion settles to steady sliding"
+            return Outcome(Status.NO_LIMIT_CYCLE, message=why)
+        chance = _BY_CHANCE * accuracy.rtol
+        errors = {
+            f"{name}_error": error_between(getattr(one, name), getattr(again, name), chance, scale)
+            for name, scale in (("clock_advance", one.recurrence_interval), (INTERVAL, None))
+        }
+        values = {
+            "clock_advance": one.clock_advance,
+            INTERVAL: one.recurrence_interval,
+            "linear_clock_advance": _linear(scene, one, meter),
+            "coulomb_clock_advance": _coulomb(scene, one),
+        }
+        ratios = {
+            f"{by}_ratio": one.clock_advance / (values[f"{by}_clock_advance"] or math.nan)
+            for by in ("linear", "coulomb")
+        }
+        return Outcome(Status.OK, {**values, **ratios, **errors})
+
+    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Both are differences of times."""
+        return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
+
+    def _next(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> "_Next | None":
+        """The next event after a train comes; None where there is no stick-slip."""
+        free = scene.under(Segment(scene.load_velocity))
+        cycle = _cycle(free, accuracy, meter)
+        if cycle is None:
+            return None
+        start, (first, second) = cycle
+        begins = first + self.cycle_phase * (second - first)
+        *_earlier, begin = follow(free, accuracy, meter, start=start, until=begins)
+        forced, watches = scene.with_(oscillation_begin=begins), _watches(scene)
+        (comes,) = _events(follow(forced, accuracy, meter, watches, since=begin), 1)
+        onset = start.coefficient
+        return _Next(second - first, second - comes, second - begins, begin.point, onset)
+
+
+class _Next(NamedTuple):
+    """The next event after a train comes.
+
+    Attributes
+    ----------
+    recurrence_interval, clock_advance : float
+    left : float
+        Time from the beginning of the train to the free event.
+    begin : Point
+        What the slider does as the train begins.
+    onset : float
+        Friction coefficient where V rises through V_0 before a free event.
+    """
+
+    recurrence_interval: float
+    clock_advance: float
+    left: float
+    begin: Point
+    onset: float
+
+
+def _cycle(
+    free: Scene, accuracy: Accuracy, meter: Meter
+) -> tuple[Point, tuple[float, float]] | None:
+    """A free cycle: where it begins, with V at V_0, and times of two events from there; None where
+    the motion settles to steady sliding.
+    """
+    nudged = free.under(Segment(free.load_velocity, NUDGE))
+    approach = Approach(nudged, accuracy, meter)
+    if not approach.follow(EVENTS):
+        return None
+    start = ReturnMap(free, accuracy, meter).point(approach.orbit.begin)
+    motion = follow(free, accuracy, meter, _watches(free), start=start, clock=True)
+    first, second = _events(motion, 2)
+    return start, (first, second)
+
+
+def _watches(scene: Scene) -> list[Watch]:
+    """An event comes as the slip rate reaches the instability norm."""
+    return [rise("log_rate", scene.log_norm_rate)]
+
+
+def _events(motion: Iterator[Event], count: int) -> list[float]:
+    """Times of the first events of a motion that was asked for nothing else."""
+    return list(islice((event.time for event in motion if event.watch is not None), count))
+
+
+def _train(scene: Scene) -> Callable[[float], float]:
+    """Change of normal stress over sigma_*, against time since the train begins."""
+    loading = scene.parts.loading
+    assert isinstance(loading, Oscillation)
+    amplitude, angle, lasts = loading.oscillation_amplitude, loading.angle, loading.lasts
+    turn = 2.0 * math.pi / loading.oscillation_period
+
+    def train(time: float) -> float:
+        return amplitude * math.sin(turn * time + angle) if 0.0 <= time < lasts else 0.0
+
+    return train
+
+
+def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
+    """Clock advance to first order in the amplitude; NaN of scenes with other equations than these.
+    Departures of spring stress f and state Psi from the free motion grow along it by
+
+        a dx = df - dPsi - (mu_* + f) dsigma,    df/dt = -K V dx,
+        dPsi/dt = -V [(Psi + b x) dx + dPsi + b dx]            (slip law),
+        dPsi/dt = -exp(-Psi/b) dPsi - b V dx                   (slowness law);
+
+    once slip rate grows by itself, the motion is the free one of an earlier time, dx = Dt dx/dt.
+    """
+    damps = scene.parts.dynamics.damping(0.0)
+    if scene.law not in LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
+        return math.nan
+    a, b, mu_star, stiffness = scene.a, scene.b, scene.mu_star, scene.stiffness
+    amplitude, slip_law, train = scene.oscillation_amplitude, scene.law == "slip", _train(scene)
+
+    def along(t: float, y: np.ndarray, pressed: float) -> tuple[float, float, list[float]]:
+        f, psi, df, dpsi = y
+        x, dx = (f - psi) / a, (df - dpsi - (mu_star + f) * pressed) / a
+        v = math.exp(x)
+        if slip_law:
+            lag = psi + b * x
+            healing = -v * lag, -v * (lag * dx + dpsi + b * dx)
+        else:
+            fresh = math.exp(-psi / b)
+            healing = b * (fresh - v), -fresh * dpsi - b * v * dx
+        growth = stiffness * (scene.load_velocity - v), -stiffness * v * dx
+        rates = [growth[0], healing[0], growth[1], healing[1]]
+        return (rates[0] - rates[1]) / a, dx, rates
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        return along(t, y, train(t) / amplitude)[-1]
+
+    def fast(t: float, y: np.ndarray) -> float:
+        return float((y[0] - y[1]) / a - FAST)
+
+    setattr(fast, "terminal", True)  # noqa: B010  # as SciPy asks for it
+    latest = 2.0 * found.left
+    over = min((scene.oscillation_cycles or math.inf) * scene.oscillation_period, latest)
+    y: Any = [found.begin.spring, found.begin.psis[0], 0.0, 0.0]
+    # no step is longer than part of a wave
+    for begin, end, longest in (
+        (0.0, over, scene.oscillation_period / 8.0),
+        (over, latest, latest),
+    ):
+        steps = {"rtol": 1e-7, "atol": 1e-10, "max_step": longest}
+        run = solve_ivp(rate, (begin, end), y, "DOP853", events=fast, **steps)
+        meter.charge("linear", run.nfev)
+        y = run.y[:, -1]
+        if run.status == 1:
+            break
+    growth, dx, _rates = along(run.t[-1], y, 0.0)
+    return float(amplitude * dx / growth)
+
+
+def _coulomb(scene: Scene, found: _Next) -> float:
+    """Clock advance where the spring is loaded at K V_0, and an event comes as soon as friction is
+    what it is at the onset of a free one: K V_0 (t - t_1) = mu dsigma/sigma_*.
+    """
+    loading = scene.stiffness * scene.load_velocity
+    latest = found.left + found.onset * scene.oscillation_amplitude / loading
+
+    train = _train(scene)
+
+    def missing(time: float) -> float:
+        return found.onset * train(time) - loading * (time - found.left)
+
+    times = np.linspace(0.0, 1.01 * latest, TIMES).tolist()
+    first = next(place for place, time in enumerate(times) if missing(time) <= 0.0)
+    return found.left - float(brentq(missing, times[first - 1], times[first]))
