@@ -9,7 +9,6 @@ that decide which numbers it gives.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -18,24 +17,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.accuracy import (
-    DEFAULT_RTOL,
-    LOOSEST_RTOL,
-    MUCH_WORSE,
-    TIGHTEST_RTOL,
-    Accuracy,
-    relative_work,
-)
+from rsfstudy.measures import _checks
+from rsfstudy.measures._checks import Plain
+from rsfstudy.measures._checks import Value as Value
+from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, relative_work
 from rsfstudy.motion.meter import Halt, Meter, more_work
-from rsfstudy.quantity import Output, Quantity, is_name
+from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.registry import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
-
-Value = float | np.ndarray
-#: What an axis can hold.
-Plain = int | float | str | bool
 
 
 @dataclass(frozen=True)
@@ -179,7 +170,7 @@ class Measure:
                 rule = f"is no number, flag or text of the measure {self.name}"
                 raise InvalidValue("field", name, rule, choices=present)
             whole = type(present[name]) is int and annotated[name] not in (float, "float")
-            changes[name] = _alike(name, value, present[name], whole)
+            changes[name] = _checks.alike(name, value, present[name], whole)
         try:
             return replace(self, **changes)
         except InvalidValue:
@@ -204,65 +195,17 @@ class Measure:
     def check(self) -> None:
         """Raise InvalidValue where the measure declares what no lattice can hold."""
         try:
-            self._check_names()
-            for name, values in self.inner_coordinates.items():
-                _check_coordinate(name, values)
-            self._check_cost()
-            self._check_description()
+            for name in ("__call__", "charged", "metered"):
+                if getattr(type(self), name) is not getattr(Measure, name):
+                    rule = f"has a {name} of its own"
+                    remedy = "Write find: what it gives is checked."
+                    raise InvalidValue("measure", self.name, rule, remedy=remedy)
+            _checks.check(self, TAKEN)
         except InvalidValue:
             raise
         except Exception as error:
             rule = f"declares what no lattice can hold ({type(error).__name__}: {error})"
             raise InvalidValue("measure", type(self).__name__, rule) from error
-
-    def _check_names(self) -> None:
-        for name in ("__call__", "charged", "metered"):
-            if getattr(type(self), name) is not getattr(Measure, name):
-                rule, remedy = f"has a {name} of its own", "Write find: what it gives is checked."
-                raise InvalidValue("measure", self.name, rule, remedy=remedy)
-        stated = [name for about in self.outputs for name in about.names]
-        names = [*(stated or self.variables), *self.inner_coordinates]
-        if not self.variables:
-            raise InvalidValue("variables", {}, f"must name a number, in measure {self.name}")
-        if self.headline not in self.variables:
-            raise InvalidValue("headline", self.headline, "is not measured", choices=self.variables)
-        for name in names:
-            if not is_name(name) or name in TAKEN - {*self.sought} or names.count(name) > 1:
-                rule = f"names something else, or nothing, in measure {self.name}"
-                raise InvalidValue("variable", name, rule)
-        for name, dims in self.variables.items():
-            if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
-                raise InvalidValue("dimensions", dims, f"of {name!r} must be names, each once")
-            for dim in dims:
-                if dim not in self.inner_coordinates:
-                    raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
-        known = {*names, *self.plain_fields}
-        for about in self.quantities:
-            if not isinstance(about, Quantity) or about.name not in known:
-                odd = about.name if isinstance(about, Quantity) else about
-                raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
-        for name in self.sought:
-            if name not in FIELDS:
-                raise InvalidValue("sought", name, "is not a field of a scene", choices=FIELDS)
-
-    def _check_cost(self) -> None:
-        work: object = self.typical_work
-        if not isinstance(work, int | float) or not 0 < work < np.inf:
-            raise InvalidValue("typical_work", work, "must be a number greater than 0")
-        for rtol in (TIGHTEST_RTOL, DEFAULT_RTOL, LOOSEST_RTOL):
-            expected = self.expected_work(Accuracy(rtol))
-            if not 0 < expected < np.inf:
-                raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {rtol:g}")
-
-    def _check_description(self) -> None:
-        try:
-            name: object = json.loads(json.dumps(self.describe()))["name"]
-        except (TypeError, ValueError) as error:
-            remedy = "Use Python's own numbers and texts, and tuples of them."
-            rule = f"is no plain data ({error})"
-            raise InvalidValue("measure", self.name, rule, remedy=remedy) from error
-        if not isinstance(name, str):
-            raise InvalidValue("name", name, "must be a text, in a measure")
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
         """Measure one scene; a motion that cannot go on becomes its status."""
@@ -289,7 +232,7 @@ class Measure:
                 found = self._held_to(accuracy.rtol, scene, *found[1:])
         except Halt as halt:
             found = halt.status, {}, str(halt)
-        return Outcome(*found, _count(meter.spent)), meter
+        return Outcome(*found, _checks.count(meter.spent)), meter
 
     def _checked(self, outcome: Outcome) -> tuple[Status, Mapping[str, Value], str]:
         """Status, numbers and message of an outcome, if they are as declared; ok without a number
@@ -311,7 +254,8 @@ class Measure:
             raise InvalidValue("measured", outcome, "must say what became of the cell")
         declared, inner = self.variables, self.inner_coordinates
         values = {
-            name: _number(declared, inner, name, value) for name, value in outcome.values.items()
+            name: _checks.number(declared, inner, name, value)
+            for name, value in outcome.values.items()
         }
         if outcome.status is not Status.OK:
             return outcome.status, values, outcome.message
@@ -355,67 +299,3 @@ class Measure:
     def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
         """Fields that are no plain data, taken out of a description that stands at `path`."""
         return {}
-
-
-def _number(
-    declared: Mapping[str, tuple[str, ...]], inner: Mapping[str, np.ndarray], name: str, value: Any
-) -> Value:
-    """A measured number, or an array of them, as NumPy's or Python's own."""
-    if name not in declared:
-        raise InvalidValue("measured", name, "is not declared", choices=declared)
-    if isinstance(value, float) and not declared[name]:
-        return value  # as most are
-    if isinstance(value, np.ma.MaskedArray):
-        raise InvalidValue(name, value, "is masked, and must be a real number")
-    array = np.asarray(value)
-    if array.dtype.kind not in "iufb":
-        raise InvalidValue(name, value, "must be a real number")
-    shape = tuple(len(inner[dim]) for dim in declared[name])
-    if array.shape != shape:
-        rule = f"has the shape {array.shape} and must have {shape}"
-        raise InvalidValue("measured", name, rule)
-    return array if shape else array.item()
-
-
-def _alike(name: str, value: Any, present: Plain, whole: bool) -> Any:
-    """A value of the kind that a field holds at present; axes hold whole numbers as float."""
-    if _kind(value) != _kind(present):
-        raise InvalidValue(name, value, f"must be {_kind(present)}, as {present!r} is")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InvalidValue(name, value, "must be finite")
-    if whole and value != int(value):
-        raise InvalidValue(name, value, "must be a whole number")
-    return int(value) if whole else value
-
-
-def _kind(value: object) -> str:
-    if isinstance(value, bool):
-        return "a flag"
-    if isinstance(value, str):
-        return "a text"
-    return "a number" if isinstance(value, int | float) else "something else"
-
-
-def _check_coordinate(name: str, values: Any) -> None:
-    """Raise InvalidValue for coordinate values that do not tell points apart, or that no file can
-    hold.
-    """
-    array = np.asarray(values)
-    if isinstance(values, np.ma.MaskedArray) or array.ndim != 1 or not array.size:
-        raise InvalidValue(name, values, "must be a list of coordinate values")
-    texts = array.dtype.kind in "OU" and all(isinstance(text, str) for text in array)
-    # no file holds the half and the long floats of NumPy
-    numbers = array.dtype.kind in "iufb" and array.dtype.char not in "eg"
-    if texts:
-        texts = "\0" not in "".join(array).encode().decode()
-    if not texts and not (numbers and np.isfinite(array).all()):
-        raise InvalidValue(name, values, "must be finite numbers, or texts, on an inner dimension")
-    if len(set(array.tolist())) < array.size:
-        raise InvalidValue(name, values, "has a value that stands twice on its inner dimension")
-
-
-def _count(spent: Any) -> int:
-    """Right-hand sides as a file can hold them."""
-    if not isinstance(spent, int | np.integer) or not 0 <= spent < 2**63:
-        raise InvalidValue("rhs_evaluations", spent, "must be a whole number from 0 to 2**63 - 1")
-    return int(spent)

@@ -11,8 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import errors_of
-from rsfstudy.measures._recorded import Recorded, recorded
+from rsfstudy.measures._records import Recorded, errors_of, recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling

@@ -26,7 +26,7 @@ from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
 from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._recorded import Recorded, recorded
+from rsfstudy.measures._records import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, error_between
 from rsfstudy.motion.meter import Halt, Meter

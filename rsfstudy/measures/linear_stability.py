@@ -113,6 +113,8 @@ class LinearStability(Measure):
         if massless == math.inf:
             why = "with this friction a perturbation grows without mass or damping too"
             return Outcome(Status.UNSTABLE_AT_ANY_STIFFNESS, values, why)
+        at_reference = scene.critical_stiffness
+        relative = critical / at_reference if at_reference else math.inf
         rise = critical / massless - 1.0 if massless else math.inf
         if rise > _LARGEST_RISE:
             norm = scene.dynamics.norm(scene, load)
@@ -132,15 +134,11 @@ class LinearStability(Measure):
                 "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": by_growth,
                 "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
-                "relative_critical_stiffness": _over(critical, scene.critical_stiffness),
+                "relative_critical_stiffness": relative,
                 "rise_by_dynamics": rise,
                 **values,
             },
         )
-
-
-def _over(stiffness: float, at_reference: float) -> float:
-    return stiffness / at_reference if at_reference else math.inf
 
 
 def _explicit(scene: Scene) -> float:

@@ -12,8 +12,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import KEPT, errors_of
-from rsfstudy.measures._recorded import Recorded, recorded
+from rsfstudy.measures._records import KEPT, Recorded, errors_of, recorded
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
@@ -31,8 +30,7 @@ from rsfstudy.status import Status
 _LEFT = 0.1
 #: Most periods of forcing after which a response that repeats itself is told as one; how many it is
 #: looked at for, at the end of the transient, and at how many instants in each.
-_LONGEST = 4
-_LOOKED_AT, _INSTANTS = 2 * _LONGEST, 4
+_LONGEST, _LOOKED_AT, _INSTANTS = 4, 8, 4
 #: How often it is looked at before it is said to repeat nothing, and how many times as many
 #: instants as are kept are looked at to resolve it.
 _PATIENCE, _FINEST = 6, 8
@@ -243,15 +241,15 @@ class NormalStressResponse(Recorded):
         period = loading.oscillation_period
         frequency = 2.0 * math.pi / period
         linear = response_to_normal_stress(scene, scene.log_load_rate, frequency)
+        by_theory = {"linear_gain": abs(linear), "linear_phase_lead": _degrees(linear)}
         fold = 1.0 / decay / period
         # looked at once the transient would not be taken for a response, and until it is over
         faint, over = (-math.log(_LEFT * part) * fold for part in (_SAME, accuracy.rtol))
         waits = math.ceil(max(faint, over - _LOOKED_AT))
         start, repeats = self._repeats(scene, waits, accuracy, meter)
         if not repeats:
-            beside = {"linear_gain": abs(linear), "linear_phase_lead": _degrees(linear)}
             why = f"it repeats itself after none of 1 to {_LONGEST} periods of forcing"
-            return Outcome(Status.NOT_PERIODIC, {**beside, "settled": 0.0}, why)
+            return Outcome(Status.NOT_PERIODIC, {**by_theory, "settled": 0.0}, why)
         way = _Way(period * repeats, repeats, fold / repeats)
         first, last = self._resolved(scene, start, way, accuracy, meter)
         finer, instants = accuracy.refined(), len(last.spring)
@@ -259,15 +257,11 @@ class NormalStressResponse(Recorded):
         _first, again = self._follow(scene, start, way, instants, finer, meter)
         moved = abs(last.response / first.response - 1.0)
         values = _read(last, linear)
-        others = {
-            "linear_gain": abs(linear),
-            "linear_phase_lead": _degrees(linear),
-            "response_period": float(repeats),
-            "settled": float(same == repeats and last.is_as(first)),
-        }
-        errors = _errors(values, linear, last, again, moved, (scene, accuracy))
+        values |= _errors(values, linear, last, again, moved, (scene, accuracy)) | by_theory
+        values["response_period"] = float(repeats)
+        values["settled"] = float(same == repeats and last.is_as(first))
         shown = _shown(scene, last.events[:: instants // self.samples])
-        return Outcome(Status.OK, {**values, **errors, **others, **shown})
+        return Outcome(Status.OK, {**values, **shown})
 
     def _repeats(
         self, scene: Scene, waits: int, accuracy: Accuracy, meter: Meter

@@ -13,7 +13,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._reading import errors_of
+from rsfstudy.measures._records import error_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.events import Kind, fall, rise
@@ -134,13 +134,7 @@ class RigidResponse(Measure):
             Status.OK,
             {
                 "evolution_distance": distance,
-                **errors_of(
-                    {"evolution_distance": distance},
-                    {"evolution_distance": again},
-                    {"evolution_distance": by_friction},
-                    scene,
-                    accuracy,
-                ),
+                "evolution_distance_error": error_of(distance, again, by_friction, scene, accuracy),
                 "direct_stress_change": start,
                 **_asymmetry(scene, log_rate),
                 "steady_stress_change": steady,

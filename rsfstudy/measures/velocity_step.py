@@ -11,8 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._reading import errors_of
-from rsfstudy.measures._recorded import Recorded, recorded
+from rsfstudy.measures._records import Recorded, errors_of, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -203,16 +202,8 @@ class VelocityStep(Recorded):
     def _follow(self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter) -> _Record:
         turn, recording = _turn(scene, step), Recording()
         begun: list[Event] = []
-        peak = None
-        moving = follow(
-            scene,
-            accuracy,
-            meter,
-            [turn],
-            recording=recording,
-            until=step.start_time + step.duration,
-        )
-        for event in moving:
+        peak, end = None, step.start_time + step.duration
+        for event in follow(scene, accuracy, meter, [turn], recording=recording, until=end):
             if event.kind in (Kind.START, Kind.SEGMENT):
                 begun.append(event)
             elif event.watch == turn and len(begun) == self.step_number and peak is None:
