@@ -11,82 +11,57 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rsfstudy.api.events import events
-    from rsfstudy.api.fitting import fit
-    from rsfstudy.api.one_scene import critical_step, limit_cycle, to_si
-    from rsfstudy.api.report import report
-    from rsfstudy.api.runs import cell, check, compare, open, plot, rerun, run, studies
-    from rsfstudy.api.trajectory import simulate
-    from rsfstudy.declare.axis import Axis
-    from rsfstudy.declare.study import Study
-    from rsfstudy.plots._motion import picture
-    from rsfstudy.rig.history import history
-    from rsfstudy.rig.laboratory import Laboratory
-    from rsfstudy.rig.protocol_file import read_protocol
-    from rsfstudy.rig.records import read_record
-    from rsfstudy.rig.table import read_table
-    from rsfstudy.slider.loading import Segment
-    from rsfstudy.slider.protocol import protocol
-    from rsfstudy.slider.scene import Scene
+    from rsfstudy.api.events import events as events
+    from rsfstudy.api.fitting import fit as fit
+    from rsfstudy.api.one_scene import critical_step as critical_step
+    from rsfstudy.api.one_scene import limit_cycle as limit_cycle
+    from rsfstudy.api.one_scene import to_si as to_si
+    from rsfstudy.api.report import report as report
+    from rsfstudy.api.runs import cell as cell
+    from rsfstudy.api.runs import check as check
+    from rsfstudy.api.runs import compare as compare
+    from rsfstudy.api.runs import open as open
+    from rsfstudy.api.runs import plot as plot
+    from rsfstudy.api.runs import rerun as rerun
+    from rsfstudy.api.runs import run as run
+    from rsfstudy.api.runs import studies as studies
+    from rsfstudy.api.trajectory import simulate as simulate
+    from rsfstudy.declare.axis import Axis as Axis
+    from rsfstudy.declare.study import Study as Study
+    from rsfstudy.plots._motion import picture as picture
+    from rsfstudy.rig.history import history as history
+    from rsfstudy.rig.laboratory import Laboratory as Laboratory
+    from rsfstudy.rig.protocol_file import read_protocol as read_protocol
+    from rsfstudy.rig.records import read_record as read_record
+    from rsfstudy.rig.table import read_table as read_table
+    from rsfstudy.slider.loading import Segment as Segment
+    from rsfstudy.slider.protocol import protocol as protocol
+    from rsfstudy.slider.scene import Scene as Scene
 
-# loaded on first use, so that a worker does not import what only its driver needs
-_HOMES = {
-    "Scene": "slider.scene",
-    "Segment": "slider.loading",
-    "protocol": "slider.protocol",
-    "Laboratory": "rig.laboratory",
-    "read_protocol": "rig.protocol_file",
-    "read_record": "rig.records",
-    "read_table": "rig.table",
-    "fit": "api.fitting",
-    "history": "rig.history",
-    "picture": "plots._motion",
-    "Study": "declare.study",
-    "Axis": "declare.axis",
-    "run": "api.runs",
-    "rerun": "api.runs",
-    "cell": "api.runs",
-    "open": "api.runs",
-    "check": "api.runs",
-    "compare": "api.runs",
-    "report": "api.report",
-    "plot": "api.runs",
-    "studies": "api.runs",
-    "simulate": "api.trajectory",
-    "critical_step": "api.one_scene",
-    "limit_cycle": "api.one_scene",
-    "to_si": "api.one_scene",
-    "events": "api.events",
+#: What each module gives. It is loaded on first use, so that a worker does not import what only its
+#: driver needs.
+_GIVEN = {
+    "slider.scene": ("Scene",),
+    "slider.loading": ("Segment",),
+    "slider.protocol": ("protocol",),
+    "rig.laboratory": ("Laboratory",),
+    "rig.protocol_file": ("read_protocol",),
+    "rig.records": ("read_record",),
+    "rig.table": ("read_table",),
+    "api.fitting": ("fit",),
+    "rig.history": ("history",),
+    "plots._motion": ("picture",),
+    "declare.study": ("Study",),
+    "declare.axis": ("Axis",),
+    "api.runs": ("run", "rerun", "cell", "open", "check", "compare", "plot", "studies"),
+    "api.report": ("report",),
+    "api.trajectory": ("simulate",),
+    "api.one_scene": ("critical_step", "limit_cycle", "to_si"),
+    "api.events": ("events",),
 }
+_HOMES = {name: module for module, names in _GIVEN.items() for name in names}
 
-__all__ = [
-    "Axis",
-    "Laboratory",
-    "Scene",
-    "Segment",
-    "Study",
-    "cell",
-    "check",
-    "compare",
-    "critical_step",
-    "events",
-    "fit",
-    "history",
-    "limit_cycle",
-    "open",
-    "picture",
-    "plot",
-    "protocol",
-    "read_protocol",
-    "read_record",
-    "read_table",
-    "report",
-    "rerun",
-    "run",
-    "simulate",
-    "studies",
-    "to_si",
-]
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
@@ -98,4 +73,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__
