@@ -15,6 +15,9 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue
 
+#: A heading of a table.
+_HEADING = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -91,6 +94,12 @@ class Output(Quantity):
 def is_name(name: object) -> bool:
     """True if a text can name a variable: an identifier, as a file gives it back."""
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
+
+
+def headed(text: str) -> tuple[str, str] | None:
+    """Name and units that a heading such as ``velocity (um/s)`` states; None of another text."""
+    match = _HEADING.fullmatch(text.strip())
+    return (match[1], match[2].strip()) if match else None
 
 
 # ---- tables, as notebooks show them --------------------------------------------------------------

@@ -167,6 +167,7 @@ def _with_units(tmp_path):
     micrometres = {"slip_distance": "um"}
     return [
         RIG.axis("case", rsfstudy.read_table(tmp_path / "cases.csv")),
+        Axis.cases(pd.read_csv(tmp_path / "cases.csv")),
         RIG.axis("case", frame),
         RIG.axis("case", dataset),
         RIG.axis("case", columns, micrometres),
@@ -304,6 +305,8 @@ def test_what_is_no_table():
         ),
         (xr.Dataset({"a": (("x", "y"), np.ones((2, 2)))}), "a = .*: must be one list"),
         ({"a": 0.01}, "a = 0.01: must be one list"),
+        ({"a": [0.01], "a (1)": [0.01]}, "column = 'a': stands twice"),
+        (xr.Dataset({"a (1)": ("x", [0.01], {"units": "um"})}), "units = 'um': are not those of"),
         ({"a": [[0.01], [0.01, 0.02]]}, r"a = \[0.01\]: must be a number, a flag or a text"),
         ({"case": [1.0, 2.0]}, "column = 'case': must be named"),
     ):

@@ -147,7 +147,7 @@ class Axis:
         table : mapping of str to sequence, DataFrame or Dataset
             Columns by their names, or what `rsfstudy.read_table` read. Units that it states count:
             those of a CSV file, of the attribute ``units`` of a variable, or of that of a
-            DataFrame, which maps columns to them.
+            DataFrame, which maps columns to them; and of names such as ``slip_distance (um)``.
         fields, units, dimension
             As in `samples`.
         """

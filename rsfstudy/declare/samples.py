@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from rsfstudy.declare.wording import is_list
 from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import headed
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.
 SetBy = str | Callable[[Mapping[str, np.ndarray]], Any]
@@ -193,17 +193,23 @@ def columns_of(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
         rule = "is no table of columns"
         remedy = "Give a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
-    found, units = {}, {}
+    found: dict[str, Any] = {}
+    units: dict[str, str] = {}
     # the keys of an xarray.Dataset are its data variables
     for key in getattr(table, "data_vars", table):
-        name, column = str(key), table[key]
+        heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
-        stated = stated.get(name, "") if isinstance(stated, Mapping) else stated
+        stated = stated.get(heading, "") if isinstance(stated, Mapping) else stated
+        name, of_heading = headed(heading) or (heading, "")
+        if name in found:
+            raise InvalidValue("column", name, "stands twice in the table")
+        if stated and of_heading and stated != of_heading:
+            raise InvalidValue("units", stated, f"are not those of the heading, {heading}")
         values = getattr(column, "values", column)
         values = np.asarray(values) if hasattr(values, "dtype") else values
-        if not is_list(values):
+        if np.ndim(np.asarray(values, dtype=object)) != 1:
             raise InvalidValue(name, column, "must be one list, of a value for each row")
-        found[name] = list(values)
+        found[name], stated = list(values), stated or of_heading
         if stated not in ("", "1"):
             units[name] = stated
     return found, units

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -14,9 +13,9 @@ import numpy as np
 
 from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.quantity import headed
 from rsfstudy.rig.units import number
 
-_HEADER = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 #: What numbers without surprises are made of.
 _PLAIN = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE = "velocity (um/s), distance (um), a (1)"
@@ -140,14 +139,15 @@ def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:
     """Name, heading and units of each column, by a header that states them."""
     found: dict[str, tuple[str, str]] = {}
     for n, heading in enumerate(headings, start=1):
-        match = _HEADER.fullmatch(heading)
-        if not match:
+        stated = headed(heading)
+        if stated is None:
             remedy = f"Write the header as in {_EXAMPLE}."
             rule = "names no column with its units"
             raise InvalidValue("header", heading, rule, remedy=remedy).at(f"{place}, column {n}")
-        if match[1] in found:
-            raise InvalidValue("column", match[1], "stands twice in the header").at(place)
-        found[match[1]] = heading, match[2].strip()
+        name, units = stated
+        if name in found:
+            raise InvalidValue("column", name, "stands twice in the header").at(place)
+        found[name] = heading, units
     return found
 
 
