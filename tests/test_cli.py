@@ -335,8 +335,10 @@ def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
     words = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100}
     settings = [word for name, value in words.items() for word in ("--set", f"{name}={value}")]
     least = ("--duration", duration, "--budget", budget, "--engine", "compiled")
+    least += ("--quiet",) * (status == 1)
     ran = call("simulate", *settings, *least, "--output", tmp_path / "motion.png")
     assert ran.returncode == status
+    assert ("peak friction" in ran.stdout) is (status != 1)
     assert said in ran.stderr
     assert ("budget" in ran.stdout) is (status == 1)
     assert len(ran.stderr.splitlines()) == (status == 3)

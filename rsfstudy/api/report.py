@@ -20,7 +20,7 @@ import xarray as xr
 from rsfstudy.api import fit_tables, runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
-from rsfstudy.declare.wording import settings, short
+from rsfstudy.declare.wording import settings, stated
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
@@ -187,11 +187,10 @@ def _of_a_scene(answer: xr.Dataset) -> dict[str, str]:
     """What is told of a motion, or of another answer for one scene."""
     about = answer.attrs
     numbers = {n: v for n, v in answer.data_vars.items() if not v.dims and v.dtype.kind in "fiu"}
-    stated = {n: short(v) for n, v in answer.rsf.scene.as_dict().items() if v is not None}
     return {
         "status": f"{about['status']} {about.get('message', '')}".strip(),
         **{str(name): f"{value.item():.8g}" for name, value in numbers.items()},
-        "scene": ", ".join(f"{name} = {value}" for name, value in stated.items()),
+        "scene": stated(answer.rsf.scene.as_dict()),
         "made by": about.get("history", "unknown"),
         "with": about.get("source", "unknown"),
     }

@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
-from rsfstudy.declare.wording import listed, short
+from rsfstudy.declare.wording import listed, short, stated
 from rsfstudy.files import contents, numbers
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import Status
@@ -214,7 +214,7 @@ def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[str, Any]]]:
         place = {str(d): cell[d].item() for d in failed.dims}
         places.append(place)
         rows.append({
-            "cell": ", ".join(f"{name} = {short(value)}" for name, value in place.items()),
+            "cell": stated(place),
             "status": _LABELS[int(cell["status"])],
             "message": str(cell["message"].item()),
         })  # fmt: skip

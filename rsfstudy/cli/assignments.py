@@ -67,6 +67,19 @@ def place(text: str) -> tuple[str, str]:
     return name, value
 
 
+def fields(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Fields of a scene that ``--set`` states."""
+    found: dict[str, Any] = {}
+    for text in settings:
+        name, equals, given = (part.strip() for part in text.partition("="))
+        if not (name and equals and given):
+            raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
+        if name in found:
+            raise InvalidValue("--set", text, f"sets {name} twice")
+        found[name] = value(given)
+    return found
+
+
 def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
     start:stop:count:log.

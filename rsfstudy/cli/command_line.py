@@ -58,7 +58,7 @@ class InOrder(click.Group):
 
 @click.group(
     cls=InOrder,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="To begin with: rsfstudy list, then rsfstudy show NAME, then rsfstudy run NAME. "
     "Each command has a --help of its own.",
 )
@@ -189,7 +189,6 @@ def show(**given: Any) -> int:
     "--format",
     type=click.Choice(FORMATS),
     default=FORMATS[0],
-    show_default=True,
     help="One NetCDF file, or a Zarr store written in pieces, which never replaces another.",
 )
 @options.figure

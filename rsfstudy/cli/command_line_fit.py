@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from rsfstudy.defaults import FIT_BUDGET as BUDGET
+from rsfstudy.cli import options
+from rsfstudy.defaults import FIT_BUDGET
 from rsfstudy.motion.engines import ENGINES
 
 
@@ -45,14 +46,12 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     "laws",
     callback=_listed,
     default="slip,slowness",
-    show_default=True,
     help="State evolution laws, a fit by each.",
 )
 @click.option(
     "--free",
     callback=_listed,
     default="a,b,slip_distance,mu_star,trend1",
-    show_default=True,
     help="Parameters to look for; also stiffness, step_time, trend2, alpha and others.",
 )
 @click.option(
@@ -65,6 +64,7 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     "--before",
     callback=_quantity,
     default="0 um",
+    show_default=False,
     help="Load point displacement that is fitted before a step.  [default: half the way back to "
     "the step before]",
 )
@@ -72,27 +72,21 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     "--after",
     callback=_quantity,
     default="0 um",
+    show_default=False,
     help="That after it, as in '250 um'.  [default: up to the next step]",
 )
-@click.option(
-    "--windows",
-    type=click.IntRange(1),
-    metavar="N",
-    default=1,
-    show_default=True,
-    help="Windows, from half of what follows a step to all of it: how parameters differ.",
+@options.count(
+    "--windows", 1, "Windows, from half of what follows a step to all of it: how parameters differ."
 )
 @click.option(
     "--noise",
     default="ar",
-    show_default=True,
     help="white, ar (autoregressive, its order found), or ar1, ar2 and so on.",
 )
 @click.option(
     "--loading",
     type=click.Choice(["steps", "recorded"]),
     default="steps",
-    show_default=True,
     help="The load point by its steps, or as it was recorded.",
 )
 @click.option(
@@ -100,34 +94,18 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     type=click.IntRange(0),
     metavar="N",
     default=0,
+    show_default=False,
     help="Draws from the posterior, by emcee.  [default: none]",
 )
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="A field of the scene that is not looked for, as in a=0.01.",
-)
-@click.option(
-    "--budget",
-    type=click.IntRange(1),
-    metavar="N",
-    default=BUDGET,
-    show_default=True,
-    help="Right-hand sides that a fit may evaluate.",
-)
+@options.fields("A field of the scene that is not looked for, as in a=0.01.")
+@options.count("--budget", FIT_BUDGET, "Right-hand sides that a fit may evaluate.")
 @click.option(
     "--engine",
     type=click.Choice(ENGINES),
     help="What integrates motions.  [default: compiled where Numba is installed, else scipy]",
 )
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    default=Path("fit.png"),
-    show_default=True,
-    help="File of the figure; the data stand beside it as NetCDF.",
+@options.image(
+    "--output", Path("fit.png"), "File of the figure; the data stand beside it as NetCDF."
 )
 def fit(**given: Any) -> int:
     """Fit friction parameters to RECORDS of velocity steps, with honest errors.

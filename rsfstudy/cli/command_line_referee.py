@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from rsfstudy.cli import options
+
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
@@ -36,17 +38,9 @@ def problems(directory: Path) -> int:
     "its header says]",
 )
 @click.option(
-    "--digits",
-    type=click.FloatRange(1.0, 12.0),
-    default=6.0,
-    show_default=True,
-    help="Digits that make a pass.",
+    "--digits", type=click.FloatRange(1.0, 12.0), default=6.0, help="Digits that make a pass."
 )
-@click.option(
-    "--figure",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Draw where they agree, into this .png, .pdf or .svg.",
-)
+@options.image("--figure", None, "Draw where they agree, into this .png, .pdf or .svg.")
 def verify(**given: Any) -> int:
     """Hold answers of another code against those that are known.
 

@@ -13,13 +13,9 @@ from rsfstudy.motion.engines import ENGINES, SCIPY
 
 
 @click.command()
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
-    "a loading from a CSV file, as in loading=record.csv.",
+@options.fields(
+    "A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
+    "a loading from a CSV file, as in loading=record.csv."
 )
 @click.option(
     "--protocol",
@@ -31,23 +27,13 @@ from rsfstudy.motion.engines import ENGINES, SCIPY
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
 @options.against
 @options.rig
-@click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Accuracy.")
-@click.option(
-    "--budget",
-    type=click.IntRange(1),
-    metavar="N",
-    default=DEFAULT_BUDGET,
-    show_default=True,
-    help="Right-hand sides it may evaluate.",
+@click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Accuracy.")
+@options.count("--budget", DEFAULT_BUDGET, "Right-hand sides it may evaluate.")
+@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY)
+@options.image(
+    "--output", Path("motion.png"), "File of the picture; the data stand beside it as NetCDF."
 )
-@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, show_default=True)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    default=Path("motion.png"),
-    show_default=True,
-    help="File of the picture; the data stand beside it as NetCDF.",
-)
+@click.option("--quiet", is_flag=True, help="Say how it ended, and not its peaks and events.")
 def simulate(**given: Any) -> int:
     """Follow one motion of one slider, draw it and write it.
 

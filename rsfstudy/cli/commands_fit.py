@@ -16,7 +16,7 @@ from rsfstudy import plots
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import fit_tables, fitting
 from rsfstudy.api.tables import Table
-from rsfstudy.cli import commands_simulate, layout, terminal
+from rsfstudy.cli import assignments, commands_simulate, layout, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents, store
@@ -36,8 +36,6 @@ def fit(
     **given: Any,
 ) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
-    if output.suffix not in (".png", ".pdf", ".svg"):
-        raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
     data = output.with_suffix(".nc")
     commands_simulate.check_replaceable(data, is_fit, "fit")
     named = _columns(columns)
@@ -49,7 +47,7 @@ def fit(
         steps=[_number(text) for text in steps],
         command=shlex.join(["rsfstudy", *sys.argv[1:]]),
         **given,
-        **commands_simulate.fields(settings),
+        **assignments.fields(settings),
     )
     dataset = store.write(dataset, data)
     plots.save(dataset, output)

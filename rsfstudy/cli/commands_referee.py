@@ -10,7 +10,7 @@ import numpy as np
 
 from rsfstudy.cli import terminal
 from rsfstudy.cli.console import console
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import theirs, writing
 from rsfstudy.referee.problem import Problem, read, shipped
 from rsfstudy.referee.verdict import Verdict, known, verdict
@@ -31,8 +31,6 @@ def verify(
     figure: Path | None,
 ) -> int:
     """Hold files against answers; FAILED where one does not pass."""
-    if figure is not None and figure.suffix not in (".png", ".pdf", ".svg"):
-        raise InvalidValue("--figure", str(figure), "must end in .png, .pdf or .svg")
     mapped = theirs.column_map(columns) if columns else None
     found = [_verdict(file, problem, mapped, digits) for file in files]
     for file, one in zip(files, found, strict=True):
@@ -101,7 +99,7 @@ def _to_quote(found: list[Verdict]) -> str:
 
 def _draw(found: list[Verdict], path: Path) -> None:
     """Digits along the rows of one problem, or by problem."""
-    from rsfstudy.plots import rendered, styled, write_image
+    from rsfstudy.plots import styled
     from rsfstudy.plots._agreement import agreement
 
     digits: dict[str, list[tuple[float, float]]] = {}
@@ -116,9 +114,6 @@ def _draw(found: list[Verdict], path: Path) -> None:
             at = verdict_of.problem.number or number
             for one in verdict_of.agreements:
                 digits.setdefault(one.quantity, []).append((at, one.digits))
-    try:
-        with styled(None):
-            drawn = agreement(digits, label, found[0].enough)
-            write_image(rendered(drawn, path.suffix[1:]), path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error})") from error
+    with styled(None):
+        drawn = agreement(digits, label, found[0].enough)
+    terminal.write_figure(drawn, path)

@@ -18,8 +18,8 @@ from rsfstudy.api.trajectory import simulate as simulated
 from rsfstudy.cli import assignments, terminal, terminal_numbers
 from rsfstudy.cli.console import console
 from rsfstudy.compute import provenance
-from rsfstudy.declare.wording import short
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.declare.wording import stated
+from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
@@ -40,22 +40,21 @@ def simulate(
     budget: int,
     engine: str,
     output: Path,
+    quiet: bool,
     **rig: str | None,
 ) -> int:
     """Follow one motion, draw it and write it."""
-    if output.suffix not in (".png", ".pdf", ".svg"):
-        raise InvalidValue("--output", str(output), "must end in .png, .pdf or .svg")
     check_replaceable(output.with_suffix(".nc"), _is_motion, "motion")
-    stated_fields, velocity = fields(settings), rig.pop("load_velocity")
-    stated = {name: text for name, text in rig.items() if text is not None}
-    laboratory = assignments.laboratory(stated) if stated else None
+    fields, velocity = assignments.fields(settings), rig.pop("load_velocity")
+    of_rig = {name: text for name, text in rig.items() if text is not None}
+    laboratory = assignments.laboratory(of_rig) if of_rig else None
     if velocity is not None:
-        stated_fields["load_velocity"] = assignments.number_or_text(velocity)
-    scene = _scene(stated_fields, protocol_file, laboratory)
+        fields["load_velocity"] = assignments.number_or_text(velocity)
+    scene = _scene(fields, protocol_file, laboratory)
     lasts = None if duration is None else _duration(duration, laboratory)
     motion = simulated(scene, duration=lasts, rtol=rtol, budget=budget, engine=engine)
     motion = motion.assign_attrs(provenance.attributes(shlex.join(["rsfstudy", *sys.argv[1:]])))
-    _write(motion, laboratory, output, against)
+    _write(motion, laboratory, output, against, quiet)
     if motion.attrs["status"] != Status.OK.label:
         return terminal.FAILED
     return _NO_PHYSICS if BEYOND in motion.attrs else terminal.OK
@@ -91,17 +90,21 @@ def _scene(
 
 def _duration(text: str, laboratory: Laboratory | None) -> float:
     """In D_c/V_*."""
-    stated = assignments.number_or_text(text)
+    time = assignments.number_or_text(text)
     if laboratory is not None:
-        return laboratory.dimensionless(stated, name="--duration")
-    if isinstance(stated, str):
+        return laboratory.dimensionless(time, name="--duration")
+    if isinstance(time, str):
         remedy = "Give a number in D_c/V_*, or state the rig too."
-        raise InvalidValue("--duration", stated, "has units, and no rig is stated", remedy=remedy)
-    return stated
+        raise InvalidValue("--duration", time, "has units, and no rig is stated", remedy=remedy)
+    return time
 
 
 def _write(
-    motion: xr.Dataset, laboratory: Laboratory | None, output: Path, against: str | None
+    motion: xr.Dataset,
+    laboratory: Laboratory | None,
+    output: Path,
+    against: str | None,
+    quiet: bool,
 ) -> None:
     """The picture, and the data beside it."""
     data = output.with_suffix(".nc")
@@ -111,11 +114,12 @@ def _write(
         return
     store.write(laboratory.in_units(motion) if laboratory else motion, data)
     draw(motion, output, against, laboratory=laboratory)
-    for tell, of in (
-        (terminal_numbers.record, motion),
-        (terminal_numbers.events, Accessor(motion).events()),
-    ):
-        tell(laboratory.in_units(of, **_UNITS) if laboratory else of)
+    if not quiet:
+        told = [motion, Accessor(motion).events()]
+        if laboratory:
+            told = [laboratory.in_units(of, **_UNITS) for of in told]
+        terminal_numbers.record(told[0])
+        terminal_numbers.events(told[1])
     console.print(f"{said}\nwrote {output} and {data}")
 
 
@@ -127,15 +131,9 @@ def draw(
     laboratory: Laboratory | None = None,
 ) -> None:
     """Draw a motion into a file."""
-    from rsfstudy.plots import rendered, styled, write_image
     from rsfstudy.plots._motion import picture
 
-    drawn = picture(motion, laboratory, against=against)
-    try:
-        with styled(style):
-            write_image(rendered(drawn, path.suffix[1:]), path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error})") from error
+    terminal.write_figure(picture(motion, laboratory, against=against), path, style)
 
 
 def show(answer: xr.Dataset) -> int:
@@ -144,8 +142,7 @@ def show(answer: xr.Dataset) -> int:
     """
     about, ours = answer.attrs, Accessor(answer)
     console.print(about.get("title", "answer for one scene"), style="bold")
-    stated = {name: value for name, value in ours.scene.as_dict().items() if value is not None}
-    console.print(", ".join(f"{name} = {short(value)}" for name, value in stated.items()))
+    console.print(stated(ours.scene.as_dict()))
     made, source = (about.get(name, "unknown") for name in ("history", "source"))
     console.print(f"made by {made}, with {source}")
     if "load_point_displacement" in answer:
@@ -157,16 +154,3 @@ def show(answer: xr.Dataset) -> int:
                 console.print(f"{name} = {values.item()!r}")
     console.print(f"{about['status']} {about['message']}".strip())
     return terminal.OK if about["status"] == Status.OK.label else terminal.FAILED
-
-
-def fields(settings: tuple[str, ...]) -> dict[str, Any]:
-    """Fields of a scene that ``--set`` states."""
-    stated: dict[str, Any] = {}
-    for text in settings:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not (name and equals and value):
-            raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
-        if name in stated:
-            raise InvalidValue("--set", text, f"sets {name} twice")
-        stated[name] = assignments.value(value)
-    return stated

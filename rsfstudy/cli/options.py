@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
+from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 every = click.option("--all", "every", is_flag=True, help="Every named study.")
 
@@ -25,7 +29,6 @@ output = click.option(
     type=click.Path(file_okay=False),
     callback=directory,
     default=OUTPUT,
-    show_default=True,
     help="Directory of the results.",
 )
 drawn = click.option(
@@ -55,21 +58,21 @@ engine = click.option(
     help="What integrates motions; compiled, which needs Numba, is much faster.  "
     "[default: the study's, scipy]",
 )
-budget = click.option(
+
+
+def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
+    """An option that is a whole number, 1 or more."""
+    kind = click.IntRange(1)
+    return click.option(name, type=kind, metavar="N", default=default, help=words)
+
+
+budget = count(
     "--budget",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
+    None,
+    "Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
     "[default: the study's, 500000]",
 )
-workers = click.option(
-    "--workers",
-    type=click.IntRange(1),
-    metavar="N",
-    default=2,
-    show_default=True,
-    help="Worker processes of this machine.",
-)
+workers = count("--workers", 2, "Worker processes of this machine.")
 serial = click.option("--serial", is_flag=True, help="Compute in this process.")
 scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
 time_limit = click.option(
@@ -77,7 +80,6 @@ time_limit = click.option(
     type=float,
     metavar="SECONDS",
     default=TIME_LIMIT,
-    show_default=True,
     help="CPU time after which a worker gives a cell up.",
 )
 study = click.option(
@@ -115,6 +117,27 @@ style = click.option(
     callback=_style,
     help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
 )
+
+
+def _image(_context: click.Context, option: click.Parameter, value: Path | None) -> Path | None:
+    """A file that can be a figure."""
+    if value is not None and value.suffix not in (".png", ".pdf", ".svg"):
+        rule = "must end in .png, .pdf or .svg"
+        raise InvalidValue(option.opts[0], str(value), rule)
+    return value
+
+
+def image(name: str, default: Path | None, words: str) -> Callable[[F], F]:
+    """An option that names the file of a figure."""
+    kind = click.Path(path_type=Path, dir_okay=False)
+    return click.option(name, type=kind, callback=_image, default=default, help=words)
+
+
+def fields(words: str) -> Callable[[F], F]:
+    """The option that sets fields of one scene."""
+    return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=words)
+
+
 figure = click.option(
     "--figure",
     "form",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
@@ -17,12 +17,16 @@ from rsfstudy.cli.console import console, stderr
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.wording import settings, short
+from rsfstudy.declare.wording import settings, stated
+from rsfstudy.errors import DataError
 from rsfstudy.files import contents
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
 from rsfstudy.rig.quantities import STATED
 from rsfstudy.slider.scene import Scene
+
+if TYPE_CHECKING:
+    from rsfstudy.plots import Figure
 
 OK, FAILED = 0, 1
 _MOST_SHOWN = 40
@@ -45,7 +49,7 @@ def declaration(study: Study, output: Path) -> None:
     if study.rig:
         varied |= {name for name, (dims, _values) in study.rig.beside().items() if dims}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    about["fixed"] = ", ".join(f"{n} = {short(v)}" for n, v in fixed.items() if v)
+    about["fixed"] = stated({n: v for n, v in fixed.items() if v})
     about["0 or absent"] = ", ".join(n for n, v in fixed.items() if not v)
     if study.laboratory:
         rig = {n: f"{v:g} {STATED[n][0]}" for n, v in study.laboratory.as_dict().items()}
@@ -181,8 +185,7 @@ def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
     """Print one cell: warnings, its scene, its numbers and how it ended."""
     for text in warned:
         console.print(text, style="yellow")
-    fields = {name: value for name, value in scene.as_dict().items() if value is not None}
-    console.print(", ".join(f"{n} = {short(v)}" for n, v in fields.items()))
+    console.print(stated(scene.as_dict()))
     for name, value in ending.values.items():
         console.print(f"{name} = {value!r}")
     text = f"{ending.status.label}{': ' * bool(ending.message)}{ending.message}"
@@ -278,3 +281,14 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
         for place in places:
             console.print(f"  {tables.reproducing(dataset, file, place)}", soft_wrap=True)
     return FAILED if undone or failed.rows else OK
+
+
+def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
+    """Write a figure into a file, which `DataError` names where it cannot be written."""
+    from rsfstudy.plots import rendered, styled, write_image
+
+    try:
+        with styled(style):
+            write_image(rendered(drawn, path.suffix[1:]), path)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error})") from error

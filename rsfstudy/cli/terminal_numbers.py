@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.api.tables import MOST_CELLS, Table, number
 from rsfstudy.cli import layout
 from rsfstudy.cli.console import console
-from rsfstudy.declare.wording import listed, short
+from rsfstudy.declare.wording import listed, short, stated
 from rsfstudy.errors import brief
 from rsfstudy.files.comparison import Comparison
 from rsfstudy.files.contents import provenance
@@ -77,7 +77,7 @@ def _ends(statuses: pd.DataFrame) -> None:
     rows = []
     for row in statuses[:_MOST_ENDS].to_dict("records"):
         *place, (_, first), (_, second) = row.items()
-        cell = ", ".join(f"{n} = {short(v)}" for n, v in place)
+        cell = stated({str(name): value for name, value in place})
         rows.append({"cell": cell, "A": first, "B": second})
     layout.show(Table(rows, prose={"cell"}))
     if len(statuses) > _MOST_ENDS:

@@ -35,3 +35,8 @@ def listed(values: Sequence[Any], between: str = ",") -> str:
 def short(value: Any) -> str:
     """A value with the digits a reader wants."""
     return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def stated(fields: Mapping[str, Any]) -> str:
+    """Fields that have a value, with it."""
+    return ", ".join(f"{n} = {short(value)}" for n, value in fields.items() if value is not None)
