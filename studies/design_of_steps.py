@@ -32,7 +32,7 @@ MACHINES = (1e-3, 3e-3)
 
 def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
     """Standard errors promised for each design, by parameter."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import look, marker, name_rows
 
     promised = dataset["promised_spread"].isel(seed=0)
     for number, name in enumerate(("a", "b", "slip_distance", "law_exponent")):
@@ -40,10 +40,9 @@ def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
         label = MODEL[name].symbol
         label = rf"$\ln$ {label}" if name in LOGARITHMIC else label
         style = {"color": look(number)["color"], "marker": marker(number), "linestyle": "none"}
-        axes.plot(one, range(len(DESIGNS)), label=label, **style)
+        axes.plot(one, range(one.size), label=label, **style)
     axes.set_xscale("log")
-    axes.set_yticks(range(len(DESIGNS)), list(DESIGNS))
-    axes.invert_yaxis()
+    name_rows(axes, [str(name) for name in promised["design"].values])
 
 
 def machine(dataset: xr.Dataset) -> str:

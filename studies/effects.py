@@ -139,7 +139,7 @@ def bars(variable: str, digits: int) -> Draw:
     """Bars of a number: one row a combination, and one bar a law."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
-        from rsfstudy.plots import look, name_points
+        from rsfstudy.plots import look, name_rows
 
         values = dataset[variable].stack(row=("coupling", "dynamics")).transpose("law", "row")
         for number, law in enumerate(values["law"].values):
@@ -153,9 +153,8 @@ def bars(variable: str, digits: int) -> Draw:
                 axes.text(
                     value if value > 0.0 else 0.0, y, text, va="center", fontsize=5.5, clip_on=True
                 )
-        name_points(axes.yaxis, [", ".join(row) for row in values["row"].values], 20)
+        name_rows(axes, [", ".join(row) for row in values["row"].values], 20)
         axes.tick_params(axis="y", labelsize=6)
-        axes.set_ylim(values.sizes["row"] - 0.5, -0.5)
         axes.margins(x=0.25)
         axes.grid(axis="y", visible=False)
 

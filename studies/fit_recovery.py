@@ -247,7 +247,7 @@ CASES = {
 
 def mark_deviations(dataset: xr.Dataset, axes: Axes) -> None:
     """Largest deviation of each case, by what made the record."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import look, marker, name_rows
 
     places = np.arange(dataset.sizes["case"])
     for number, source in enumerate(dataset["record_by"].values):
@@ -255,8 +255,7 @@ def mark_deviations(dataset: xr.Dataset, axes: Axes) -> None:
         style = {"marker": marker(number), "color": look(number)["color"], "linestyle": ""}
         axes.plot(off, places, label=str(source), **style)
         axes.axvline(LEAVES[str(source)], color=style["color"], linestyle="--", linewidth=0.8)
-    axes.set_yticks(places, [str(name) for name in dataset["case"].values])
-    axes.invert_yaxis()
+    name_rows(axes, [str(name) for name in dataset["case"].values])
     axes.set_xscale("log")
 
 

@@ -305,11 +305,10 @@ ends(
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
     """Rows with the names of cases."""
-    from rsfstudy.plots import name_points
+    from rsfstudy.plots import name_rows
 
-    name_points(axes.yaxis, [str(name) for name in dataset["hard_case"].values], 60)
+    name_rows(axes, [str(name) for name in dataset["hard_case"].values])
     axes.tick_params(axis="y", labelsize=5.5)
-    axes.set_ylim(dataset.sizes["hard_case"] - 0.5, -0.5)
     if math.isfinite(axes.dataLim.minposx):
         axes.set_xscale("log")
 
@@ -360,7 +359,7 @@ figure = Figure(
         ),
         Panel(marks=[mark_work], x_label="Right-hand sides", y_label="Case"),
     ],
-    height=150.0,
+    height=lambda dataset: 20.0 + 3.25 * dataset.sizes["hard_case"],
 )
 
 

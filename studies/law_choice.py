@@ -64,22 +64,18 @@ class Choice(Reduction):
 
 def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     """Bars of right, open and wrong choices."""
-    names: list[str] = []
-    begin = np.zeros(len(DESIGNS) * len(NOISE))
+    from rsfstudy.plots import name_rows
+
+    rows = dataset.stack(row=("design", "noise_size"))
+    names = [f"{design}\nnoise {size:g}" for design, size in rows["row"].values]
+    begin = np.zeros(len(names))
     colours = {"right": "#0072b2", "open": "0.8", "wrong": "#d55e00"}
     for key, colour in colours.items():
-        shares: list[float] = []
-        names.clear()
-        for design in dataset["design"].values:
-            for size in dataset["noise_size"].values:
-                one = dataset[f"chosen_{key}"].sel(design=design, noise_size=size)
-                shares.append(100.0 * float(one))
-                names.append(f"{design}\nnoise {size:g}")
+        shares = 100.0 * rows[f"chosen_{key}"].values
         axes.barh(range(len(names)), shares, left=begin, color=colour, label=key, height=0.6)
-        begin = begin + np.array(shares)
-    axes.set_yticks(range(len(names)), names)
+        begin = begin + shares
+    name_rows(axes, names)
     axes.set_xlim(0.0, 100.0)
-    axes.invert_yaxis()
 
 
 figure = Figure(

@@ -120,7 +120,7 @@ class Figure:
     panels : sequence of Panel, or function of (dataset, axes)
     columns : int
         Most panels beside each other.
-    height : float, optional
+    height : float or function of dataset, optional
         Of a panel without its legend, in mm; that of the style by default.
     more_axes : bool
         Whether it shows further axes of the lattice too.
@@ -128,7 +128,7 @@ class Figure:
 
     panels: Sequence[Panel | Draw]
     columns: int = 2
-    height: float | None = None
+    height: float | Callable[[Any], float] | None = None
     more_axes: bool = False
 
     @property

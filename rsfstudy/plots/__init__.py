@@ -27,7 +27,7 @@ from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
 from rsfstudy.plots import _panel
-from rsfstudy.plots._axes import name_points as name_points
+from rsfstudy.plots._axes import name_rows as name_rows
 from rsfstudy.plots._axes import place as place
 from rsfstudy.plots._style import hold_ticks, letter, make_room, settle, share_legends, size
 from rsfstudy.plots._style import in_grey as in_grey
@@ -100,7 +100,8 @@ def figure(
         panels = _panels(drawing, dataset)
         columns = min(drawing.columns, len(panels))
         rows = -(-len(panels) // columns)
-        figure = Drawing(figsize=size(columns, rows, drawing.height), layout="constrained")
+        height = drawing.height(dataset) if callable(drawing.height) else drawing.height
+        figure = Drawing(figsize=size(columns, rows, height), layout="constrained")
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)

@@ -132,6 +132,12 @@ def name_points(axis: Axis, names: list[str], width: int) -> None:
     axis.set_ticks(range(len(names))[some], texts)
 
 
+def name_rows(axes: Axes, names: list[str], width: int = 60) -> None:
+    """Rows with names, from the top down, and half a row beyond either end."""
+    name_points(axes.yaxis, names, width)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+
+
 # ---- scales of colours --------------------------------------------------------------------------
 
 

@@ -13,6 +13,7 @@ from rsfstudy.quantity import Quantity
 
 _PARSER = MathTextParser("path")
 _MATH = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
+_NUMBER = re.compile(r"-?[\d.,]*\d")
 _WORD = re.compile(rf"(?:{_MATH.pattern[1:-1]}|\\\$|[^\s$])+")
 
 #: What results call things, and how figures write it.
@@ -87,9 +88,19 @@ def _is_math(text: str) -> bool:
 
 
 def wrapped(text: str, width: int) -> str:
-    """Text in lines of `width` characters at most, never broken within a formula."""
-    lines: list[list[str]] = [[]]
+    """Text in lines of `width` characters at most, never broken within a formula, nor within
+    ``x = 2 y``.
+    """
+    words: list[str] = []
     for word in _WORD.findall(text):
+        last = words[-1].split()[-2:] if words else [""]
+        with_units = last[0] == "=" and _NUMBER.fullmatch(last[-1])
+        if words and ("=" in (word, last[-1]) or with_units):
+            words[-1] += f" {word}"
+        else:
+            words.append(word)
+    lines: list[list[str]] = [[]]
+    for word in words:
         if lines[-1] and _length(" ".join([*lines[-1], word])) > width:
             lines.append([])
         lines[-1].append(word)
