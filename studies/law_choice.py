@@ -40,9 +40,10 @@ class Choice(Reduction):
         """Over records."""
         of = dataset[self.of]
         other = of.sel(fitted_law=list(reversed(LAWS))).assign_coords(fitted_law=list(LAWS))
+        laws = of["law"].values
         ahead = xr.concat(
-            [(other - of).sel(law=law, fitted_law=law, drop=True) for law in LAWS],
-            xr.Variable("law", np.array(LAWS, dtype=object)),
+            [(other - of).sel(law=law, fitted_law=law, drop=True) for law in laws],
+            xr.Variable("law", laws.astype(object)),
         )
         return xr.Dataset(
             {
