@@ -444,37 +444,9 @@ def test_classes_that_fill_no_slot(body, complaint):
         Scene(law=made(**body))
 
 
-def by_its_own(source: str, **names: object) -> object:
-    """A function whose file says where the numbers of its part begin, in its own way."""
-    known = {"math": math, **names}
-    exec(source, known)
-    return known["function"]
-
-
-#: A law's own number b, read by itself, inside a function of its own, and by another that it calls.
-READS = (
-    "def function(x, state, p):\n    return -(state + p[OWN] * x)",
-    "def function(x, state, p):\n    return sum(-y for y in (state, (lambda: p[OWN] * x)()))",
-    "def b(p):\n    return p[OWN]\ndef function(x, state, p):\n    return -(state + b(p) * x)",
-)
-
-
-@pytest.mark.parametrize("source", READS)
-def test_numbers_that_are_read_in_the_place_of_others_are_refused(source):
-    """p[0] is the direct effect a: a law that read it for its b would give wrong numbers."""
-    read = staticmethod(by_its_own(source, OWN=0))
-    with pytest.raises(
-        InvalidValue, match="law = .*reads its numbers at OWN = 0.*read p.LAW."
-    ) as e:
-        Scene(law=made(name="elsewhere", evolution=read))
-    assert "Import LAW from rsfstudy.slider.places" in str(e.value)
-    inside = made(name="base_elsewhere", resting=read)  # as the steady states were called before
-    assert inside.steady_states is inside.resting
-    with pytest.raises(InvalidValue, match="reads its numbers at OWN = 0"):
-        Scene(law=made(inside, name="derived_elsewhere"))
-    there = made(name="placed", evolution=staticmethod(by_its_own(source, OWN=places.LAW)))
-    theirs, ours = (LinearStability()(Scene(law=law), Accuracy(1e-6)) for law in ("slip", there))
-    assert ours.values == theirs.values
+def test_members_may_bear_their_former_names():
+    part = made(name="formerly", resting=staticmethod(lambda log_rate, shift, p: (shift,)))
+    assert part.steady_states is part.resting
 
 
 def test_a_part_has_as_many_numbers_as_there_are_places():

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.places import LARGEST_EXPONENT
+from rsfstudy.slider.places import LARGEST_LOG_SLIP_RATE
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.system import SLOWEST
 
@@ -65,7 +65,7 @@ def limits(scene: Scene, accuracy: Accuracy) -> Limits:
 
 def norm_at(log_rate: float, given: Limits) -> float:
     """w = V T/(2 pi D_c)."""
-    return given.inertial_time * math.exp(min(log_rate, LARGEST_EXPONENT))
+    return given.inertial_time * math.exp(min(log_rate, LARGEST_LOG_SLIP_RATE))
 
 
 def weight_of_mass(log_rate: float, missing: float, given: Limits) -> float:

@@ -7,14 +7,13 @@ defines it anew; a name that stands for something else is refused.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from types import CellType, CodeType, FunctionType
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
-from rsfstudy.slider import places
 from rsfstudy.slider.parts import Part, has_meaning
 
 if TYPE_CHECKING:
@@ -45,56 +44,11 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
         _check_field(slot, part, stated.name, owners)
         if stated.name in taken - set(owners):
             raise _taken(part, stated.name, "every scene")
-    _check_places(slot, part)
     for name in part.functions():
         function = inspect.getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
             rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
-
-
-def _check_places(slot: Slot, part: type[Part]) -> None:
-    """Refuse functions that read numbers at another OWN than the place of their slot: what they
-    took for their own would be those of something else.
-    """
-    place = slot.name.upper()
-    for function in _reached(part):
-        read = function.__globals__.get("OWN")
-        names_it = any("OWN" in code.co_names for code in _codes(function.__code__))
-        if names_it and read != getattr(places, place):
-            rule = f"reads its numbers at OWN = {read!r} in {function.__name__}, where others are"
-            remedy = f"Import {place} from rsfstudy.slider.places, and read p[{place}]."
-            raise InvalidValue(slot.name, part, rule, remedy=remedy)
-
-
-def _reached(part: type[Part]) -> Iterator[FunctionType]:
-    """The functions of a part and of its bases, and those that they name or close over."""
-    members = (member for kind in part.__mro__ for member in vars(kind).values())
-    found, seen = [getattr(m, "__func__", getattr(m, "fget", m)) for m in members], set[int]()
-    while found:
-        function = found.pop()
-        if not isinstance(function, FunctionType) or id(function) in seen:
-            continue
-        seen.add(id(function))
-        yield function
-        names = {name for code in _codes(function.__code__) for name in code.co_names}
-        found += [function.__globals__.get(name) for name in names]
-        found += [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    """A code, and those inside it."""
-    yield code
-    for inner in code.co_consts:
-        if isinstance(inner, CodeType):
-            yield from _codes(inner)
-
-
-def _is_filled(cell: CellType) -> bool:
-    try:
-        return cell.cell_contents is not None
-    except ValueError:  # a name that is yet to be given a value
-        return False
 
 
 def _check_kind(slot: Slot, part: Any) -> None:

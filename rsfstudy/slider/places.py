@@ -34,9 +34,9 @@ RECHARGE = DYNAMICS - 1
 #: begins, NaN of others.
 BEGINS, ENDS_AT, VELOCITY, LOG_VELOCITY, RATE, RELIEF = range(6)
 
-#: Exponents beyond this occur in trial steps only, which the integrator rejects: a motion ends at
-#: ln(V/V_*) = 276 (`slip_rate_unbounded`).
-LARGEST_EXPONENT = 300.0
+#: Slip rates of which ln(V/V_*) is beyond this occur in trial steps only, which the integrator
+#: rejects: a motion ends at 276 (`slip_rate_unbounded`).
+LARGEST_LOG_SLIP_RATE = 300.0
 #: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
 LARGEST_SLOWNESS = 680.0
 #: Normal stress ratios outside of these only occur in trial steps; clamps keep them finite.

@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import Friction
 from rsfstudy.slider.parts import Function, Numbers, flag
-from rsfstudy.slider.places import DYNAMICS, LARGEST_EXPONENT, LOAD_VELOCITY, STIFFNESS, A
+from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, LOAD_VELOCITY, STIFFNESS, A
 from rsfstudy.slider.states import moved
 from rsfstudy.slider.system import velocity_ratios
 
@@ -120,7 +120,7 @@ def weight_at(x: float, slower: float, p: Numbers) -> float:
     if LEAST < slower < MOST:
         norm = load / slower
     else:
-        norm = math.exp(min(x + p[DYNAMICS + 1], LARGEST_EXPONENT / 4.0))
+        norm = math.exp(min(x + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE / 4.0))
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
@@ -139,7 +139,9 @@ def rupture_rate(friction: Friction) -> Function:
     def rates(state: Numbers, p: Numbers) -> Numbers:
         spring, x, g, others = state[0], state[1], state[2], state[3:]
         a, stiffness = p[A], p[STIFFNESS]
-        norm = math.exp(max(min(x + p[DYNAMICS + 1], LARGEST_EXPONENT), -LARGEST_EXPONENT))
+        norm = math.exp(
+            max(min(x + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE), -LARGEST_LOG_SLIP_RATE)
+        )
         value, slope, shift, _shift_slope = strength(g, others, p)
         faster = bounded((spring - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)

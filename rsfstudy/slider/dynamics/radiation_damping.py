@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import Friction
 from rsfstudy.slider.parts import Function, Numbers, number
-from rsfstudy.slider.places import DYNAMICS, LARGEST_EXPONENT, A
+from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -85,7 +85,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         psis = state[1:]
         slope = strength(g, psis, p)[1]
-        resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LARGEST_EXPONENT))
+        resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LARGEST_LOG_SLIP_RATE))
         growing: float = (slope * rates[0] - contribution(rates[1:], g, psis, p)) / resists
         return growing
 

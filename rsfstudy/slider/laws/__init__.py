@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-#: Exponents beyond this occur in trial steps only, which the integrator rejects: the equations of
-#: motion stop at slip rates of 10^-290 V_*.
+#: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
+#: the equations of motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
 
 
