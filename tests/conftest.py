@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, settings
 from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
-from rsfstudy.compute import clusters, workers
+from rsfstudy.compute import clusters, provenance, workers
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, Watch, settling
@@ -100,6 +100,14 @@ def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
     monkeypatch.setattr(workers, "TELL", math.inf)
     monkeypatch.setattr(workers, "PATIENCE", math.inf)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def the_checkout_stays():
+    """Each of hundreds of runs would ask Git three times for the state of the same checkout."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(provenance, "git_state", functools.cache(provenance.git_state))
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from rsfstudy.named_studies.rigid_response import Spread
-from running import command, ended, named_results
+from running import called, named_results
 
-from rsfstudy.files import store
 from rsfstudy.files.comparison import side_by_side
 from rsfstudy.reduce import (
     Boundary,
@@ -214,11 +213,10 @@ def test_slopes_that_differ_within_their_errors_agree(boundary):
     assert side_by_side(dataset, far).beyond_errors == ["zeta"]
 
 
-def test_the_table_of_slopes_shows_them(boundary, tmp_path):
-    """In a process of its own, whose terminal is wide enough."""
-    dataset, _path = boundary
-    store.write(dataset, tmp_path / "it.nc")
-    code, said, _errors = ended(command("show", str(tmp_path / "it.nc")))
+def test_the_table_of_slopes_shows_them(boundary, monkeypatch):
+    dataset, path = boundary
+    monkeypatch.setenv("COLUMNS", "500")
+    code, said = called(["show", str(path)])
     assert code == 0
     assert "numerical error" in said
     assert f" {float(dataset.zeta_error[0, 0]):.2g} " in said

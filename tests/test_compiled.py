@@ -353,29 +353,12 @@ def test_a_rate_that_is_no_number_ends_the_motion(by):
     assert float(ended["log10_slip_rate"].max()) <= 1.0 / math.log(10.0)
 
 
-def test_without_numba_the_remedy_is_told(monkeypatch):
-    for name in list(sys.modules):
-        if name.startswith("rsfstudy.motion.compiled"):
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.setattr(engines, "compiled_engine", engines.compiled_engine.__wrapped__)
-    with pytest.raises(InvalidValue, match=r"needs Numba.*pip install 'rsfstudy\[fast\]'"):
-        run(SMALL, engine=COMPILED)
-
-
-def test_an_unknown_engine_and_integrators_of_another_are_refused():
-    with pytest.raises(InvalidValue, match="scipy, python, compiled"):
-        run(SMALL, engine="julia")
-    with pytest.raises(InvalidValue, match="SciPy's"):
-        Accuracy(methods=(("inertial", "Radau"),), engine=COMPILED)
-
-
 # ---- files and time ------------------------------------------------------------------------------
 
 
 def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
     small = replace(SMALL, axes=SMALL.axes[:1])
-    ran = run(small, engine=COMPILED, output=tmp_path, workers=1)
+    ran = run(small, engine=COMPILED, output=tmp_path)
     assert '"engine": "compiled"' in ran.attrs["provenance"]
     assert '"numba"' in ran.attrs["provenance"]
     with pytest.raises(DataError, match="engine"):
@@ -541,16 +524,14 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     """Their functions are alike in name, and each process numbers those it compiles from one on: as
     here, where both begin at the same number. Then both are loaded.
     """
-    function = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4)
+    function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
         building._compiled_inside.cache_clear()
         monkeypatch.setattr(machine, "_ADDRESSES", {})
-        scene = Scene(law=law, normal_stress="constant", fluid="dilatant", inertia=True)
-        equations = between_ruptures(scene, clock=False)
-        state = (0.01, 0.02, 0.001, 0.002)
-        y, p = (ctypes.c_double * 4)(*state), (ctypes.c_double * len(equations.p))(*equations.p)
-        result = (ctypes.c_double * 4)()
+        equations = between_ruptures(Scene(law=law, normal_stress="constant"), clock=False)
+        y, p = (ctypes.c_double * 2)(*state), (ctypes.c_double * len(equations.p))(*equations.p)
+        result = (ctypes.c_double * 2)()
         function(machine.addresses(equations)[0])(y, y, p, result)
         assert list(result) == pytest.approx(list(equations.rates(state)), rel=1e-12)
 

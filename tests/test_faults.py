@@ -302,13 +302,6 @@ def lattice(failing=(3.0,)) -> xr.Dataset:
 FIT = (LinearFit(name="slope", of="total", on="b_over_a"),)
 
 
-def test_reductions_refuse_failed_cells():
-    found = reduced(lattice(), FIT)
-    assert np.isnan(found.slope)
-    assert "failed or are missing" in found.slope.refused
-    assert "reduced_despite" not in found.attrs
-
-
 def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
     found = reduced(lattice(), FIT, despite_failures=True)
     assert float(found.slope) == pytest.approx(1.0, rel=1e-14)

@@ -29,9 +29,9 @@ SLACK = 0.01
 
 
 @pytest.fixture(scope="module", params=names.names())
-def figure(request, tmp_path_factory, cluster):
+def figure(request, tmp_path_factory):
     """The figure of enough of each study."""
-    dataset, _path = named_results(request.param, tmp_path_factory, client=cluster)
+    dataset, _path = named_results(request.param, tmp_path_factory)
     return plots.figure(dataset)
 
 

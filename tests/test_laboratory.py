@@ -368,25 +368,6 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
         assert data.read_bytes() == other
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--normal-stress", "5 MPa"], "--slip-distance = None: must be stated"),
-        (["--duration", "10 s"], "--duration = '10 s': has units, and no rig is stated"),
-        (["--duration", "0"], "duration = 0.0: must be positive"),
-        (["--set", "law"], "must read FIELD=VALUE"),
-        (["--set", "law=slip", "--set", "law=slip"], "sets law twice"),
-        (["--set", "hold_time=ten"], "hold_time = 'ten': must be a number"),
-        (["--output", "motion.txt"], "must end in .png, .pdf or .svg"),
-    ],
-)
-def test_wrong_usage_of_the_command(words, complaint, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    ran = call("simulate", *words)
-    assert ran.returncode == 2
-    assert complaint in " ".join(ran.stderr.split())
-
-
 def test_a_stiffness_of_friction_is_multiplied_by_normal_stress() -> None:
     """k D_c/sigma_* does not depend on sigma_* then; one of stress is read as before."""
     for stress in ("5 MPa", "20 MPa"):

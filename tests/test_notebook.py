@@ -45,10 +45,10 @@ assert (fit.status == 0).all()
 
 
 @pytest.fixture(scope="module")
-def executed(tmp_path_factory, cluster):
+def executed(tmp_path_factory):
     outputs = tmp_path_factory.mktemp("outputs")
     for name in STUDIES:
-        _dataset, file = named_results(name, tmp_path_factory, client=cluster)
+        _dataset, file = named_results(name, tmp_path_factory)
         shutil.copy(file, outputs)
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     with pytest.MonkeyPatch.context() as patch:

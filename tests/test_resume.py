@@ -298,14 +298,6 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
     same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
 
 
-def test_other_tolerances_are_not_mixed(tmp_path):
-    run(output=tmp_path)
-    with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now.*--fresh"):
-        run(output=tmp_path, rtol=1e-6)
-    fresh = run(output=tmp_path, rtol=1e-6, fresh=True)
-    same_numbers(fresh, run(rtol=1e-6))
-
-
 @pytest.mark.parametrize("name", ["physics", "numpy", "scipy"])
 def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
     from rsfstudy.compute import provenance

@@ -170,10 +170,10 @@ def test_results_survive_their_file(tmp_path):
     assert (rerun["identical"] == rerun["values"]).all()
 
 
-def test_two_workers_and_what_is_finished_already(tmp_path):
+def test_two_workers_and_what_is_finished_already(tmp_path, cluster):
     made = study(*LATTICE)
     serial = run(made, output=tmp_path / "serial")
-    both = rsfstudy.run(made, workers=2, output=tmp_path / "both", progress=False)
+    both = rsfstudy.run(made, client=cluster, output=tmp_path / "both", progress=False)
     longer = made.with_(sigma_star=["1 MPa", "5 MPa", "20 MPa", "40 MPa"])
     kept = run(longer, output=tmp_path / "both")
     for name in made.measure.variables:

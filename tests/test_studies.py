@@ -27,9 +27,9 @@ FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
 @pytest.fixture(scope="module", params=names.names())
-def result(request, tmp_path_factory, cluster):
-    """What is enough of each study, on two workers, and where its file is."""
-    return named_results(request.param, tmp_path_factory, client=cluster)
+def result(request, tmp_path_factory):
+    """What is enough of each study, and where its file is."""
+    return named_results(request.param, tmp_path_factory)
 
 
 def test_the_study_is_named_as_its_file(result):
@@ -168,7 +168,14 @@ MEANINGLESS = re.compile(
 )
 
 
-def test_the_compliance_checker_reports_no_error(result, tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def checkers():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of their own
+        CheckSuite.load_all_available_checkers()
+
+
+def test_the_compliance_checker_reports_no_error(result, tmp_path, monkeypatch, checkers):
     """And no attribute for discovery is missing that has a meaning here."""
     report = tmp_path / "report.json"
     # it asks for these a thousand times, in a file that stays as it is
@@ -176,7 +183,6 @@ def test_the_compliance_checker_reports_no_error(result, tmp_path, monkeypatch):
         monkeypatch.setattr(cfutil, name, functools.cache(getattr(cfutil, name)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the checker's own
-        CheckSuite.load_all_available_checkers()
         ComplianceChecker.run_checker(
             str(result[1]),
             ["cf:1.11", "acdd:1.3"],
@@ -232,7 +238,7 @@ def test_a_plot_outside_of_the_package_is_never_imported(result):
         plots.figure(dataset)
 
 
-@pytest.mark.parametrize("result", names.names()[::3], indirect=True, scope="module")
+@pytest.mark.parametrize("result", names.names()[::7], indirect=True, scope="module")
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"

@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from running import command, ended
+from running import call
 
 import rsfstudy
 from rsfstudy.declare import catalogue
@@ -56,11 +56,9 @@ def written(tmp_path, text: str) -> str:
     return str(path)
 
 
-def test_a_file_runs_by_its_path_on_workers(tmp_path):
-    file = written(tmp_path, DECLARATION)
-    words = ("run", file, "--workers", "1", "--output", tmp_path)
-    code, _out, said = ended(command(*words))
-    assert code == 0, said
+def test_a_file_runs_by_its_path(tmp_path):
+    ran = call("run", written(tmp_path, DECLARATION), "--serial", "--output", tmp_path)
+    assert ran.returncode == 0, ran.stderr
     assert (tmp_path / "mine.nc").exists()
     assert (tmp_path / "mine.png").exists()
     assert rsfstudy.open("mine", tmp_path).sizes["phi"] == 2

@@ -10,7 +10,7 @@ from rsfstudy.api.tables import Table
 from rsfstudy.cli import layout, terminal
 from rsfstudy.declare import catalogue, names
 
-WIDTHS = (40, 60, 80, 120)
+WIDTHS = (40, 80)
 
 
 @pytest.fixture
@@ -43,8 +43,8 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
 
 
 @pytest.mark.parametrize("name", names.names())
-def test_results_of_every_study(name, printed, tmp_path_factory, cluster):
-    dataset, _path = named_results(name, tmp_path_factory, client=cluster)
+def test_results_of_every_study(name, printed, tmp_path_factory):
+    dataset, _path = named_results(name, tmp_path_factory)
     shown = [tables.headline(dataset), *tables.reductions(dataset), tables.held(dataset)]
     shown += [tables.claims(runs.check(dataset))]
     for table in (table for table in shown if table.rows):

@@ -223,18 +223,3 @@ def test_a_steady_response_is_not_asked_of_a_train():
         scene = Scene(**STABLE, **IMPOSED, oscillation_amplitude=0.01, **fields)
         with pytest.raises(InvalidValue, match="begins later or ends.*Leave out osc.*_begin and"):
             NormalStressResponse()(scene, Accuracy())
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"velocity_oscillation": 1.5}, "must be 1 or less: the load point.*regularised=True"),
-        ({"velocity_oscillation": 0.1, "load_velocity_ratio": 0.0}, "must be greater than 0"),
-        ({"velocity_oscillation": 0.1, "fluid": "dilatant"}, "has no meaning for fluid='dilatant'"),
-        ({"velocity_oscillation": 0.1, **TRAIN, "oscillation_period": 1e-9}, "mass matters"),
-        ({"oscillation_cycles": 3.0}, "state oscillation_amplitude or velocity_oscillation too"),
-    ],
-)
-def test_trains_that_are_none(fields, message):
-    with pytest.raises(InvalidValue, match=message):
-        Scene(**fields)

@@ -18,8 +18,10 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+import pandas as pd
 import pytest
 from running import call
+from scipy.stats import norm
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene
@@ -145,7 +147,8 @@ def known() -> dict[str, Any]:
     return (
         {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
         | {kind.__name__: kind for kind in kinds if kind.__module__.startswith("rsfstudy.")}
-        | {"inf": math.inf, "nan": math.nan, "np": np, "Accuracy": Accuracy, "Output": Output}
+        | {"inf": math.inf, "nan": math.nan, "np": np, "pd": pd, "norm": norm}
+        | {"Accuracy": Accuracy, "Output": Output}
         | {"study": study, "claim": claim, "csv": csv, "RIG": RIG, "in_si": in_si}
         | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
     )
