@@ -31,27 +31,29 @@ sys.dont_write_bytecode = False
 
 
 #: Modules that take longest, which begin first: none of them is left for one process alone at the
-#: end. Figures come after studies, whose results they draw.
+#: end. Figures draw the results of studies.
 DEAR = (
     "test_studies",
-    "test_resume",
-    "test_faults",
-    "test_readings",
-    "test_clusters",
     "test_figures",
+    "test_resume",
+    "test_doors",
+    "test_faults",
+    "test_clusters",
     "test_strangers",
+    "test_report",
+    "test_compiled",
+    "test_scale",
+    "test_fits_together",
+    "test_notebook",
     "test_every_law",
     "test_cli",
-    "test_two_states",
-    "test_notebook",
-    "test_scale",
-    "test_critical_step",
-    "test_compiled",
-    "test_periods",
+    "test_readme",
     "test_extensions",
-    "test_limit_cycle",
-    "test_laboratory",
-    "test_fluid",
+    "test_site",
+    "test_two_states",
+    "test_critical_step",
+    "test_fit_command",
+    "test_tables",
 )
 
 

@@ -99,7 +99,7 @@ SETTINGS = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(SETTINGS, min_size=1, max_size=2))
 @example(["b_over_a=2:3:100000000000"])
 @example(["b_over_a=2:3:1e400"])
@@ -126,7 +126,7 @@ def small(tmp_path_factory):
     return output / "small.nc"
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_unharmed(small, tmp_path_factory, data):
     """Bytes changed, blanked or cut off, anywhere: an error that names the file, or, where they

@@ -406,37 +406,6 @@ def test_a_change_of_units_leaves_every_dimensionless_number() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "remedy"),
-    [
-        ("b", "Write b_over_a"),
-        ("k", "Write stiffness_ratio"),
-        ("V_0", "Write load_velocity_ratio, .* of a rig load_velocity"),
-        ("slip_distance", "D_c is slip_distance of a rig"),
-        ("theta", "Write initial_state"),
-        ("D_c", "D_c is slip_distance of a rig"),
-        ("sigma", "sigma_. is normal_stress of a rig"),
-    ],
-)
-def test_names_of_others_are_answered_by_one_line(name: str, remedy: str) -> None:
-    about = {"name": "named", "title": "Names", "base": Scene(), "measure": LimitCycle()}
-    study = Study(**about, axes=[Axis("a", [0.01])])
-    with pytest.raises(InvalidValue, match=remedy):
-        study.with_(**{name: 1.0})
-    with pytest.raises(InvalidValue, match=remedy):
-        Study(**about, axes=[Axis(name, [1.0])])
-    for made in (Scene, RIG.scene):
-        with pytest.raises(InvalidValue, match=remedy):
-            made(**{name: 1.0})
-
-
-def test_normal_stress_of_a_rig_is_told_from_that_of_a_scene() -> None:
-    for made in (Scene, RIG.scene):
-        for value in ("5 MPa", 5e6):
-            with pytest.raises(InvalidValue, match="sigma_. is normal_stress of a rig"):
-                made(normal_stress=value)
-
-
-@pytest.mark.parametrize(
     ("fields", "expected"),
     [
         ({}, "constant"),

@@ -205,7 +205,7 @@ def test_altered_results_are_used_or_refused(tiny, data):
 
 
 @pytest.mark.filterwarnings("ignore")  # of xarray, and of what is not as it was for the file
-@settings(max_examples=6, **ALTERED)
+@settings(max_examples=3, **ALTERED)
 @given(data=st.data())
 def test_any_command_takes_or_refuses_an_altered_file(tiny, tmp_path_factory, data):
     """Whatever part of it was altered."""

@@ -11,7 +11,6 @@ import pint
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import called
 
 from rsfstudy import Laboratory, read_protocol
 from rsfstudy.cli import assignments
@@ -185,40 +184,6 @@ def _is_number(text):
 
 
 # ---- where texts come in -------------------------------------------------------------------------
-
-THREE = ["--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s"]
-NO_RIG: list[str] = []
-
-
-@pytest.mark.parametrize("rig", [THREE, NO_RIG])
-@pytest.mark.parametrize(
-    "wrong", ["b_over_a=1,4", "a=0.01,0.02", "a=0.01:0.02:3", "b_over_a=1_4", "b_over_a=\u0661"]
-)
-def test_a_field_of_one_scene_is_one_number(rig, wrong, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, said = called(["simulate", "--duration", "1", "--set", wrong, *rig])
-    name, _equals, value = wrong.partition("=")
-    assert code == 2
-    assert f"{name} = {value!r}" in said
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["--normal-stress", "2,5 MPa"],
-        ["--stiffness", "1e5 MPa 3/m"],
-        ["--duration", "1,5 s"],
-        ["--duration", "1_0"],
-        ["--set", "hold_time=1,5 s"],
-    ],
-)
-def test_options_of_a_rig_are_one_quantity(words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, said = called(["simulate", *THREE, *words])
-    assert code == 2, said
-    assert "is no quantity" in " ".join(said.split())
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("text", ["1_0", "\u0661"])
