@@ -47,6 +47,12 @@ class Quantity:
     flags: tuple[str, ...] = ()
 
     @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of a variable of it: words, units, scale and flags, those that it has."""
+        stated = {"long_name": self.long_name, "units": self.units, "scale": self.scale}
+        return {key: text for key, text in stated.items() if text} | self.flag_attributes
+
+    @property
     def flag_attributes(self) -> dict[str, Any]:
         """The CF attributes that say what its values mean; none of a plain number."""
         values = [float(number) for number in range(len(self.flags))]

@@ -5,13 +5,16 @@ from.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from rsfstudy.quantity import Quantity
+
+#: The numbers of an event, each with its error, and which part of it is missing, by its flag.
+Found = tuple[dict[str, tuple[float, float]], int]
 
 _QUANTITIES = (
     Quantity("time", "", "1", "time at which the event begins", "D_c/V_*"),
@@ -35,22 +38,24 @@ _QUANTITIES = (
 _CUT = ("whole", "begins_before", "lasts_beyond", "both")
 
 
-def catalogue(found: list[dict[str, float]], about: Mapping[str, Mapping[Any, Any]]) -> xr.Dataset:
+def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) -> xr.Dataset:
     """Events as a dataset, in the units of what they were read from."""
-    for row, earlier in zip(found, [{}, *found], strict=False):
-        row["interval"] = row["time"] - earlier.get("time", math.nan)
-        row["interval_error"] = row["time_error"] + earlier.get("time_error", math.nan)
-    dataset = xr.Dataset(coords={"event": np.arange(len(found))})
+    rows = [numbers for numbers, _cut in found]
+    for row, earlier in zip(rows, [{}, *rows], strict=False):
+        (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
+        row["interval"] = time - before, error + unsure
+    dataset = xr.Dataset(coords={"event": np.arange(len(rows))})
     for quantity in _QUANTITIES:
-        for name in (quantity.name, f"{quantity.name}_error"):
-            if found and name not in found[0]:
-                continue
-            error = "error estimate of " if name != quantity.name else ""
-            attrs = {"long_name": error + quantity.long_name, **_units(quantity, about)}
-            dataset[name] = ("event", np.array([row[name] for row in found]), attrs)
+        if rows and quantity.name not in rows[0]:
+            continue
+        units = _units(quantity, about)
+        for place, (name, of) in enumerate((("", ""), ("_error", "error estimate of "))):
+            values = np.array([row[quantity.name][place] for row in rows])
+            attrs = {"long_name": of + quantity.long_name, **units}
+            dataset[quantity.name + name] = ("event", values, attrs)
     dataset["cut"] = (
         "event",
-        np.array([row["cut"] for row in found], dtype=np.int8),
+        np.array([cut for _numbers, cut in found], dtype=np.int8),
         {
             "long_name": "what of the event the record leaves out",
             "flag_values": np.arange(len(_CUT), dtype=np.int8),

@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 from scipy.stats import norm
 
-from rsfstudy.api.catalogue import catalogue
+from rsfstudy.api.catalogue import Found, catalogue
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.table import read_table
@@ -170,36 +170,29 @@ def _row(
     stress: np.ndarray,
     moves: np.ndarray | None,
     drop: tuple[int, int, int, float],
-) -> dict[str, float]:
+) -> Found:
     """The numbers of one event of a record, each with its standard error by noise."""
     begin, end, window, error = drop
     before, after = stress[begin - window : begin].mean(), stress[end : end + window].mean()
     apart = times[end] - times[begin - 1]
     row = {
-        "time": times[begin - 1],
-        "time_error": apart,
-        "duration": apart,
-        "duration_error": apart,
-        "stress_before": before,
-        "stress_before_error": error,
-        "stress_after": after,
-        "stress_after_error": error,
-        "static_stress_drop": before - after,
-        "static_stress_drop_error": error,
-        "cut": 0,
+        "time": (times[begin - 1], apart),
+        "duration": (apart, apart),
+        "stress_before": (before, error),
+        "stress_after": (after, error),
+        "static_stress_drop": (before - after, error),
     }
     if moves is None:
-        return row
+        return row, 0
     slips = -_falls(moves, window)
     rates = np.diff(moves) / np.diff(times)
     fastest = begin - 1 + int(np.argmax(rates[begin - 1 : end]))
     noise = _spread(rates)
-    seen = rates[fastest] > noise * norm.isf(_CHANCE / len(rates))
-    return row | {
-        "slip": moves[end : end + window].mean() - moves[begin - window : begin].mean(),
-        "slip_error": _spread(slips) + abs(float(np.median(slips))),
-        "peak_slip_rate": rates[fastest] if seen else math.nan,
-        "peak_slip_rate_error": noise if seen else math.nan,
-        "dynamic_stress_drop": before - stress[fastest + 1] if seen else math.nan,
-        "dynamic_stress_drop_error": error + _spread(np.diff(stress)) if seen else math.nan,
-    }
+    slip = moves[end : end + window].mean() - moves[begin - window : begin].mean()
+    row["slip"] = slip, _spread(slips) + abs(float(np.median(slips)))
+    row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
+    if rates[fastest] > noise * norm.isf(_CHANCE / len(rates)):
+        row["peak_slip_rate"] = rates[fastest], noise
+        drop_error = error + _spread(np.diff(stress))
+        row["dynamic_stress_drop"] = before - stress[fastest + 1], drop_error
+    return row, 0

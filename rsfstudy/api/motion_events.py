@@ -11,7 +11,7 @@ from scipy.interpolate import KroghInterpolator
 from scipy.ndimage import find_objects, label
 from scipy.optimize import brentq
 
-from rsfstudy.api.catalogue import catalogue
+from rsfstudy.api.catalogue import Found, catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.scene import Scene
 
@@ -72,8 +72,8 @@ class _Rows:
         above = label(self._values[:, 0] > self._level)[0]
         return [(part.start, part.stop - 1) for (part,) in find_objects(above)]
 
-    def event(self, first: int, last: int) -> dict[str, float]:
-        """The numbers of an event, each with its error."""
+    def event(self, first: int, last: int) -> Found:
+        """The numbers of an event, each with its error, and which part of it is missing."""
         end, stress = len(self._times) - 1, self._values[:, 2]
         peak = first + int(np.argmax(self._values[first : last + 1, 0]))
         highest, lowest = first, last
@@ -88,25 +88,17 @@ class _Rows:
         (rate, _, at_peak), (rate_error, _, peak_error) = self._extreme(peak, 0, 1.0)
         (*_, before), (*_, before_error) = self._extreme(top, 2, 1.0)
         (*_, after), (*_, after_error) = self._extreme(bottom, 2, -1.0)
+        cut = (first == 0 or highest == 0) + 2 * (last == end or lowest == end)
         return {
-            "time": begin,
-            "time_error": begun[0],
-            "duration": finish - begin,
-            "duration_error": begun[0] + finished[0],
-            "peak_log10_slip_rate": rate,
-            "peak_log10_slip_rate_error": rate_error,
-            "slip": slipped - slip,
-            "slip_error": begun[1] + finished[1],
-            "stress_before": before,
-            "stress_before_error": before_error,
-            "stress_after": after,
-            "stress_after_error": after_error,
-            "static_stress_drop": before - after,
-            "static_stress_drop_error": before_error + after_error,
-            "dynamic_stress_drop": before - at_peak,
-            "dynamic_stress_drop_error": before_error + peak_error,
-            "cut": (first == 0 or highest == 0) + 2 * (last == end or lowest == end),
-        }
+            "time": (begin, begun[0]),
+            "duration": (finish - begin, begun[0] + finished[0]),
+            "peak_log10_slip_rate": (rate, rate_error),
+            "slip": (slipped - slip, begun[1] + finished[1]),
+            "stress_before": (before, before_error),
+            "stress_after": (after, after_error),
+            "static_stress_drop": (before - after, before_error + after_error),
+            "dynamic_stress_drop": (before - at_peak, before_error + peak_error),
+        }, cut
 
     def _through(self, row: int, number: int) -> KroghInterpolator:
         """The polynomial through as many rows about that between a row and the next, in time since

@@ -199,11 +199,8 @@ def _blank(measure: Measure) -> xr.Dataset:
     inner = measure.inner_coordinates
     variables: dict[str, Any] = {}
     for name, dims in measure.variables.items():
-        about = quantity(name, own)
-        attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
         missing = np.full([len(inner[dim]) for dim in dims], np.nan)
-        attrs = {k: v for k, v in attrs.items() if v} | about.flag_attributes
-        variables[name] = (dims, missing, attrs)
+        variables[name] = (dims, missing, quantity(name, own).attributes)
     variables["rhs_evaluations"] = ((), 0)
     rate = ((), math.nan, {"units": "s-1"})
     return xr.Dataset(variables, coords={**inner, "reference_rate": rate})

@@ -37,13 +37,8 @@ _UNSTEPPED = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
-_INSTABILITY_TIME = Quantity(
-    "instability_time",
-    "$t V_*/D_c$",
-    "1",
-    "time at which slip rate first passed the instability norm",
-    "D_c/V_*",
-)
+_FIRST = "time at which slip rate first passed the instability norm"
+_INSTABILITY_TIME = Quantity("instability_time", "$t V_*/D_c$", "1", _FIRST, "D_c/V_*")
 #: Attribute that says from when on a motion is no physics.
 BEYOND = "beyond_instability_norm"
 #: Attribute that holds time, slip and point of the end of a motion.
@@ -184,7 +179,7 @@ def simulate(
         dataset = dataset.assign(history_samples=_samples(scene.parts.loading))
     if passed >= 0.0:
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
-        dataset[_INSTABILITY_TIME.name] = ((), passed, _about(_INSTABILITY_TIME))
+        dataset[_INSTABILITY_TIME.name] = ((), passed, _INSTABILITY_TIME.attributes)
         dataset = dataset.assign_attrs({BEYOND: text})
         warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=3)
     if status is not Status.OK:
@@ -231,7 +226,7 @@ def _dataset(
 ) -> xr.Dataset:
     dataset = xr.Dataset()
     for about, values in columns.items():
-        dataset[about.name] = ("time", values, _about(about))
+        dataset[about.name] = ("time", values, about.attributes)
     dataset["regime"] = (
         "time",
         regime.astype(np.int8),
@@ -242,11 +237,6 @@ def _dataset(
         },
     )
     return dataset
-
-
-def _about(about: Quantity) -> dict[str, str]:
-    attrs = {"long_name": about.long_name, "units": about.units, "scale": about.scale}
-    return {key: text for key, text in attrs.items() if text}
 
 
 def _as_stated(scene: Scene) -> float:
