@@ -60,3 +60,7 @@ class Status(IntEnum):
     def is_answer(self) -> bool:
         """True where the status answers the question, even if no number can."""
         return self < Status.WORK_BUDGET_SPENT
+
+
+#: Names of the statuses, by what files hold.
+LABELS = {int(status): status.label for status in Status}

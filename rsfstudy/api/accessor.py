@@ -5,11 +5,10 @@ rsfstudy has made the dataset.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
@@ -63,13 +62,13 @@ class Accessor:
         InvalidValue
             Where no single cell is selected, or a part is a user's own and not known here.
         """
-        if "rows_fitted" in self._dataset:
-            from rsfstudy.api import fit_results
+        from rsfstudy.api import fit_results, scenes
 
+        if "rows_fitted" in self._dataset:
             return fit_results.scene(self._dataset)
         if self._is_study:
-            return self.study.scene(_cell_of(self._dataset, self.study))
-        return _scene_of(self._dataset)
+            return self.study.scene(scenes.cell(self._dataset, self.study))
+        return scenes.described(self._dataset)
 
     @property
     @door
@@ -297,7 +296,7 @@ class Accessor:
         import pandas as pd
 
         from rsfstudy.files import contents
-        from rsfstudy.status import Status
+        from rsfstudy.status import LABELS, Status
 
         if not self._is_study:
             ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
@@ -307,8 +306,7 @@ class Accessor:
         failed = status.values != int(Status.OK)
         names = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
         columns = {n: self._dataset[n].broadcast_like(status).values[failed] for n in names}
-        labels = {int(code): code.label for code in Status}
-        columns["status"] = [labels[code] for code in status.values[failed].tolist()]
+        columns["status"] = [LABELS[code] for code in status.values[failed].tolist()]
         columns["message"] = self._dataset["message"].values[failed]
         return pd.DataFrame(columns)
 
@@ -353,55 +351,3 @@ class Backend(BackendEntrypoint):
         from rsfstudy.api import runs
 
         return runs.open(filename_or_obj).drop_vars(drop_variables or [])
-
-
-def _cell_of(dataset: xr.Dataset, study: Study) -> int:
-    """The number of the cell that is selected."""
-    from rsfstudy.files.lattice import coordinates
-
-    ours = xr.Dataset(coords=coordinates(study))
-    places = []
-    for name in study.dimensions:
-        given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
-        if given.size != 1:
-            remedy = f"Select a cell first, as in dataset.isel({name}=0)."
-            raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
-        found = np.flatnonzero(ours[name].values == given[0])
-        if not found.size:
-            remedy = "Ask before you convert it to other units."
-            raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)
-        places.append(int(found[0]))
-    return int(np.ravel_multi_index(places, study.shape))
-
-
-def _scene_of(dataset: xr.Dataset) -> Scene:
-    """The scene that the attributes of a dataset describe."""
-    from rsfstudy.files import contents
-    from rsfstudy.slider.history import of_samples
-    from rsfstudy.slider.protocol import Stated, protocol
-    from rsfstudy.slider.registry import SLOTS, Own, name_of
-
-    plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
-    segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
-    digest = plain.pop("samples", "")
-    own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
-    # protocols of one name differ: the segments tell which it was
-    if segments and (loading not in own or isinstance(own[loading], Stated)):
-        rebuilt = protocol(segments, loading)
-        own[name_of("loading", rebuilt)] = rebuilt
-    if digest:
-        told = dataset["history_samples"]
-        pressure = bool(told.attrs.get("of_pressure"))
-        stress = bool(told.attrs["of_stress"])
-        sampled = of_samples(told.values, stress, loading, of_pressure=pressure)
-        if sampled.digest != digest:
-            raise contents.refused("history_samples", f"are not those of the scene ({digest})")
-        own[name_of("loading", sampled)] = sampled
-    for slot in SLOTS:
-        name = plain.get(slot.name)
-        if isinstance(name, str) and name not in {*slot.choices, *own}:
-            remedy = "Make a scene with the class itself first, so that its name is known."
-            raise InvalidValue(
-                slot.name, name, "is a user's own, and not known here", remedy=remedy
-            )
-    return contents.scene(plain, own, "scene")

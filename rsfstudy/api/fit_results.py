@@ -14,6 +14,7 @@ from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import LABELS
 
 #: What laboratories call parameters, and their units.
 SHORT = {
@@ -43,6 +44,15 @@ def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
     dims = dataset["rows_fitted"].dims
     sizes = [dataset.sizes[d] for d in dims]
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
+
+
+def _only(dataset: xr.Dataset) -> xr.Dataset:
+    """The one fit that a dataset holds."""
+    found = cells(dataset)
+    if len(found) != 1:
+        remedy = "Select one first, as in dataset.sel(law='slip')."
+        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
+    return found[0]
 
 
 def place(one: xr.Dataset) -> dict[str, Any]:
@@ -87,36 +97,14 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
 
 def status(one: xr.Dataset) -> str:
     """How a fit ended."""
-    flags = dict(
-        zip(one["status"].flag_values.tolist(), one["status"].flag_meanings.split(), strict=True)
-    )
-    return str(flags[one["status"].item()])
+    return LABELS[int(one["status"])]
 
 
 def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
-    """Samples of the parameters of one fit, as its errors let them be.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of which one fit is selected.
-    n : int
-        How many.
-    seed : int
-
-    Returns
-    -------
-    xarray.Dataset
-        Each parameter along ``draw``. Slip distances and stiffness stay positive: their logarithms
-        are drawn. The distribution is Student's t.
-    """
-    found = cells(dataset)
-    if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
+    """Samples of the parameters of one fit, as `Accessor.draw` says."""
+    one = _only(dataset)
     if not isinstance(n, int) or n < 1:
         raise InvalidValue("n", n, "must be a whole number, 1 or more")
-    one = found[0]
     names = [str(name) for name in one["parameter"].values]
     at = np.array([one[name].item() for name in names])
     covariance = one["covariance"].values
@@ -140,11 +128,8 @@ def scene(dataset: xr.Dataset) -> Scene:
     """The scene of one fit, with the parameters that it found and the velocity step that it is of,
     in units of its slip distance and of the velocity before the step.
     """
-    found = cells(dataset)
-    if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
-    one, plain = found[0], json.loads(dataset.attrs["declaration"])
+    one = _only(dataset)
+    plain = json.loads(dataset.attrs["declaration"])
     first = contents.scene(plain["base"], {})
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))

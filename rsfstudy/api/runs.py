@@ -24,12 +24,7 @@ from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.doors import door, outside
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
-from rsfstudy.files.comparison import (
-    Comparison,
-    cell_number,
-    compared,
-    side_by_side,
-)
+from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by_side
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
@@ -152,11 +147,7 @@ def run(
     return results
 
 
-def declaration(
-    study: str | Path | Study,
-    overrides: Mapping[str, Any],
-    **accuracy: Any,
-) -> Study:
+def declaration(study: str | Path | Study, overrides: Mapping[str, Any], **accuracy: Any) -> Study:
     """A study with other values and fields of its accuracy, those that are not None; checked."""
     declared = study if isinstance(study, Study) else catalogue.load(str(study))
     changes = {name: value for name, value in accuracy.items() if value is not None}
@@ -171,10 +162,7 @@ def prepared(
     """A function that runs the study, once everything has been checked; `progress` shows how
     far it has come.
 
-    Raises
-    ------
-    InvalidValue
-        For anything wrong with the study or the options.
+    Raises `InvalidValue` for anything wrong with the study or the options.
     """
     check_engine(study.accuracy.engine)
     task = Task(

@@ -16,7 +16,7 @@ from rsfstudy.declare import verdicts
 from rsfstudy.declare.wording import listed, short, stated
 from rsfstudy.files import contents, numbers
 from rsfstudy.rig.scales import in_units_of_rig, renamed
-from rsfstudy.status import Status
+from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
 
 #: Most cells of a lattice that are shown, and most that failed.
@@ -28,7 +28,6 @@ _OF_SLOPES = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
-_LABELS = {int(status): status.label for status in Status}
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,7 @@ def headline(dataset: xr.Dataset) -> Table:
         if error in few:
             row["error"] = number(cell[error].item(), ".1e")
         if others:
-            row["status"] = _LABELS[int(cell["status"])]
+            row["status"] = LABELS[int(cell["status"])]
         rows.append(row)
     about = dataset[name].attrs
     units = about.get("scale") or about.get("units", "1")
@@ -215,7 +214,7 @@ def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[str, Any]]]:
         places.append(place)
         rows.append({
             "cell": stated(place),
-            "status": _LABELS[int(cell["status"])],
+            "status": LABELS[int(cell["status"])],
             "message": str(cell["message"].item()),
         })  # fmt: skip
     caption = f"{int(failed.sum())} cells failed"

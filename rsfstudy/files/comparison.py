@@ -19,7 +19,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
 from rsfstudy.files.journal import differences
 from rsfstudy.files.numbers import headline
-from rsfstudy.status import Status
+from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import MEASURED_TIMES
 
 _COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
@@ -249,13 +249,12 @@ def _statuses(shared: Sequence[xr.Dataset], known: np.ndarray) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
     first, second = (one["status"].values for one in shared)
     places = np.nonzero(known & (first != second))
-    labels = {int(s): s.label for s in Status}
     dims = map(str, shared[0]["status"].dims)
     columns: dict[str, Any] = {
         d: shared[0][d].values[at] for d, at in zip(dims, places, strict=True)
     }
     for name, ended in (("first", first), ("second", second)):
-        columns[name] = [labels[code] for code in ended[places].tolist()]
+        columns[name] = [LABELS[code] for code in ended[places].tolist()]
     return pd.DataFrame(columns)
 
 

@@ -1,0 +1,61 @@
+"""The scene that a dataset is of: the one that it describes, or that of a cell that is selected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.declare.study import Study
+from rsfstudy.errors import InvalidValue
+from rsfstudy.files import contents
+from rsfstudy.files.lattice import coordinates
+from rsfstudy.slider.history import of_samples
+from rsfstudy.slider.protocol import Stated, protocol
+from rsfstudy.slider.registry import SLOTS, Own, name_of
+from rsfstudy.slider.scene import Scene
+
+
+def cell(dataset: xr.Dataset, study: Study) -> int:
+    """The number of the cell that is selected."""
+    ours = xr.Dataset(coords=coordinates(study))
+    places = []
+    for name in study.dimensions:
+        given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
+        if given.size != 1:
+            remedy = f"Select a cell first, as in dataset.isel({name}=0)."
+            raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
+        found = np.flatnonzero(ours[name].values == given[0])
+        if not found.size:
+            remedy = "Ask before you convert it to other units."
+            raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)
+        places.append(int(found[0]))
+    return int(np.ravel_multi_index(places, study.shape))
+
+
+def described(dataset: xr.Dataset) -> Scene:
+    """The scene that the attributes of a dataset describe."""
+    plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
+    segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
+    digest = plain.pop("samples", "")
+    own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
+    # protocols of one name differ: the segments tell which it was
+    if segments and (loading not in own or isinstance(own[loading], Stated)):
+        rebuilt = protocol(segments, loading)
+        own[name_of("loading", rebuilt)] = rebuilt
+    if digest:
+        told = dataset["history_samples"]
+        pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
+        sampled = of_samples(told.values, stress, loading, of_pressure=pressure)
+        if sampled.digest != digest:
+            raise contents.refused("history_samples", f"are not those of the scene ({digest})")
+        own[name_of("loading", sampled)] = sampled
+    for slot in SLOTS:
+        name = plain.get(slot.name)
+        if isinstance(name, str) and name not in {*slot.choices, *own}:
+            remedy = "Make a scene with the class itself first, so that its name is known."
+            rule = "is a user's own, and not known here"
+            raise InvalidValue(slot.name, name, rule, remedy=remedy)
+    return contents.scene(plain, own, "scene")
