@@ -319,7 +319,7 @@ def _declared(
         study = lattice.on(study, assignments.laboratory(stated))
         study = replace(study, overrides={**study.overrides, **stated})
         stated = {name: text for name, text in stated.items() if name == "load_velocity"}
-    in_si = {"load_velocity": "m/s", **{name: units for name, (units, *_) in STATED.items()}}
+    in_si = {"load_velocity": "m/s", **{name: about.units for name, about in STATED.items()}}
     texts = {n: t if number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignments.overrides(study, settings)
     return runs.declaration(study, changes, **accuracy)

@@ -52,7 +52,7 @@ def declaration(study: Study, output: Path) -> None:
     about["fixed"] = stated({n: v for n, v in fixed.items() if v})
     about["0 or absent"] = ", ".join(n for n, v in fixed.items() if not v)
     if study.laboratory:
-        rig = {n: f"{v:g} {STATED[n][0]}" for n, v in study.laboratory.as_dict().items()}
+        rig = {n: f"{v:g} {STATED[n].units}" for n, v in study.laboratory.as_dict().items()}
         about["laboratory"] = ", ".join(f"{n} = {v}" for n, v in rig.items())
     measured = {n: v for n, v in study.measure.describe().items() if n not in varied}
     about["measure"] = ", ".join(f"{n} = {_brief(v)}" for n, v in measured.items())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -76,12 +76,11 @@ def history(
         rule = f"has columns of {sorted(sizes)} samples: all must have as many, 2 at least"
         raise InvalidValue("record", [*found], rule)
     for key, column in found.items():
-        wrong = ~np.isfinite(column.values)
-        _check(key, column.values, wrong, "must be a finite number", column.place)
+        column.check(key, ~np.isfinite(column.values), "must be a finite number")
     values = {key: _plain(key, column, laboratory) for key, column in found.items()}
-    time, clock = values["time"], found["time"]
+    time = values["time"]
     late = np.append(False, np.diff(time) <= 0.0)
-    _check("time", clock.values, late, "must be later than the sample before", clock.place)
+    found["time"].check("time", late, "must be later than the sample before")
     velocity, back = _velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:
@@ -89,7 +88,7 @@ def history(
         fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
         rule = "leaves no normal stress: it must stay positive, less pore pressure"
-        _check(key, found[key].values, fall >= 1.0, rule, found[key].place)
+        found[key].check(key, fall >= 1.0, rule)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
     return sampled(time, velocity, fall, name, of_pressure=of_pressure, back=back)
 
@@ -157,12 +156,3 @@ def _velocity(
         return mean, None
     first = int(np.argmax(back))
     return mean, (key, float(found[key].values[first]), found[key].place(first))
-
-
-def _check(
-    name: str, values: np.ndarray, wrong: np.ndarray, rule: str, place: Callable[[int], str]
-) -> None:
-    """Raise InvalidValue for the first sample that is wrong, with its place."""
-    if wrong.any():
-        first = int(np.argmax(wrong))
-        raise InvalidValue(name, float(values[first]), rule).at(place(first))

@@ -26,7 +26,7 @@ from rsfstudy.rig.quantities import (
     stated,
     units_of,
 )
-from rsfstudy.rig.scales import Scale, in_units, scales, scales_of
+from rsfstudy.rig.scales import Scale, in_units, scales_of, scales_of_rig
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
@@ -38,18 +38,6 @@ SEGMENT = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
-
-#: Symbols of what a rig states, and what each is.
-_SHOWN = {
-    "normal_stress": (r"$\sigma_*$", "normal stress"),
-    "slip_distance": ("$D_c$", "slip distance"),
-    "reference_velocity": ("$V_*$", "velocity of the load point before the test"),
-    "stiffness": ("$k$", "stiffness of the machine with its sample"),
-    "period": ("$T$", "period of free oscillation"),
-    "mass": ("$m$", "mass over the area of the fault"),
-    "shear_modulus": ("$G$", "shear modulus of the medium"),
-    "density": (r"$\rho$", "density of the medium"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,14 +92,13 @@ class Laboratory(ShownAsTable):
     def shown(self) -> Iterator[tuple[Quantity, object]]:
         """What the rig states, in SI units."""
         for name, value in self.as_dict().items():
-            symbol, meaning = _SHOWN[name]
-            yield Quantity(name, symbol, STATED[name][0], meaning), value
+            about = STATED[name]
+            yield Quantity(name, about.symbol, about.units, about.meaning), value
 
     @property
     def scales(self) -> dict[str, Scale]:
         """Scales of dimensionless quantities, in SI units."""
-        rate = self.reference_velocity / self.slip_distance
-        return scales(self.normal_stress, self.slip_distance, rate)
+        return scales_of_rig(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or

@@ -28,7 +28,7 @@ from rsfstudy.rig.quantities import (
     stated,
     units_of,
 )
-from rsfstudy.rig.scales import BESIDE, scales
+from rsfstudy.rig.scales import BESIDE, scales_of_rig
 from rsfstudy.rig.units import exact, factor, parted, spaced, times
 from rsfstudy.slider.scene import Scene
 
@@ -179,7 +179,7 @@ def _si_units(name: str, value: Any) -> str | None:
     if value is None or isinstance(value, bool):
         return None
     if name in OF_AXIS:
-        return STATED[OF_AXIS[name]][0]
+        return STATED[OF_AXIS[name]].units
     if name in FULL:
         return UNITS["V_*"]
     return units_of(name, value)
@@ -339,9 +339,7 @@ def _alike(theirs: Any, value: Any) -> bool:
 
 def _scales(rig: Mapping[str, Any]) -> dict[str, Any]:
     """Value of 1 in SI units, by what quantities are measured in."""
-    rate = rig["reference_velocity"] / rig["slip_distance"]
-    found = scales(rig["normal_stress"], rig["slip_distance"], rate)
-    return {name: scale.factor for name, scale in found.items()}
+    return {name: scale.factor for name, scale in scales_of_rig(rig).items()}
 
 
 def _squeezed(along: Sequence[Axis], values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:

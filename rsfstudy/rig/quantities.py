@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,16 +13,30 @@ from rsfstudy.rig.units import in_si
 from rsfstudy.slider.numbers import SPRING
 from rsfstudy.slider.registry import QUANTITIES
 
-#: What a laboratory may state: SI units, and the range that is usual; beyond it, it warns.
-STATED: Mapping[str, tuple[str, float, float]] = {
-    "normal_stress": ("Pa", 1e2, 1e10),
-    "slip_distance": ("m", 1e-9, 1e-1),
-    "reference_velocity": ("m/s", 1e-13, 1e1),
-    "stiffness": ("Pa/m", 1e4, 1e15),
-    "period": ("s", 1e-6, 1e3),
-    "mass": ("kg/m^2", 1e-2, 1e9),
-    "shear_modulus": ("Pa", 1e5, 1e12),
-    "density": ("kg/m^3", 1e2, 2e4),
+
+class Stated(NamedTuple):
+    """What a laboratory may state: SI units, the range that is usual, beyond which it warns, a
+    symbol, and what it is.
+    """
+
+    units: str
+    least: float
+    most: float
+    symbol: str
+    meaning: str
+
+
+STATED: Mapping[str, Stated] = {
+    "normal_stress": Stated("Pa", 1e2, 1e10, r"$\sigma_*$", "normal stress"),
+    "slip_distance": Stated("m", 1e-9, 1e-1, "$D_c$", "slip distance"),
+    "reference_velocity": Stated(
+        "m/s", 1e-13, 1e1, "$V_*$", "velocity of the load point before the test"
+    ),
+    "stiffness": Stated("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
+    "period": Stated("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
+    "mass": Stated("kg/m^2", 1e-2, 1e9, "$m$", "mass over the area of the fault"),
+    "shear_modulus": Stated("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
+    "density": Stated("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
 }
 #: What it must state: the scales of all else.
 SCALES = ("normal_stress", "slip_distance", "reference_velocity")
@@ -59,7 +73,7 @@ def stated(name: str, value: Any, stress: float | None = None) -> float:
     InvalidValue
         For what is no quantity, of another kind, or not positive.
     """
-    units, least, most = STATED[name]
+    units, least, most, *_words = STATED[name]
     found = in_si_of(name, value, units, stress)
     if not found > 0.0:
         raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")

@@ -103,11 +103,7 @@ def read_record(
     for key, column in found.items():
         if key not in _UNITS:
             raise InvalidValue("column", key, "is unknown", choices=_UNITS)
-        wrong = ~np.isfinite(column.values)
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            rule = "must be a finite number"
-            raise InvalidValue(key, float(column.values[row]), rule).at(column.place(row))
+        column.check(key, ~np.isfinite(column.values), "must be a finite number")
         values[key] = column.values * _scale(key, column.units)
     return _record(values, normal_stress, name or _name(source))
 

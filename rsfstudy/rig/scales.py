@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -77,6 +77,12 @@ def _held(
         remedy = "Each cell is converted by its own: state another to the scenes."
         raise InvalidValue(name, stated, rule, remedy=remedy)
     return held
+
+
+def scales_of_rig(rig: Mapping[str, Any]) -> dict[str, Scale]:
+    """The scales of a rig, in SI units; of arrays of its quantities arrays."""
+    rate = rig["reference_velocity"] / rig["slip_distance"]
+    return scales(rig["normal_stress"], rig["slip_distance"], rate)
 
 
 def in_units(

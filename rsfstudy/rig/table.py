@@ -50,6 +50,12 @@ class Column(NamedTuple):
             return f"sample {row + 1}"
         return f"{self.path}, line {self.lines[row]}, column {self.number}"
 
+    def check(self, name: str, wrong: np.ndarray, rule: str) -> None:
+        """Raise `InvalidValue` for the first number that is wrong, with its place."""
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InvalidValue(name, float(self.values[row]), rule).at(self.place(row))
+
 
 @door
 def read_table(

@@ -182,7 +182,7 @@ def rig() -> str:
     must = {name: name in quantities.SCALES for name in quantities.STATED}
     rows = (
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
-        for name, (units, least, most) in quantities.STATED.items()
+        for name, (units, least, most, *_words) in quantities.STATED.items()
     )
     return table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
 
