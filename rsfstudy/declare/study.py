@@ -28,6 +28,8 @@ from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig import lattice
+from rsfstudy.rig.axes import axis as axis_in_units
+from rsfstudy.rig.axes import in_units
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import ALSO, FULL
 from rsfstudy.slider.registry import (
@@ -152,7 +154,7 @@ class Study:
         if not self.axes:
             raise InvalidValue("axes", self.axes, "must hold at least one axis")
         if self.laboratory is not None:
-            object.__setattr__(self, "axes", [lattice.in_units(axis) for axis in self.axes])
+            object.__setattr__(self, "axes", [in_units(axis) for axis in self.axes])
         self.measure.check()
         known = list(self.measure.variables)
         for reduction in self.reductions:
@@ -369,7 +371,7 @@ class Study:
         if axis.labels is not None:
             rule = f"states what {ALSO[name]} does along {axis.dimension}"
             raise InvalidValue(name, values, rule, remedy=f"Give {ALSO[name]}.")
-        return lattice.axis(name, values) if self.laboratory else Axis(name, values)
+        return axis_in_units(name, values) if self.laboratory else Axis(name, values)
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""

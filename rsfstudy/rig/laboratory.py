@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.declare.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, ShownAsTable
-from rsfstudy.rig import lattice
+from rsfstudy.rig import axes
 from rsfstudy.rig.quantities import (
     FIELDS,
     FULL,
@@ -131,7 +131,7 @@ class Laboratory(ShownAsTable):
         return Scene(**fields)
 
     def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
-        """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.lattice.axis`.
+        """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.axes.axis`.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Laboratory(ShownAsTable):
         units : mapping of str to str, optional
             Of columns of a table that do not state them; SI units by default.
         """
-        return lattice.axis(dimension, values, units or "")
+        return axes.axis(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
