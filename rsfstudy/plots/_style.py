@@ -7,7 +7,8 @@ from __future__ import annotations
 import contextlib
 import itertools
 import string
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -117,28 +118,38 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         Most entries beside each other; fewer where they would be wider than the panel.
     title : str, optional
     """
-    handles, labels = axes.get_legend_handles_labels()
-    shown: dict[str, Any] = {}
-    for handle, label in zip(handles, labels, strict=True):
-        if _is_drawn(handle):
-            shown.setdefault(wrapped(label, 48), handle)
+    shown = _named(axes)
     if not shown:
         return
     lines = 1 + axes.get_xlabel().count("\n")
     drop = rcParams["font.size"] * (2.4 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
-    for beside in range(min(columns, len(shown)), 0, -1):
-        made = axes.legend(
-            list(shown.values()),
-            list(shown),
-            loc="upper center",
-            bbox_to_anchor=(0.5 * (left + right), 0.0),
-            bbox_transform=blended_transform_factory(figure.transFigure, below),
-            ncols=beside,
-            title=title,
-        )
-        if made.get_window_extent().width <= 0.97 * (right - left) * figure.bbox.width:
+    made = partial(
+        axes.legend,
+        list(shown.values()),
+        list(shown),
+        loc="upper center",
+        bbox_to_anchor=(0.5 * (left + right), 0.0),
+        bbox_transform=blended_transform_factory(figure.transFigure, below),
+        title=title,
+    )
+    _fit(made, min(columns, len(shown)), 0.97 * (right - left) * figure.bbox.width)
+
+
+def _named(axes: Axes) -> dict[str, Any]:
+    """What is drawn on the axes, by its name."""
+    named: dict[str, Any] = {}
+    for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+        if _is_drawn(handle):
+            named.setdefault(wrapped(label, 48), handle)
+    return named
+
+
+def _fit(made: Callable[..., Legend], columns: int, width: float) -> None:
+    """Make a legend of so many columns, or of fewer, until it is no wider than that."""
+    for beside in range(columns, 0, -1):
+        if made(ncols=beside).get_window_extent().width <= width:
             return
 
 
@@ -179,24 +190,17 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
             alike, chosen = within, fullest
     if not alike:
         return
-    handles, labels = chosen.get_legend_handles_labels()
-    by_text: dict[str, Any] = {}
-    for handle, label in zip(handles, labels, strict=True):
-        by_text.setdefault(wrapped(label, 48), handle)
-    title = cast(Legend, chosen.get_legend()).get_title().get_text()
+    handles, title = _named(chosen), cast(Legend, chosen.get_legend()).get_title().get_text()
     for panel in alike:
         cast(Legend, panel.get_legend()).remove()
-    for beside in range(min(len(named[chosen]), 5), 0, -1):
+
+    def made(ncols: int) -> Legend:
         figure.legends.clear()
-        made = figure.legend(
-            [by_text[text] for text in named[chosen]],
-            named[chosen],
-            loc="outside lower center",
-            ncols=beside,
-            title=title,
-        )
-        if made.get_window_extent().width <= figure.bbox.width:
-            return
+        place: Any = "outside lower center"
+        shown = [handles[text] for text in named[chosen]]
+        return figure.legend(shown, named[chosen], loc=place, ncols=ncols, title=title)
+
+    _fit(made, min(len(named[chosen]), 5), figure.bbox.width)
 
 
 def _texts(legend: Legend) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -74,7 +73,8 @@ def _lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
         if coloured is None:
             axes.plot(x, np.atleast_1d(group.values), **style)
             continue
-        for row, colour in _scaled(dataset, group, coloured):
+        shades = colours(dataset, coloured)
+        for row, colour in zip(_points(group, [coloured]), shades, strict=True):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
     if coloured is not None:
@@ -123,10 +123,3 @@ def _different(
         (same[0], ", ".join(place(same[0], d) for d in common[first]))
         for first, same in alike.items()
     ]
-
-
-def _scaled(
-    dataset: xr.Dataset, group: xr.DataArray, dimension: str
-) -> Iterator[tuple[xr.DataArray, Any]]:
-    """The values at each point of an axis, with its colour."""
-    return zip(_points(group, [dimension]), colours(dataset, dimension), strict=True)
