@@ -87,15 +87,10 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         _say("interrupted")
         sys.exit(FAILED)
-    except InvalidValue as error:
-        _say(f"error: {error}")
-        sys.exit(WRONG_USAGE)
-    except Interrupted as error:
-        _say(f"error: {error}")
-        sys.exit(error.exit_status)
     except RsfStudyError as error:
         _say(f"error: {error}")
-        sys.exit(FAILED)
+        of_ours = WRONG_USAGE if isinstance(error, InvalidValue) else FAILED
+        sys.exit(error.exit_status if isinstance(error, Interrupted) else of_ours)
     except Exception as error:
         if os.environ.get("RSFSTUDY_TRACEBACK"):
             raise
