@@ -68,14 +68,14 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     from rsfstudy.plots import name_rows
 
     rows = dataset.stack(row=("design", "noise_size"))
-    names = [f"{design}\nnoise {size:g}" for design, size in rows["row"].values]
+    names = [f"{design}, noise {size:g}" for design, size in rows["row"].values]
     begin = np.zeros(len(names))
     colours = {"right": "#0072b2", "open": "0.8", "wrong": "#d55e00"}
     for key, colour in colours.items():
         shares = 100.0 * rows[f"chosen_{key}"].values
         axes.barh(range(len(names)), shares, left=begin, color=colour, label=key, height=0.6)
         begin = begin + shares
-    name_rows(axes, names)
+    name_rows(axes, names, 20)
     axes.set_xlim(0.0, 100.0)
 
 

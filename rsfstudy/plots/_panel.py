@@ -46,16 +46,28 @@ def expanded(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
     if panel.when and not panel.when(dataset):
         return []
     places = np.ndindex(*(dataset.sizes[d] for d in panel.each))
-    return [
+    found = [
         replace(panel, each=(), at={**dict(zip(panel.each, at, strict=True)), **panel.at})
         for at in places
     ]
+    return [one for one in found if not callable(panel.y) or _is_known(one, dataset)]
+
+
+def _is_known(panel: Panel, dataset: xr.Dataset) -> bool:
+    """True if the function of a panel has a number anywhere."""
+    found = (_values(panel.y, row) for row, _style in rows(panel, _part(panel, dataset)))
+    return bool(panel.marks) or any(np.isfinite(values.astype(float)).any() for values in found)
+
+
+def _part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
+    """The part of a dataset that a panel shows."""
+    at = {d: place for d, place in panel.at.items() if d in dataset.dims}
+    return dataset.isel({d: _numbers(dataset[d], place) for d, place in at.items()})
 
 
 def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     """Draw all of a panel that does not depend on others."""
-    at = {d: place for d, place in panel.at.items() if d in dataset.dims}
-    part = dataset.isel({d: _numbers(dataset[d], place) for d, place in at.items()})
+    part = _part(panel, dataset)
     if panel.x and (panel.y in part if isinstance(panel.y, str) else panel.y):
         values = [_curve(panel, row, axes, style) for row, style in rows(panel, part)]
         _name_second(panel, part, axes)
@@ -136,7 +148,7 @@ def _shades(part: xr.Dataset, dimension: str) -> np.ndarray | None:
 
 def _name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
     name = pretty(panel.name(row)) if panel.name else ", ".join(place(row, d) for d in by) or None
-    if name is None or not np.isfinite(row.get(panel.says, np.nan)):
+    if name is None or not np.isfinite(row.get(f"{panel.says}_stderr", np.nan)):
         return name
     symbol = quantity(panel.says, stated_by(row)).symbol
     slope = f"{symbol} = {slope_with_error(row, panel.says, _DIGITS)}".removeprefix(" = ")

@@ -40,6 +40,7 @@ _SHORT = {
     "critical_displacement": "critical displacement",
     "critical_velocity_ratio": "critical load point velocity",
     "critical_stiffness": "critical stiffness",
+    "critical_stiffness_from_growth": "critical stiffness by growth",
     "dilatancy": "dilatancy",
     "drainage": "drainage",
     "dynamic_stress_drop": "dynamic stress drop",

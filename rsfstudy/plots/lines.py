@@ -115,8 +115,9 @@ def _different(
     for group in groups:
         if bool(np.isfinite(group).any()):
             alike.setdefault(group.values.tobytes(), []).append(group)
+    several = [d for d in dimensions if len({str(group[d].item()) for group in groups}) > 1]
     common = {
-        first: [d for d in dimensions if len({str(group[d].item()) for group in same}) == 1]
+        first: [d for d in several if len({str(group[d].item()) for group in same}) == 1]
         for first, same in alike.items()
     }
     return [

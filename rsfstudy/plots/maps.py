@@ -101,7 +101,8 @@ def draw_map(
             bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
             bar.set_label(label(quantity(name, stated_by(dataset)), 34))
             contours(axes, values, found[1])
-    status = dataset["status"].squeeze()
+    status = dataset["status"]
+    status = status.squeeze([d for d in status.dims if status.sizes[d] == 1 and d not in plane])
     if set(status.dims) == set(plane):
         unknown = ~np.isfinite(values.values)
         _statuses(axes, at, status.transpose(*plane).values, unknown)
