@@ -85,7 +85,7 @@ shares = Panel(
     marks=[mark_shares],
     x_label="Parameter",
     y_label="Truth inside 68.3 % interval (%)",
-    y_limits=(0.0, 100.0),
+    y_limits=(0.0, 103.0),
     alike="share",
 )
 

@@ -68,7 +68,7 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     from rsfstudy.plots import name_rows
 
     rows = dataset.stack(row=("design", "noise_size"))
-    names = [f"{design}, noise {size:g}" for design, size in rows["row"].values]
+    names = [f"{design}, noise = {size:g}" for design, size in rows["row"].values]
     begin = np.zeros(len(names))
     colours = {"right": "#0072b2", "open": "0.8", "wrong": "#d55e00"}
     for key, colour in colours.items():

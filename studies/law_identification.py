@@ -85,8 +85,8 @@ def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
         axes.errorbar(number + 0.35, EXPONENT, promise, color="0.2", capsize=4, marker="_")
         text = f"{promise:.3f}"
         axes.annotate(text, (number + 0.35, EXPONENT + promise), (0, 4), textcoords="offset points")
-    axes.set_xticks(range(len(DESIGNS)), list(DESIGNS))
-    axes.set_xlim(-0.4, len(DESIGNS) - 0.3)
+    axes.set_xticks(range(seen.sizes["design"]), [str(name) for name in seen["design"].values])
+    axes.set_xlim(-0.4, seen.sizes["design"] - 0.3)
     axes.axhline(EXPONENT, color="0.6", linewidth=0.8)
 
 

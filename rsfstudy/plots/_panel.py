@@ -56,7 +56,7 @@ def expanded(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
 def _is_known(panel: Panel, dataset: xr.Dataset) -> bool:
     """True if the function of a panel has a number anywhere."""
     found = (_values(panel.y, row) for row, _style in rows(panel, _part(panel, dataset)))
-    return bool(panel.marks) or any(np.isfinite(values.astype(float)).any() for values in found)
+    return any(np.isfinite(values.astype(float)).any() for values in found)
 
 
 def _part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
@@ -77,6 +77,9 @@ def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     for which, limits in (("x", panel.x_limits), ("y", panel.y_limits)):
         if any(end is not None for end in limits):
             getattr(axes, f"set_{which}lim")(*limits)
+        if which == "y" and limits[1] is None is not limits[0]:
+            top = float(axes.dataLim.ymax)  # what lies highest is seen whole
+            axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = room(axes)
     axes.set_xlabel(_label(panel.x, panel.x_label, part, across - _LETTER))
     axes.set_ylabel(_label(panel.y, panel.y_label, part, up))

@@ -30,6 +30,8 @@ from rsfstudy.vocabulary import quantity
 #: Most panels, and most lines that a legend names; lines along a longer axis of numbers are told
 #: apart by a scale of colours.
 _PANELS, _NAMED, _COLOURED = 4, 24, 6
+#: Most curves that lie on each other and are all named.
+_FEW = 3
 #: Most points of a line with markers.
 _MARKED = 60
 
@@ -116,11 +118,14 @@ def _different(
         if bool(np.isfinite(group).any()):
             alike.setdefault(group.values.tobytes(), []).append(group)
     several = [d for d in dimensions if len({str(group[d].item()) for group in groups}) > 1]
-    common = {
-        first: [d for d in several if len({str(group[d].item()) for group in same}) == 1]
-        for first, same in alike.items()
-    }
-    return [
-        (same[0], ", ".join(place(same[0], d) for d in common[first]))
-        for first, same in alike.items()
-    ]
+    return [(same[0], ", ".join(_named(same, several))) for same in alike.values()]
+
+
+def _named(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
+    """Places of curves that lie on each other: what they have in common, or else all of the two or
+    three that there are.
+    """
+    places = [list(dict.fromkeys(place(group, d) for group in same)) for d in dimensions]
+    if len(same) <= _FEW and all(len(names) > 1 for names in places):
+        return (" and ".join(", ".join(place(one, d) for d in dimensions) for one in same),)
+    return tuple(names[0] for names in places if len(names) == 1)
