@@ -10,7 +10,7 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.signal import lfilter
 
 from rsfstudy.analysis.fitting import noise as noises
-from rsfstudy.analysis.fitting.noise import Noise
+from rsfstudy.analysis.fitting.noise import Noise, Run
 from rsfstudy.errors import InvalidValue
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
@@ -33,35 +33,44 @@ def partial(coefficients: np.ndarray) -> np.ndarray:
     return np.array([np.linalg.solve(toeplitz(seen[:n]), seen[1 : n + 1])[-1] for n in orders])
 
 
-def dense(runs: tuple[tuple[int, int, int], ...], sizes: list[float]) -> np.ndarray:
-    """The covariance of runs of an AR(3) and of an AR(1) process, in blocks."""
-    seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
-    return np.asarray(
-        block_diag(*(sizes[n] ** 2 * toeplitz(seen[n][: last - first]) for first, last, n in runs))
-    )
-
-
 #: Runs of two processes, of which one is shorter than their order.
-RUNS = ((0, 40, 0), (40, 42, 1), (42, 90, 0), (90, 130, 1))
+RUNS = (Run(0, 40, 0, 0), Run(40, 42, 1, 0), Run(42, 90, 0, 0), Run(90, 130, 1, 0))
 SIZES = [1.0, 0.3]
 BOTH = Noise(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
+#: One process whose size changes, first after fewer rows than its order.
+JOINED = (Run(0, 2, 0, 0), Run(2, 42, 1, 2), Run(42, 90, 0, 42), Run(90, 130, 1, 90))
+CHANGING = Noise(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 
 
-def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix() -> None:
-    matrix = dense(RUNS, SIZES)
+def dense(noise: Noise) -> np.ndarray:
+    """The covariance: runs of an AR(3) and of an AR(1) process in blocks, or one AR(3) process."""
+    seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
+    sizes = np.concatenate([[noise.sizes[r.number]] * (r.last - r.first) for r in noise.runs])
+    if noise is CHANGING:
+        return np.asarray(toeplitz(seen[0][:130]) * np.outer(sizes, sizes))
+    if not noise.partial.any():
+        return np.diag(sizes**2)
+    blocks = [toeplitz(seen[r.number][: r.last - r.first]) for r in noise.runs]
+    return np.asarray(block_diag(*blocks) * np.outer(sizes, sizes))
+
+
+@pytest.mark.parametrize("noise", [BOTH, CHANGING], ids=["apart", "one whose size changes"])
+def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: Noise) -> None:
+    matrix = dense(noise)
     triangle = np.linalg.cholesky(matrix)
-    found = BOTH.whitened(np.eye(len(matrix)))
+    found = noise.whitened(np.eye(len(matrix)))
     # rounding times the condition of the matrix, 1e3
     np.testing.assert_allclose(found, np.linalg.inv(triangle), atol=1e-11)
     exact = 2.0 * np.log(np.diag(triangle)).sum()
-    assert BOTH.log_determinant == pytest.approx(exact, abs=1e-10)
+    assert noise.log_determinant == pytest.approx(exact, abs=1e-10)
 
 
-def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices() -> None:
+@pytest.mark.parametrize("noise", [BOTH, CHANGING], ids=["apart", "one whose size changes"])
+def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(noise: Noise) -> None:
     rng = np.random.default_rng(1)
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
-    products = noises._Products(RUNS, 2, np.column_stack([jacobian, residuals]), 3)
+    products = noises._Products(noise.runs, 2, np.column_stack([jacobian, residuals]), 3)
 
     def exact(matrix: np.ndarray) -> float:
         told = jacobian.T @ np.linalg.solve(matrix, jacobian)
@@ -71,40 +80,27 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices() -> N
         logs = np.linalg.slogdet(matrix)[1] + np.linalg.slogdet(told)[1]
         return float((130 - 3) * math.log(squares) + logs)
 
-    plain = Noise(RUNS, np.zeros((2, 3)), np.array([1.0, 2.0]))
-    apart = exact(dense(RUNS, SIZES)) - exact(np.diag(np.square(np.diag(plain_sizes(plain)))))
-    assert products.misfit(BOTH) - products.misfit(plain) == pytest.approx(apart, abs=1e-8)
-
-
-def plain_sizes(plain: Noise) -> np.ndarray:
-    """Sizes of white noise along its rows."""
-    return np.diag(np.concatenate([[plain.sizes[n]] * (j - i) for i, j, n in plain.runs]))
-
-
-def test_draws_have_the_covariance() -> None:
-    rng = np.random.default_rng(2)
-    drawn = np.array([BOTH.draw(rng) for _ in range(3_000)])
-    # a covariance of 3,000 draws is off by its size over the root of them: five such at most
-    off = np.abs(drawn.T @ drawn / len(drawn) - dense(RUNS, SIZES))
-    assert off.max() < 5.5 * math.sqrt(2.0 / 3_000)
+    plain = Noise(noise.runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
+    apart = exact(dense(noise)) - exact(dense(plain))
+    assert products.misfit(noise) - products.misfit(plain) == pytest.approx(apart, abs=1e-8)
 
 
 def test_independent_samples_of_first_order() -> None:
-    one = Noise(((0, 500, 0),), np.array([[0.9]]), np.ones(1))
+    one = Noise((Run(0, 500, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.effective_samples == pytest.approx(500 * 0.1 / 1.9)
 
 
 def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     """In closed form for first order; else by how the power at zero frequency scatters."""
-    one = Noise(((0, 500, 0),), np.array([[0.9]]), np.ones(1))
+    one = Noise((Run(0, 500, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.degrees == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
     assert noises.white(np.arange(500.0)).degrees == 500
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
-        found = Noise(((0, 3_000, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1))
+        found = Noise((Run(0, 3_000, 0, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1))
         logs.append(math.log(np.var(drawn) / found.effective_samples))
-    exact = Noise(((0, 3_000, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
+    exact = Noise((Run(0, 3_000, 0, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
     # a variance of 400 draws has a standard error of a fourteenth
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
@@ -147,12 +143,12 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
     found = noises.fitted("ar1", time, left, np.ones((1_500, 1)))
-    assert [run[:2] for run in found.runs] == [(0, 600), (600, 1_500)]
-    coefficients = dict(zip([n for _i, _j, n in found.runs], (0.5, 0.95), strict=True))
+    assert [(*run[:2], run.before) for run in found.runs] == [(0, 600, 0), (600, 1_500, 600)]
+    coefficients = dict(zip([run.number for run in found.runs], (0.5, 0.95), strict=True))
     for number, exact in coefficients.items():
         assert found.partial[number, 0] == pytest.approx(exact, abs=0.12)
     # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
-    sizes = found.sizes[[n for _i, _j, n in found.runs]]
+    sizes = found.sizes[[run.number for run in found.runs]]
     assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -161,7 +157,7 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     """Intervals that vary, or that a logger has rounded to one or two ticks, tell one noise."""
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
-    assert noises._runs(time) == ((0, 2_000, 0),)
+    assert noises._runs(time) == (Run(0, 2_000, 0, 0),)
 
 
 def test_noise_without_size() -> None:

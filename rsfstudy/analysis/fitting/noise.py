@@ -7,14 +7,18 @@ n samples, REML minimises
     (n - p) ln(S/(n - p)) + ln|R| + ln|J' R^-1 J|,
 
 S being the sum of squares that generalised least squares leaves. Samples taken at other intervals
-have noise of their own: another size, and other correlations.
+have noise of their own, of another size and other correlations; where intervals change, the samples
+before still tell of those behind, by their sizes.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -44,21 +48,39 @@ def check_noise(name: str) -> None:
         raise InvalidValue("noise", name, "is unknown", choices=choices)
 
 
+class Run(NamedTuple):
+    """Samples taken at one interval.
+
+    Attributes
+    ----------
+    first, last : int
+        First row, and row behind the last.
+    number : int
+        That of the process.
+    before : int
+        Rows before it since the clock began.
+    """
+
+    first: int
+    last: int
+    number: int
+    before: int
+
+
 @dataclass(frozen=True)
 class Noise:
     """The noise of samples, which come in runs of one sampling interval.
 
     Attributes
     ----------
-    runs : tuple of (int, int, int)
-        First row, row behind the last, and number of the process of each run.
+    runs : tuple of Run
     partial : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
     sizes : ndarray, shape (processes,)
         Standard deviations, over that of the first one.
     """
 
-    runs: tuple[tuple[int, int, int], ...]
+    runs: tuple[Run, ...]
     partial: np.ndarray
     sizes: np.ndarray
 
@@ -71,21 +93,28 @@ class Noise:
         """Columns freed of correlation: shape (samples, columns), each sample less what those
         before tell of it, over the standard deviation of what is left.
         """
-        found, predictors = np.empty_like(columns), [*map(_predictors, self.partial)]
-        for first, last, number in self.runs:
-            found[first:last] = _innovations(columns[first:last], *predictors[number])
-            found[first:last] /= self.sizes[number]
+        scaled = columns / self.sizes[_numbers(self.runs)][:, None]
+        found = np.empty_like(columns)
+        for run in self.runs:
+            known = min(run.before, self.order)
+            part = scaled[run.first - known : run.last]
+            found[run.first : run.last] = _innovations(part, *self.predictors[run.number])[known:]
         return found
+
+    @cached_property
+    def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
+        """Coefficients and variances of each process (see `_predictors`)."""
+        return [*map(_predictors, self.partial)]
 
     @property
     def log_determinant(self) -> float:
         """``ln|R|``."""
         total = 0.0
-        for first, last, number in self.runs:
-            variances = _predictors(self.partial[number])[1]
-            early = min(last - first, self.order)
-            total += math.fsum(map(math.log, variances[:early]))
-            total += (last - first - early) * math.log(variances[-1])
+        for first, last, number, before in self.runs:
+            variances = self.predictors[number][1]
+            early = variances[min(before, self.order) : min(before + last - first, self.order)]
+            total += math.fsum(map(math.log, early))
+            total += (last - first - len(early)) * math.log(variances[-1])
             total += 2.0 * (last - first) * math.log(self.sizes[number])
         return total
 
@@ -93,10 +122,10 @@ class Noise:
     def effective_samples(self) -> float:
         """Number of independent samples that tell a mean as well."""
         total = 0.0
-        for first, last, number in self.runs:
-            coefficients, variances = _predictors(self.partial[number])
+        for run in self.runs:
+            coefficients, variances = self.predictors[run.number]
             at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
-            total += max(1.0, (last - first) / max(at_rest, 1.0))
+            total += max(1.0, (run.last - run.first) / max(at_rest, 1.0))
         return total
 
     @property
@@ -105,27 +134,13 @@ class Noise:
         2 over the variance of its logarithm, in which coefficients that are found count.
         """
         total = 0.0
-        for number, partial in enumerate(self.partial):
-            rows = sum(last - first for first, last, n in self.runs if n == number)
-            coefficients, variances = _predictors(partial)
+        rows = np.bincount(_numbers(self.runs)).tolist()
+        for count, (coefficients, variances) in zip(rows, self.predictors, strict=True):
             at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
             # coefficients have the covariance (variance left) R^-1/rows
             ones = _innovations(np.ones((self.order, 1)), coefficients, variances)
-            total += rows / (1.0 + 2.0 * at_rest * float(np.square(ones).sum()))
+            total += count / (1.0 + 2.0 * at_rest * float(np.square(ones).sum()))
         return total
-
-    def draw(self, rng: np.random.Generator) -> np.ndarray:
-        """One sample of the noise, of unit size."""
-        found = np.empty(self.runs[-1][1])
-        for first, last, number in self.runs:
-            coefficients, variances = _predictors(self.partial[number])
-            for row in range(first, last):
-                told = coefficients[min(row - first, self.order)]
-                left = math.sqrt(variances[min(row - first, self.order)])
-                before = found[row - len(told) : row][::-1]
-                found[row] = np.dot(told, before) + left * rng.standard_normal()
-            found[first:last] *= self.sizes[number]
-        return found
 
 
 def white(time: np.ndarray) -> Noise:
@@ -146,7 +161,7 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
         Derivatives of the model.
     """
     runs, count = _runs(time), _count(time)
-    parts = [[residuals[i:j] for i, j, number in runs if number == n] for n in range(count)]
+    parts = [[residuals[r.first : r.last] for r in runs if r.number == n] for n in range(count)]
     stated = name.removeprefix(AUTOREGRESSIVE)
     order = 0 if name == WHITE else int(stated) if stated else _order(parts)
     sizes = np.array([max(float(np.std(np.concatenate(part))), 1e-300) for part in parts])
@@ -185,8 +200,7 @@ class _Products:
 
     Parameters
     ----------
-    runs : tuple of (int, int, int)
-        As those of `Noise`.
+    runs : tuple of Run
     count : int
         How many processes there are.
     columns : ndarray, shape (samples, columns)
@@ -196,12 +210,11 @@ class _Products:
 
     def __init__(
         self,
-        runs: Sequence[tuple[int, int, int]],
+        runs: Sequence[Run],
         count: int,
         columns: np.ndarray,
         order: int,
     ) -> None:
-        self.runs, self.order = runs, order
         self.rows, self.parameters = len(columns), columns.shape[1] - 1
         # derivatives may be next to dependent: those of the same span are as good, up to a constant
         base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]
@@ -209,27 +222,33 @@ class _Products:
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
         self.sums = np.zeros((count, order + 1, order + 1, width, width))
-        self.early = [columns[first : min(first + order, last)] for first, last, _n in runs]
-        for first, last, number in runs:
-            part = columns[first:last]
+        #: The first rows of each run with those before that tell of them: how many these are, and
+        #: the processes of all.
+        self.early: list[tuple[np.ndarray, int, np.ndarray]] = []
+        numbers = _numbers(runs)
+        for run in runs:
+            known = min(run.before, order)
+            rows = slice(run.first - known, min(run.first + order, run.last))
+            self.early.append((columns[rows], known, numbers[rows]))
+            part = columns[run.first : run.last]
             later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
             for i in range(order + 1 if len(part) > order else 0):
                 for j in range(i + 1):
                     found = later[i].T @ later[j]
-                    self.sums[number, i, j] += found
+                    self.sums[run.number, i, j] += found
                     if i > j:
-                        self.sums[number, j, i] += found.T
+                        self.sums[run.number, j, i] += found.T
 
     def misfit(self, noise: Noise) -> float:
         """What REML minimises, up to a constant; infinite where nothing is left."""
         total = np.zeros(self.sums.shape[-2:])
-        predictors = [*map(_predictors, noise.partial)]
-        for number, (coefficients, variances) in enumerate(predictors):
+        for number, (coefficients, variances) in enumerate(noise.predictors):
             full = np.append(1.0, -np.array(coefficients[-1]))
             scale = variances[-1] * noise.sizes[number] ** 2
             total += np.einsum("i,j,ijab->ab", full, full, self.sums[number]) / scale
-        for early, (_first, _last, number) in zip(self.early, self.runs, strict=True):
-            begun = _innovations(early, *predictors[number]) / noise.sizes[number]
+        for early, known, numbers in self.early:
+            scaled = early / noise.sizes[numbers][:, None]
+            begun = _innovations(scaled, *noise.predictors[numbers[-1]])[known:]
             total += begun.T @ begun
         try:
             triangle = np.diag(np.linalg.cholesky(total))
@@ -315,14 +334,17 @@ def _count(time: np.ndarray) -> int:
     return int(_kinds(time).max()) + 1
 
 
-def _runs(time: np.ndarray) -> tuple[tuple[int, int, int], ...]:
-    """First row, row behind the last and kind of the runs of samples of one kind; where the clock
-    begins again there is another run.
-    """
-    kinds = _kinds(time)
-    bounds = np.flatnonzero((np.diff(kinds) != 0) | (np.diff(time) <= 0.0)) + 1
-    firsts = [0, *bounds.tolist()]
-    return tuple(
-        (first, last, int(kinds[first]))
-        for first, last in zip(firsts, [*firsts[1:], len(time)], strict=True)
-    )
+def _runs(time: np.ndarray) -> tuple[Run, ...]:
+    """The runs of samples of one kind; where the clock begins again there is another run."""
+    kinds, begins = _kinds(time), np.diff(time) <= 0.0
+    bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
+    found, begun = [], 0
+    for first, last in itertools.pairwise([0, *bounds, len(time)]):
+        begun = first if first and begins[first - 1] else begun
+        found.append(Run(first, last, int(kinds[first]), first - begun))
+    return tuple(found)
+
+
+def _numbers(runs: Sequence[Run]) -> np.ndarray:
+    """The process of each row."""
+    return np.repeat([run.number for run in runs], [run.last - run.first for run in runs])
