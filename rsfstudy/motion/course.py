@@ -12,8 +12,8 @@ from rsfstudy.motion.events import Event, Kind, Watch
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import jumped, starting
-from rsfstudy.motion.running import chain, happening, path
-from rsfstudy.slider.equations import Equations
+from rsfstudy.motion.running import along as along
+from rsfstudy.motion.running import chain, happening
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import BEGINS, ENDS_AT, LOG_LOAD_RATE, LOG_VELOCITY
 from rsfstudy.slider.point import Point
@@ -158,20 +158,3 @@ def _begun(
 
 def _without_settling(watches: Sequence[Watch]) -> list[Watch]:
     return [watch for watch in watches if watch.kind is not Kind.SETTLED]
-
-
-def along(
-    equations: Equations,
-    state: Numbers,
-    tolerance: float,
-    meter: Meter,
-    watches: Sequence[Watch] = (),
-    *,
-    backward: bool = False,
-    recording: Recording | None = None,
-) -> Iterator[Event]:
-    """Follow one system of equations from a state; against its clock if `backward`.
-
-    A rigid slider has slip for its clock: a recording that asks for values has them at slips.
-    """
-    return path(equations, state, tolerance, meter, watches, backward=backward, recording=recording)

@@ -76,7 +76,7 @@ CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
 #: Codes of events that are not asked for; those of others are the places of their watches.
 BEGIN, CHANGE, END, SAMPLED, KINK = -1, -2, -3, -4, -5
 
-#: Columns of a point; its states follow.
+#: Columns of a point, in the order of `Point`, of which the states are the last.
 LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, DISTANCE, COEFFICIENT, RATIO = range(10)
 READING, READING_GROWTH, PSIS = 10, 11, 12
 

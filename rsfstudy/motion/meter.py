@@ -73,23 +73,20 @@ class Meter:
                 f"more than {self.budget} right-hand sides without an answer",
             )
 
+    def settle(self, regimes: Sequence[str], known: Sequence[int], spent: Sequence[int]) -> int:
+        """Add what a motion has spent since what is known of it; returns what else is on the meter.
 
-class Account:
-    """Work of a motion in its regimes that a meter has been told of."""
-
-    def __init__(self, meter: Meter, regimes: Sequence[str]) -> None:
-        self._meter, self._regimes = meter, regimes
-        self._slow = self._fast = self._steps = self._jacobians = 0
-
-    def settle(self, slow: int, fast: int, steps: int, jacobians: int) -> int:
-        """Add what it has spent since the last time to the meter; returns what else is on that."""
-        meter = self._meter
-        before = meter.spent - self._slow - self._fast
-        if slow > self._slow:
-            meter.add(self._regimes[0], slow - self._slow)
-        if fast > self._fast:
-            meter.add(self._regimes[1], fast - self._fast)
-        meter.steps += steps - self._steps
-        meter.jacobians += jacobians - self._jacobians
-        self._slow, self._fast, self._steps, self._jacobians = slow, fast, steps, jacobians
-        return before
+        Parameters
+        ----------
+        regimes : sequence of str
+            Those of the motion: one, or that between ruptures and that in them.
+        known, spent : sequence of int
+            Right-hand sides in one and in the other, steps, and Jacobians: before, and now.
+        """
+        others = self.spent - known[0] - known[1]
+        for regime, before, now in zip(regimes, known, spent, strict=False):
+            if now > before:
+                self.add(regime, now - before)
+        self.steps += spent[2] - known[2]
+        self.jacobians += spent[3] - known[3]
+        return others

@@ -5,20 +5,16 @@ it does.
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 from scipy.optimize import newton
 
 from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import SCIPY, of_floats
-from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.meter import Halt
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
-    Equations,
     between_ruptures,
-    in_rupture,
     normal_stress_at,
     steady_states_of,
 )
@@ -27,20 +23,6 @@ from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-
-
-class Regimes(NamedTuple):
-    """The equations of a scene with mass, and when they change."""
-
-    slow: Equations
-    fast: Equations
-    limits: Limits
-
-
-def regimes(scene: Scene, accuracy: Accuracy, *, clock: bool) -> Regimes:
-    """The regimes of a scene with mass."""
-    slow, fast = between_ruptures(scene, clock=clock), in_rupture(scene, clock=clock)
-    return Regimes(slow, fast, handover.limits(scene, accuracy))
 
 
 def starting(scene: Scene) -> Point:

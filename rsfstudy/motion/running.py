@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,12 @@ from rsfstudy.motion.columns import filling
 from rsfstudy.motion.detection import BEFORE, NOWHERE, between
 from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
 from rsfstudy.motion.events import Event, Kind, Watch
-from rsfstudy.motion.handover import Limits
+from rsfstudy.motion.handover import Limits, limits
 from rsfstudy.motion.loop import advance
-from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Account, Halt, Meter
+from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
-from rsfstudy.motion.regimes import Regimes, halted
-from rsfstudy.motion.regimes import regimes as regimes_of
-from rsfstudy.slider.equations import Equations, without_mass
+from rsfstudy.motion.regimes import halted
+from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import ENDS_AT, LOADING, RELIEF
 from rsfstudy.slider.point import Point
@@ -31,74 +30,35 @@ from rsfstudy.status import Status
 
 #: Rows of the tables of events and of recordings that one call may fill.
 _EVENTS, _RECORDED = 64, 4096
-_KINDS = {
-    Kind.MAXIMUM: layout.MAXIMUM,
-    Kind.MINIMUM: layout.MINIMUM,
-    Kind.RISE: layout.RISE,
-    Kind.FALL: layout.FALL,
-    Kind.SETTLED: layout.SETTLED,
-}
-_COLUMNS = {
-    "log_rate": layout.LOG_RATE,
-    "growth": layout.GROWTH,
-    "spring": layout.SPRING,
-    "friction": layout.FRICTION,
-    "psi": layout.PSI,
-    "state": layout.STATE,
-    "imbalance": layout.IMBALANCE,
-    "distance_from_steady_state": layout.DISTANCE,
-    "coefficient": layout.COEFFICIENT,
-    "normal_stress": layout.RATIO,
-    "reading": layout.READING,
-    "": 0,
-}
+_KINDS = {kind: layout.__dict__[kind.name] for kind in Kind if kind.name in layout.__dict__}
+#: Columns of a point, by the names of its numbers; what is asked of none reads the first.
+_COLUMNS = {name: column for column, name in enumerate(Point._fields[:-1])} | {"": 0}
 #: What is told beside what was asked for: the codes of these count from the end.
 _BESIDE = [(k, None) for k in (Kind.SEGMENT, Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
-#: Where the states of a point begin in a line of the table of events; and where the numbers of a
-#: `Point` are that come before its states, and behind them.
-_OF_STATES = layout.POINT + layout.PSIS
-_BEFORE = slice(layout.POINT, layout.POINT + Point._fields.index("psis"))
-_BEHIND = slice(_BEFORE.stop, _OF_STATES)
 #: Makes a named tuple of a tuple, in half the time that its name takes.
 _named = tuple.__new__
 _TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
 _NOTHING = layout.NEVER, np.empty(0), np.empty((0, STATES))
 _NO_KINKS = np.empty((0, RELIEF + 1)), 0
-_NO_MASS = (math.nan,) * len(Limits._fields)
-
-
-class Machine(Protocol):
-    """Machine that runs the loop: as it stands, or compiled."""
-
-    def initial(self, fields: tuple[tuple[str, float], ...]) -> Any:
-        """Initial state of motions that have these numbers in their state, and others 0."""
-
-    def state(self, initial: Any, called_with: tuple[float, ...]) -> Any:
-        """The state of a motion: its `memory`, and what it `says` of itself."""
-
-    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
-        """The table of functions of the regimes."""
-
-    def passed(self, *arrays: np.ndarray) -> Sequence[Any]:
-        """Arrays as the loop takes them."""
-
-    def numbers(self, p: Numbers) -> Any:
-        """The numbers of a scene as the loop takes them."""
-
-    def advance(self) -> Any:
-        """The loop."""
+_NO_MASS = Limits(*[math.nan] * len(Limits._fields))
 
 
 class Plain:
-    """The loop as it stands."""
+    """The loop as it stands, and its arguments; `compiled.machine.Compiled` is the other machine
+    that runs it.
+    """
 
     def initial(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
+        """Initial state of motions that have these numbers in their state, and others 0."""
         return {**dict.fromkeys(layout.MOTION.names or (), 0), **dict(fields)}
 
     def state(self, initial: dict[str, float], called_with: tuple[float, ...]) -> PlainState:
-        return PlainState(initial, called_with)
+        """The state of a motion: its `memory`, and what it `says` of itself."""
+        called = zip(layout.CALLED_WITH_FIELDS, called_with, strict=True)
+        return PlainState(**{**initial, **dict(called)})
 
     def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        """The table of functions of the regimes."""
         rows = np.zeros((2, layout.FUNCTIONS), dtype=object)
         for row, system in zip(rows, systems, strict=False):
             row[:] = filling(system)
@@ -106,34 +66,36 @@ class Plain:
         return rows
 
     def passed(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+        """Arrays as the loop takes them."""
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
     def numbers(self, p: Numbers) -> list[float]:
+        """The numbers of a scene as the loop takes them."""
         return list(p)
 
     def advance(self) -> Any:
+        """The loop."""
         return advance
 
 
-class PlainState:
+class PlainState(SimpleNamespace):
     """The state of a motion in plain Python."""
 
-    def __init__(self, initial: dict[str, float], called_with: tuple[float, ...]) -> None:
-        called = zip(layout.CALLED_WITH_FIELDS, called_with, strict=True)
-        self._now = SimpleNamespace(**{**initial, **dict(called)})
-        self.memory = [self._now]
+    @property
+    def memory(self) -> list[PlainState]:
+        """The state as the loop takes it."""
+        return [self]
 
     def says(self) -> tuple[int, ...]:
         """Right-hand sides by regime, steps, events, rows, and Jacobians."""
-        now = self._now
         return (
-            *(now.spent_slow, now.spent_fast, now.steps),
-            *(now.events, now.recorded, now.jacobians),
+            *(self.spent_slow, self.spent_fast, self.steps),
+            *(self.events, self.recorded, self.jacobians),
         )
 
     def field(self, name: str) -> float:
         """One of its fields."""
-        return float(getattr(self._now, name))
+        return float(getattr(self, name))
 
 
 class _Plan(NamedTuple):
@@ -141,7 +103,7 @@ class _Plan(NamedTuple):
 
     Attributes
     ----------
-    machine : Machine
+    machine : Plain or Compiled
     initial : object
         What they begin with.
     called : tuple
@@ -207,17 +169,20 @@ def _pushed(point: Point, by: float) -> Point:
     return point._replace(spring=point.spring + by, friction=point.friction + by)
 
 
-def path(
+def along(
     equations: Equations,
     state: Numbers,
     tolerance: float,
     meter: Meter,
-    watches: Sequence[Watch],
+    watches: Sequence[Watch] = (),
     *,
-    backward: bool,
-    recording: Recording | None,
+    backward: bool = False,
+    recording: Recording | None = None,
 ) -> Iterator[Event]:
-    """Events along one system of equations; the arguments are those of `course.along`."""
+    """Events along one system of equations from a state; against its clock if `backward`.
+
+    A rigid slider has slip for its clock: a recording that asks for values has them at slips.
+    """
     fields = _fields(tolerance, equations)
     fields |= {"direction": -1.0 if backward else 1.0, "slip_is_clock": equations.is_rigid}
     plan = _plan(_machine(meter), fields, equations)
@@ -229,24 +194,24 @@ def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> 
     """Plan that motions of a scene at an accuracy share; made once."""
     key = "plan", meter.engine == COMPILED, accuracy, clock
     if key not in scene.made:
-        both = regimes_of(scene, accuracy, clock=clock) if scene.has_mass else None
-        slow = both.slow if both else without_mass(scene, clock=clock)
-        fields = _fields(accuracy.solver, slow, both)
+        slow, fast, given = between_ruptures(scene, clock=clock), None, _NO_MASS
+        if scene.has_mass:
+            fast, given = in_rupture(scene, clock=clock), limits(scene, accuracy)
+        fields = _fields(accuracy.solver, slow, fast)
         fields["behind"] = len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0
         fields["reverses"] = scene.parts.law.regularised
         fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
-        scene.made[key] = _plan(_machine(meter), fields, slow, both)
+        scene.made[key] = _plan(_machine(meter), fields, slow, fast, given)
     found: _Plan = scene.made[key]
     return found
 
 
-def _machine(meter: Meter) -> Machine:
+def _machine(meter: Meter) -> Any:
     """Machine that runs the loop."""
-    machine: Machine = compiled_engine().Compiled() if meter.engine == COMPILED else Plain()
-    return machine
+    return compiled_engine().Compiled() if meter.engine == COMPILED else Plain()
 
 
-def _fields(tolerance: float, slow: Equations, both: Regimes | None = None) -> dict[str, float]:
+def _fields(tolerance: float, slow: Equations, fast: Equations | None = None) -> dict[str, float]:
     """Fields of the state of a motion at first, by an integrator of that tolerance."""
     tolerance = max(tolerance, TIGHTEST)
     return {
@@ -257,20 +222,23 @@ def _fields(tolerance: float, slow: Equations, both: Regimes | None = None) -> d
         "limits_steps": not slow.is_rigid,
         "unknowns": len(slow.unknowns),
         "states": slow.states,
-        "unknowns_fast": len(both.fast.unknowns) if both else 0,
-        "has_mass": both is not None,
+        "unknowns_fast": len(fast.unknowns) if fast else 0,
+        "has_mass": fast is not None,
     }
 
 
 def _plan(
-    machine: Machine, fields: dict[str, float], slow: Equations, both: Regimes | None = None
+    machine: Any,
+    fields: dict[str, float],
+    slow: Equations,
+    fast: Equations | None = None,
+    given: Limits = _NO_MASS,
 ) -> _Plan:
-    """A plan of motions by equations, and by those of another regime."""
-    systems = (slow,) if both is None else (slow, both.fast)
+    """A plan of motions by equations, and by those of ruptures, which begin and end at limits."""
+    systems = (slow,) if fast is None else (slow, fast)
     scales = np.array([scale for system in systems for scale in system.scales])
-    limits = _NO_MASS if both is None else tuple(both.limits)
     table, p = machine.table(systems), machine.numbers(slow.p)
-    called = *machine.passed(scales), table, limits, p, p
+    called = *machine.passed(scales), table, tuple(given), p, p
     initial, regimes = machine.initial(tuple(fields.items())), tuple(s.regime for s in systems)
     unknowns = max(fields["unknowns"], fields["unknowns_fast"])
     return _Plan(machine, initial, called, systems, regimes, int(unknowns), slow.states)
@@ -312,7 +280,8 @@ def _events(
         p, p_before = (machine.numbers(systems[0].p) for _ in range(2))
         called, systems = (*called[:-2], p, p_before), tuple(s._replace(p=p) for s in systems)
     stepper = stepper_of(meter.engine, systems, meter.methods)
-    events = np.empty((max(_EVENTS, 2 * len(watches) + 4), _OF_STATES + states))
+    columns = layout.POINT + layout.PSIS + states
+    events = np.empty((max(_EVENTS, 2 * len(watches) + 4), columns))
     records, samples, rows = _to_record(recording, systems[0], states)
     called_with = *times, meter.budget - meter.spent, records, len(kinks[0]), kinks[1]
     state = machine.state(plan.initial, called_with)
@@ -320,20 +289,20 @@ def _events(
     arrays = machine.passed(y, last, block)
     tables = machine.passed(asked.copy(), kinks[0], samples, events, rows)
     arguments = *arrays, called, *tables, stepper
-    run, end, account = machine.advance(), layout.HANDS_OVER, Account(meter, regimes)
+    run, end, known = machine.advance(), layout.HANDS_OVER, (0, 0, 0, 0)
     while end == layout.HANDS_OVER:
         end = run(state.memory, *arguments)
         slow, fast, steps, happened, recorded, jacobians = state.says()
-        before = account.settle(slow, fast, steps, jacobians)
+        known, settled = (slow, fast, steps, jacobians), known
+        before = meter.settle(regimes, settled, known)
         if recording is not None and recorded:
             kept = rows[:recorded].copy()
             if imposed is not None:
                 kept[:, STRESSES] += kept[:, -1:] - imposed
             recording.take(kept, regimes)
         for line in events[:happened].tolist():
-            code, regime, clock, time, slip, spent = line[: layout.POINT]
-            psis = tuple(line[_OF_STATES:])
-            point = _named(Point, (*line[_BEFORE], psis, *line[_BEHIND]))
+            code, regime, clock, time, slip, spent, *of_point = line
+            point = _named(Point, (*of_point[: layout.PSIS], tuple(of_point[layout.PSIS :])))
             kind, watch = meanings[int(code)]
             name, work = regimes[int(regime)], before + int(spent)
             yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
@@ -385,8 +354,7 @@ def _asked(watches: tuple[Watch, ...]) -> tuple[np.ndarray, list[tuple[Kind, Wat
 
 def _columns_of(point: Point) -> np.ndarray:
     """A point as the loop has it."""
-    log_rate, growth, spring, friction, psis, *others = point
-    return np.array((log_rate, growth, spring, friction, *others, *psis))
+    return np.array((*point[:-1], *point.psis))
 
 
 def _halt(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> Halt:

@@ -16,10 +16,8 @@ class Point(NamedTuple):
         Its derivative with respect to the clock of the equations, length along the path.
     spring, friction : float
         Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
-    psis : tuple of float
-        States freed of stress, and those of a fluid.
     psi : float
-        The sum of those of the law.
+        The sum of the states of the law, freed of stress.
     state : float
         State variable Theta (the sum, where a law has several).
     imbalance : float
@@ -35,13 +33,14 @@ class Point(NamedTuple):
         pressure outside the fault.
     reading_growth : float
         Its derivative with respect to the clock of the equations.
+    psis : tuple of float
+        States freed of stress, and those of a fluid.
     """
 
     log_rate: float
     growth: float
     spring: float
     friction: float
-    psis: tuple[float, ...]
     psi: float
     state: float
     imbalance: float
@@ -50,3 +49,4 @@ class Point(NamedTuple):
     normal_stress: float
     reading: float
     reading_growth: float
+    psis: tuple[float, ...]

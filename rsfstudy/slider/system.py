@@ -232,7 +232,6 @@ def point_of(made: Friction) -> Function:
             growth,
             spring,
             g,
-            psis,
             psi,
             psi - shift,
             psi - state_sum(steady),
@@ -241,6 +240,7 @@ def point_of(made: Friction) -> Function:
             ratio,
             reading[0],
             reading[1],
+            psis,
         )
 
     return point_at

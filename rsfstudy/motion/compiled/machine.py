@@ -27,7 +27,7 @@ _PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY, _ARRAY))
 
 
 class Compiled:
-    """The loop, compiled."""
+    """The loop, compiled, and its arguments (see `running.Plain`)."""
 
     def initial(self, fields: tuple[tuple[str, float], ...]) -> bytes:
         return _initial(fields)
@@ -75,11 +75,11 @@ def prepare(scene: Scene, *, clock: bool) -> None:
         Where a part of the scene cannot be compiled.
     """
     compiled_loop()
+    addresses(between_ruptures(scene, clock=clock))
     if scene.has_mass:
-        addresses(between_ruptures(scene, clock=clock))
         addresses(in_rupture(scene, clock=clock))
-    if not (scene.has_mass and clock):
-        addresses(without_mass(scene, clock=clock))
+    if scene.has_mass and not clock:
+        addresses(without_mass(scene, clock=False))
 
 
 @lru_cache(maxsize=256)

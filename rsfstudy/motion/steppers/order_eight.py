@@ -6,7 +6,6 @@ The tableau, the error and the controller of step lengths are those of `scipy.in
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853
@@ -207,18 +206,8 @@ class OrderEight(Stepper):
     """DOP853 in plain Python: every step can be followed with a debugger."""
 
     name = "python"
-
-    def begin(self, motion: Any, space: Any) -> None:
-        begin(motion, space)
-
-    def attempt(self, motion: Any, space: Any, longest: float) -> float:
-        return float(attempt(motion, space, longest))
-
-    def reach(self, motion: Any, space: Any, length: float) -> float:
-        return float(reach(motion, space, length))
-
-    def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
-        unknowns_at(motion, space, clock)
-
-    def retake(self, motion: Any, space: Any, clock: float) -> None:
-        retake(motion, space, clock)
+    begin = staticmethod(begin)
+    attempt = staticmethod(attempt)
+    reach = staticmethod(reach)
+    unknowns_at = staticmethod(unknowns_at)
+    retake = staticmethod(retake)
