@@ -21,6 +21,7 @@ from rsfstudy.motion.loop import advance
 from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
 from rsfstudy.motion.regimes import halted
+from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import ENDS_AT, LOADING, RELIEF
@@ -152,7 +153,7 @@ def chain(
     told : int
         How many segments, the last ones, are told to begin.
     """
-    plan = _planned(scene, accuracy, meter, clock=clock)
+    plan = _planned(scene, accuracy, compiled=meter.engine == COMPILED, clock=clock)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
     first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
     if first is not None:  # in the loop stresses are without what the load point imposes
@@ -185,30 +186,27 @@ def along(
     """
     fields = _fields(tolerance, equations)
     fields |= {"direction": -1.0 if backward else 1.0, "slip_is_clock": equations.is_rigid}
-    plan = _plan(_machine(meter), fields, equations)
+    plan = _plan(_machine(compiled=meter.engine == COMPILED), fields, equations)
     begins = np.array((*state, *state)), np.empty(layout.PSIS + equations.states)
     return _events(plan, (math.inf, 0.0, 0.0, 0.0), begins, meter, watches, recording, _NO_KINKS)
 
 
-def _planned(scene: Scene, accuracy: Accuracy, meter: Meter, *, clock: bool) -> _Plan:
+@once
+def _planned(scene: Scene, accuracy: Accuracy, *, compiled: bool, clock: bool) -> _Plan:
     """Plan that motions of a scene at an accuracy share; made once."""
-    key = "plan", meter.engine == COMPILED, accuracy, clock
-    if key not in scene.made:
-        slow, fast, given = between_ruptures(scene, clock=clock), None, _NO_MASS
-        if scene.has_mass:
-            fast, given = in_rupture(scene, clock=clock), limits(scene, accuracy)
-        fields = _fields(accuracy.solver, slow, fast)
-        fields["behind"] = len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0
-        fields["reverses"] = scene.parts.law.regularised
-        fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
-        scene.made[key] = _plan(_machine(meter), fields, slow, fast, given)
-    found: _Plan = scene.made[key]
-    return found
+    slow, fast, given = between_ruptures(scene, clock=clock), None, _NO_MASS
+    if scene.has_mass:
+        fast, given = in_rupture(scene, clock=clock), limits(scene, accuracy)
+    fields = _fields(accuracy.solver, slow, fast)
+    fields["behind"] = len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0
+    fields["reverses"] = scene.parts.law.regularised
+    fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
+    return _plan(_machine(compiled=compiled), fields, slow, fast, given)
 
 
-def _machine(meter: Meter) -> Any:
+def _machine(*, compiled: bool) -> Any:
     """Machine that runs the loop."""
-    return compiled_engine().Compiled() if meter.engine == COMPILED else Plain()
+    return compiled_engine().Compiled() if compiled else Plain()
 
 
 def _fields(tolerance: float, slow: Equations, fast: Equations | None = None) -> dict[str, float]:

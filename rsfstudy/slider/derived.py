@@ -1,9 +1,13 @@
-"""Properties that are found once."""
+"""What is found once for each scene."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from functools import cached_property, wraps
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 if TYPE_CHECKING:
     derived = cached_property
@@ -19,3 +23,17 @@ else:
                 return self
             value = instance.__dict__[self.attrname] = self.func(instance)
             return value
+
+
+def once(make: Callable[Concatenate[Any, P], T]) -> Callable[Concatenate[Any, P], T]:
+    """A function of a scene that is called once for each scene and what is stated beside it."""
+
+    @wraps(make)
+    def known(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
+        key = make, *stated, *named.values()
+        if key not in scene.made:
+            scene.made[key] = make(scene, *stated, **named)
+        found: T = scene.made[key]
+        return found
+
+    return known

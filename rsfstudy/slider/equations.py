@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from rsfstudy.slider.derived import once
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import InRupture, functions
+from rsfstudy.slider.system import Form, functions
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
@@ -82,21 +82,7 @@ class Equations(NamedTuple):
         return now
 
 
-def _once(make: Callable[..., Equations]) -> Callable[..., Equations]:
-    """Make equations once for each scene."""
-
-    @wraps(make)
-    def known(scene: Scene, **how: Any) -> Equations:
-        key = make.__name__, *how.values()
-        if key not in scene.made:
-            scene.made[key] = make(scene, **how)
-        found: Equations = scene.made[key]
-        return found
-
-    return known
-
-
-@_once
+@once
 def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
     """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
     of a law that has several), and time as a passenger where a `clock` is wanted.
@@ -104,7 +90,7 @@ def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
     return _slow(scene, scene.dynamics, clock=clock)
 
 
-@_once
+@once
 def without_mass(scene: Scene, *, clock: bool) -> Equations:
     """The form between ruptures with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
@@ -114,13 +100,19 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
     forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
-    unknowns: tuple[str, ...] = ("spring", *_states(scene))
-    scales, rate = (scene.a,) * len(unknowns), forms.rate
-    if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), forms.rate_with_time
-    point, balance = forms.point, forms.balance
-    p, count = scene.numbers, scene.states
-    return Equations(dynamics.regime, unknowns, scales, rate, point, p, count, balance)
+    scales = dict.fromkeys(("spring", *_states(scene)), scene.a)
+    slow = _along_path(scene, dynamics.regime, forms.between_ruptures, scales, clock=clock)
+    return slow._replace(balance=forms.balance)
+
+
+def _along_path(
+    scene: Scene, regime: str, form: Form, scales: dict[str, float], *, clock: bool
+) -> Equations:
+    """Equations along the path, of unknowns with these scales."""
+    rate = form.rate_with_time if clock else form.rate
+    scales = scales | {"time": 1.0} if clock else scales
+    unknowns, sizes = tuple(scales), tuple(scales.values())
+    return Equations(regime, unknowns, sizes, rate, form.point, scene.numbers, scene.states)
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -130,21 +122,17 @@ def _states(scene: Scene) -> tuple[str, ...]:
     return (*of_law, *(unknown.name for unknown in scene.pressure_source.unknowns))
 
 
-@_once
+@once
 def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
-    full, a, others = _full(scene), scene.a, _states(scene)[1:]
-    unknowns: tuple[str, ...] = ("spring", "log_rate", "friction", *others)
-    scales, rate = (a, 1.0, a, *[a] * len(others)), full.rate
-    if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), full.rate_with_time
-    p, states = scene.numbers, scene.states
-    return Equations(IN_RUPTURE, unknowns, scales, rate, full.point, p, states)
+    a, others = scene.a, dict.fromkeys(_states(scene)[1:], scene.a)
+    scales = {"spring": a, "log_rate": 1.0, "friction": a, **others}
+    return _along_path(scene, IN_RUPTURE, _full(scene), scales, clock=clock)
 
 
-def _full(scene: Scene) -> InRupture:
+def _full(scene: Scene) -> Form:
     full = scene.functions.in_rupture
     if full is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
@@ -156,24 +144,19 @@ def by_displacement(scene: Scene) -> Equations:
     are linear in departures farther from steady sliding than those along the path.
     """
     along = between_ruptures(scene, clock=False)
-    return along._replace(rate=scene.functions.by_displacement)
+    return along._replace(rate=scene.functions.between_ruptures.against_clock)
 
 
 def by_inertial_time(scene: Scene) -> Equations:
     """The full equations in inertial time T/(2 pi)."""
-    along = in_rupture(scene)
-    return along._replace(rate=_full(scene).against_time)
+    return in_rupture(scene)._replace(rate=_full(scene).against_clock)
 
 
 def rigid(scene: Scene, log_rate: float) -> Equations:
     """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
-    forms, p, unknowns = (
-        scene.functions,
-        (*scene.numbers, log_rate),
-        ("friction", *_states(scene)[1:]),
-    )
-    scales, rate, point = (scene.a,) * len(unknowns), forms.rigid_rate, forms.rigid_point
-    return Equations(RIGID, unknowns, scales, rate, point, p, states=scene.states)
+    forms, unknowns = scene.functions, ("friction", *_states(scene)[1:])
+    scales, p = (scene.a,) * len(unknowns), (*scene.numbers, log_rate)
+    return Equations(RIGID, unknowns, scales, forms.rigid_rate, forms.rigid_point, p, scene.states)
 
 
 def relation_of(

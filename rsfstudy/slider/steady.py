@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from scipy.optimize import brentq
 
+from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import relation_of, steady_states_of
 from rsfstudy.slider.parts import Numbers
 
@@ -48,18 +49,11 @@ class Steady:
     psis: Numbers
 
 
+@once
 def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
     """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
     strong.
     """
-    key = "steady", log_rate
-    if key not in scene.made:
-        scene.made[key] = _found(scene, log_rate)
-    known: Steady | None = scene.made[key]
-    return known
-
-
-def _found(scene: Scene, log_rate: float) -> Steady | None:
     friction = stress_at(scene, steady_excess(scene, log_rate))
     if friction is None:
         return None

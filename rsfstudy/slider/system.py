@@ -142,9 +142,9 @@ def rates_between_ruptures(
 # ---- rates in ruptures, and of a rigid slider ----------------------------------------------------
 
 
-def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, Function]:
-    """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first,
-    along the path in inertial time and ln V, and the same with inertial time as a passenger.
+def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, Function, Function]:
+    """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first
+    against inertial time, along the path in that and ln V, and so with that time as a passenger.
     """
     end = 2 + made.states
     times = scaled(end)
@@ -159,7 +159,7 @@ def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, 
         along = path_metric(by[1] / UNITS)
         return (*times(by, along), along)
 
-    return along_path, along_path_with_time
+    return rupture_rate, along_path, along_path_with_time
 
 
 def rate_of_rigid(made: Friction) -> Function:
@@ -299,19 +299,19 @@ def point_of_rigid(made: Friction, reading: Function, point_at: Function) -> Fun
 # ---- all of it -----------------------------------------------------------------------------------
 
 
-class InRupture(NamedTuple):
-    """The full equations of a scene with mass.
+class Form(NamedTuple):
+    """Equations of a scene between ruptures, or the full ones in them.
 
     Attributes
     ----------
-    against_time, rate, rate_with_time : callable
-        ``(state, p)``: derivatives of the unknowns against inertial time, along the path, and so
-        with time as a passenger.
+    against_clock, rate, rate_with_time : callable
+        ``(state, p)``: derivatives of the unknowns against slip and load point displacement
+        together, or inertial time; along the path; and so with time as a passenger.
     point : callable
         ``(state, derivatives, p) -> Point``.
     """
 
-    against_time: Function
+    against_clock: Function
     rate: Function
     rate_with_time: Function
     point: Function
@@ -327,26 +327,19 @@ class System(NamedTuple):
     balance : callable
         ``(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress, between
         ruptures.
-    by_displacement, rate, rate_with_time : callable
-        ``(state, p)``: derivatives of the unknowns between ruptures, against displacement, along
-        the path, and so with time as a passenger.
-    point : callable
-        ``(state, derivatives, p) -> Point``, between ruptures.
+    between_ruptures : Form
+    in_rupture : Form or None
+        Where mass acts.
     rigid_rate, rigid_point : callable
-        The same of a rigid slider, against slip.
-    in_rupture : InRupture or None
-        The same where mass acts.
+        Those of a rigid slider, against slip.
     """
 
     friction: Friction
     balance: Function
-    by_displacement: Function
-    rate: Function
-    rate_with_time: Function
-    point: Function
+    between_ruptures: Form
+    in_rupture: Form | None
     rigid_rate: Function
     rigid_point: Function
-    in_rupture: InRupture | None
 
 
 @cache
@@ -359,24 +352,14 @@ def system_of(
     made = friction_of(parts)
     balance, growth = slip_rate(made)
     against = against_displacement(made, balance, reverses=parts.regularised)
-    by_displacement, rate, rate_with_time = rates_between_ruptures(made, against)
     reading, point_at = reading_of(made), point_of(made)
-    full = None
+    point = point_between_ruptures(made, balance, growth, reading, point_at)
+    slow, full = Form(*rates_between_ruptures(made, against), point), None
     if rupture_rate is not None:
-        by_time = rupture_rate(made)
-        along = rates_in_rupture(made, by_time)
-        full = InRupture(by_time, *along, point_in_rupture(made, reading, point_at))
-    return System(
-        made,
-        balance,
-        by_displacement,
-        rate,
-        rate_with_time,
-        point_between_ruptures(made, balance, growth, reading, point_at),
-        rate_of_rigid(made),
-        point_of_rigid(made, reading, point_at),
-        full,
-    )
+        rates = rates_in_rupture(made, rupture_rate(made))
+        full = Form(*rates, point_in_rupture(made, reading, point_at))
+    of_rigid = rate_of_rigid(made), point_of_rigid(made, reading, point_at)
+    return System(made, balance, slow, full, *of_rigid)
 
 
 def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
