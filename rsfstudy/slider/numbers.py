@@ -61,11 +61,11 @@ class Slider(Part):
         """Stress and a state to begin with."""
         if self.initial_stress <= -self.mu_star:
             rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
-            raise InvalidValue("initial_stress", self.initial_stress, rule)
+            raise self.invalid("initial_stress", rule)
         if self.initial_state and scene.parts.law.states > 1:
             rule = f"has no meaning for {scene.parts.law.name}, whose states share it"
             remedy = "Leave it out, and come to it by a protocol."
-            raise InvalidValue("initial_state", self.initial_state, rule, remedy=remedy)
+            raise self.invalid("initial_state", rule, remedy)
 
 
 #: The fields of which one sets the spring.

@@ -55,6 +55,8 @@ class Part:
     #: hold those: a part with one of them of its own inherits no conclusion from another's.
     conclusions: ClassVar[tuple[str, ...]] = ()
     equations: ClassVar[frozenset[str]] = frozenset()
+    #: Where values of other parts of the slot have no meaning, and what would give them one.
+    no_meaning: ClassVar[tuple[str, str]] = ("", "")
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -90,7 +92,14 @@ class Part:
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
         """The error for a value of another part of the slot, which has no meaning here."""
-        return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy="Leave it out.")
+        where, instead = cls.no_meaning
+        rule = f"has no meaning {where or f'for {cls.name}'}"
+        remedy = f"Leave {name} out, or {instead}." if instead else "Leave it out."
+        return InvalidValue(name, value, rule, remedy=remedy)
+
+    def invalid(self, name: str, rule: str, remedy: str = "") -> InvalidValue:
+        """The error for what one of its fields holds."""
+        return InvalidValue(name, getattr(self, name), rule, remedy=remedy)
 
 
 def number(

@@ -185,9 +185,5 @@ class Inertia(Dynamics):
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
-        return InvalidValue(
-            name,
-            value,
-            "stands in for mass, and this scene has mass",
-            remedy="Leave one of them out.",
-        )
+        rule = "stands in for mass, and this scene has mass"
+        return InvalidValue(name, value, rule, remedy="Leave one of them out.")

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_threshold
@@ -99,12 +98,8 @@ class Dilatant(Fluid):
     def check(self, scene: Scene) -> None:
         """Some critical stiffness, where the spring is given by its ratio to that."""
         if lacks_threshold(scene):
-            raise InvalidValue(
-                "drainage",
-                self.drainage,
-                f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}",
-                remedy="Give stiffness itself, or raise drainage.",
-            )
+            rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
+            raise self.invalid("drainage", rule, "Give stiffness itself, or raise drainage.")
 
     def highest_pressure(self, log_rate: float, states: Numbers) -> float:
         """Pores close by ``V (phi - phi_0 - eps ln(V/V_*))`` at most, which drainage holds at a

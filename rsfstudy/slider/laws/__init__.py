@@ -14,7 +14,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Function, Numbers, Part, flag, found_in, number
 
 if TYPE_CHECKING:
@@ -126,21 +125,14 @@ class LawOfStates(Part):
         if not unknown and loading.imposes:
             unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
-            raise InvalidValue(
-                "stress_dependence",
-                self.stress_dependence,
-                f"is known for normal stress in proportion to shear stress, not for {unknown}",
-                remedy="Leave it out, or state `coupling` where the proportion is constant.",
-            )
+            rule = f"is known for normal stress in proportion to shear stress, not for {unknown}"
+            remedy = "Leave it out, or state `coupling` where the proportion is constant."
+            raise self.invalid("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.displaces
         one_way = source if pressed else None if scene.dynamics.reverses else scene.dynamics
         if self.regularised and one_way:
-            raise InvalidValue(
-                "regularised",
-                self.regularised,
-                f"has no meaning for {one_way.name}, whose equations hold ln V",
-                remedy="Leave one of them out.",
-            )
+            rule = f"has no meaning for {one_way.name}, whose equations hold ln V"
+            raise self.invalid("regularised", rule, "Leave one of them out.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,30 +176,20 @@ class Law(LawOfStates):
         """
         super().check(scene)
         if not self.b_over_a and (self.feels_stress or scene.parts.normal_stress.state_effect):
-            raise InvalidValue(
-                "b_over_a",
-                self.b_over_a,
-                "has no meaning where stress acts on the state variable: by alpha/b or c/b",
-                remedy="Leave alpha and stress_dependence out, or give another b_over_a.",
-            )
+            rule = "has no meaning where stress acts on the state variable: by alpha/b or c/b"
+            remedy = "Leave alpha and stress_dependence out, or give another b_over_a."
+            raise self.invalid("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
-            raise InvalidValue(
-                "initial_state",
-                scene.parts.slider.initial_state,
-                "is of a state variable that has no effect where b_over_a is 0",
-                remedy="Leave initial_state out.",
-            )
+            rule = "is of a state variable that has no effect where b_over_a is 0"
+            raise scene.parts.slider.invalid("initial_state", rule, "Leave initial_state out.")
         if 0.0 < abs(self.b_over_a) < SMALLEST:
-            rule = f"must be 0, or at least {SMALLEST:g} in size"
-            raise InvalidValue("b_over_a", self.b_over_a, rule, remedy="Give 0.")
+            raise self.invalid(
+                "b_over_a", f"must be 0, or at least {SMALLEST:g} in size", "Give 0."
+            )
         least = self.least_weakening
         if self.b_over_a <= least and lacks_threshold(scene):
-            raise InvalidValue(
-                "b_over_a",
-                self.b_over_a,
-                f"must exceed {least:.6g}: without rate weakening there is no critical stiffness",
-                remedy=GIVE_STIFFNESS,
-            )
+            rule = f"must exceed {least:.6g}: without rate weakening there is no critical stiffness"
+            raise self.invalid("b_over_a", rule, GIVE_STIFFNESS)
 
 
 #: b/a in equations that divide by b, of a state variable without effect: by far less than rounding.

@@ -88,10 +88,10 @@ class TwoStates(LawOfStates):
         super().check(scene)
         if not self.size_over_a:
             rule = "must not be 0 where b1_over_a is: no state has an effect"
-            raise InvalidValue("b2_over_a", self.b2_over_a, rule, remedy="Give one of them.")
+            raise self.invalid("b2_over_a", rule, "Give one of them.")
         if lacks_threshold(scene):
             rule = (
                 f"with b1_over_a = {self.b1_over_a:g} and length_ratio = {self.length_ratio:g} "
                 "gives no critical stiffness"
             )
-            raise InvalidValue("b2_over_a", self.b2_over_a, rule, remedy=GIVE_STIFFNESS)
+            raise self.invalid("b2_over_a", rule, GIVE_STIFFNESS)

@@ -16,6 +16,9 @@ from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
+#: Most segments of a history that is stated by their number.
+MOST_SEGMENTS = 100_000
+
 
 class Segment(NamedTuple):
     """A part of a loading history.
@@ -153,6 +156,14 @@ class Loading(Part):
     def imposes(self) -> bool:
         """True if it changes normal stress."""
         return self.presses or any(segment.normal_stress for segment in self.segments)
+
+    def check_count(self, name: str) -> None:
+        """Raise InvalidValue for a field that holds no whole number, or too large a one: as many
+        are the segments.
+        """
+        count = getattr(self, name)
+        if count % 1.0 or count > MOST_SEGMENTS:
+            raise self.invalid(name, f"must be a whole number, {MOST_SEGMENTS:,} at most")
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

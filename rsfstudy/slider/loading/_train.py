@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
@@ -113,12 +112,9 @@ class Train(Loading):
         """Slow enough where there is no mass."""
         free = 2.0 * math.pi * scene.inertial_time
         if self.oscillation_period < free and not scene.has_mass:
-            raise InvalidValue(
-                "oscillation_period",
-                self.oscillation_period,
-                f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters",
-                remedy="Set inertia=True, or give a longer one.",
-            )
+            rule = f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters"
+            remedy = "Set inertia=True, or give a longer one."
+            raise self.invalid("oscillation_period", rule, remedy)
 
     @property
     def mean_velocity(self) -> float:

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import _train, last_velocity, refuse_fluid
 from rsfstudy.slider.parts import Numbers, number
@@ -52,9 +51,7 @@ class Oscillation(_train.Train):
         amplitude = self.oscillation_amplitude
         if amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
-            raise InvalidValue(
-                "oscillation_amplitude", amplitude, "must be less than 1", remedy=remedy
-            )
+            raise self.invalid("oscillation_amplitude", "must be less than 1", remedy)
         refuse_fluid(scene, "oscillation_amplitude", amplitude)
         super().check(scene)
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-#: Each is a segment of its own.
-_MOST_STAIRS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,18 +50,12 @@ class VelocityRamp(Loading):
 
     def check(self, scene: Scene) -> None:
         """A whole number of stairs."""
-        if self.velocity_ramp_stairs % 1.0 or self.velocity_ramp_stairs > _MOST_STAIRS:
-            rule = f"must be a whole number, {_MOST_STAIRS:,} at most"
-            raise InvalidValue("velocity_ramp_stairs", self.velocity_ramp_stairs, rule)
+        self.check_count("velocity_ramp_stairs")
 
     @property
     def segments(self) -> tuple[Segment, ...]:
         """The stairs, and what follows them."""
-        return tuple(self._segments())
-
-    def _segments(self) -> Iterator[Segment]:
-        stairs = int(self.velocity_ramp_stairs)
-        for stair in range(stairs):
-            velocity = 1.0 + self.velocity_ramp * (stair + 0.5) / stairs
-            yield Segment(velocity, duration=self.velocity_ramp_duration / stairs)
-        yield Segment(1.0 + self.velocity_ramp)
+        count, change = int(self.velocity_ramp_stairs), self.velocity_ramp
+        velocities = [1.0 + change * (stair + 0.5) / count for stair in range(count)]
+        lasts = self.velocity_ramp_duration / count
+        return (*(Segment(v, duration=lasts) for v in velocities), Segment(1.0 + change))

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 
 if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
-
-#: Each is a segment of its own, followed by itself.
-_MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,18 +51,12 @@ class VelocitySteps(Loading):
 
     def check(self, scene: Scene) -> None:
         """A whole number of steps."""
-        if self.velocity_steps % 1.0 or self.velocity_steps > _MOST_STEPS:
-            rule = f"must be a whole number, {_MOST_STEPS:,} at most"
-            raise InvalidValue("velocity_steps", self.velocity_steps, rule)
+        self.check_count("velocity_steps")
 
     @property
     def segments(self) -> tuple[Segment, ...]:
         """One after each step."""
-        return tuple(self._segments())
-
-    def _segments(self) -> Iterator[Segment]:
-        last = int(self.velocity_steps)
-        for number_ in range(1, last + 1):
-            velocity = self.velocity_ratio if number_ % 2 else 1.0
-            lasts = self.displacement_between_steps / velocity if number_ < last else math.inf
-            yield Segment(velocity, duration=lasts)
+        count, moves = int(self.velocity_steps), self.displacement_between_steps
+        velocities = [1.0 if number_ % 2 else self.velocity_ratio for number_ in range(count)]
+        lasts = [*(moves / velocity for velocity in velocities[:-1]), math.inf]
+        return tuple(Segment(v, duration=t) for v, t in zip(velocities, lasts, strict=False))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
@@ -17,24 +17,12 @@ class Constant(NormalStress):
     """Constant normal stress: nothing to add to the friction relation."""
 
     name = "constant"
+    no_meaning = "while normal stress is constant", "set normal_stress='variable'"
     coupling = (0.0, 0.0)
 
     def check(self, scene: Scene) -> None:
         """Nothing that changes it."""
         if scene.parts.loading.imposes:
-            raise InvalidValue(
-                "normal_stress",
-                self.name,
-                "is changed by the loading",
-                remedy="Set normal_stress='imposed', or 'variable' where it follows shear stress"
-                " too.",
-            )
-
-    @classmethod
-    def refuse(cls, name: str, value: Any) -> InvalidValue:
-        return InvalidValue(
-            name,
-            value,
-            "has no meaning while normal stress is constant",
-            remedy=f"Leave {name} out, or set normal_stress='variable'.",
-        )
+            remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."
+            rule = "is changed by the loading"
+            raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)

@@ -5,9 +5,8 @@ of its own; a rise of it lowers the state variable.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import IMPOSED
@@ -28,6 +27,7 @@ class Imposed(StateEffect):
     """Normal stress that the loading imposes, with an effect `alpha` of it on the state."""
 
     name = "imposed"
+    no_meaning = "while normal stress does not follow shear stress", "set normal_stress='variable'"
     normal_stress = staticmethod(normal_stress)
     follows_friction = False
 
@@ -38,12 +38,3 @@ class Imposed(StateEffect):
     def numbers(self, scene: Scene) -> Numbers:
         """alpha."""
         return (self.alpha,)
-
-    @classmethod
-    def refuse(cls, name: str, value: Any) -> InvalidValue:
-        return InvalidValue(
-            name,
-            value,
-            "has no meaning while normal stress does not follow shear stress",
-            remedy=f"Leave {name} out, or set normal_stress='variable'.",
-        )

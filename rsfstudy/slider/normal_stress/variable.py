@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
@@ -75,17 +74,9 @@ class Variable(StateEffect):
     def check(self, scene: Scene) -> None:
         """An angle at which normal stress varies, and sigma_3 is positive."""
         if self.phi >= 90.0:
-            raise InvalidValue(
-                "phi",
-                self.phi,
-                "must lie between 0 and 90 degrees",
-                remedy="At 90 degrees it no longer varies: set normal_stress='constant'.",
-            )
+            remedy = "At 90 degrees it no longer varies: set normal_stress='constant'."
+            raise self.invalid("phi", "must lie between 0 and 90 degrees", remedy)
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
-            raise InvalidValue(
-                "phi",
-                self.phi,
-                f"must exceed atan(mu_star) = {lowest:.6g} degrees: sigma_3 is negative below",
-                remedy="Raise phi or lower mu_star.",
-            )
+            rule = f"must exceed atan(mu_star) = {lowest:.6g} degrees: sigma_3 is negative below"
+            raise self.invalid("phi", rule, "Raise phi or lower mu_star.")
