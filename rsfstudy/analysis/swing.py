@@ -16,7 +16,6 @@ from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
-from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -60,17 +59,14 @@ class Swing:
 
 
 @dataclass(frozen=True)
-class _Steady:
-    """Steady sliding at the load point velocity.
+class _Steady(steady.Steady):
+    """Steady sliding at the load point velocity, and the margin of its stability.
 
     It is neutral at constant normal stress and critical stiffness: every orbit then closes (Gu et
     al. 1984 for the slip law, Ranjith and Rice 1999 for the slowness law), and only numerical
     errors would make peaks grow.
     """
 
-    log_rate: float
-    spring: float
-    psis: Numbers
     margin: float
 
     @property
@@ -323,7 +319,7 @@ def _steady(scene: Scene) -> _Steady:
     margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
     if margin < -_NEUTRAL and scene.states > 1 and _decays(scene):
         margin = -margin
-    return _Steady(load, sliding.spring, sliding.psis, margin)
+    return _Steady(**vars(sliding), margin=margin)
 
 
 def _decays(scene: Scene) -> bool:

@@ -165,13 +165,20 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
 
     None where the motion does not come back.
     """
-    fallen = False
-    watches = maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
-    for event in _path(scene, tolerance, meter, watches, backward=False):
-        if fallen and event.kind is Kind.MAXIMUM:
+    for event in _coming_back(scene, tolerance, meter):
+        if event.kind is Kind.MAXIMUM:
             return event.point.log_rate - scene.log_norm_rate
-        fallen = fallen or event.kind is Kind.FALL
     return None
+
+
+def _coming_back(scene: Scene, tolerance: float, meter: Meter, *watches: Watch) -> Iterator[Event]:
+    """Events, peaks among them, of the motion that has touched the norm and fallen below V_0."""
+    fallen = False
+    asked = *watches, maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
+    for event in _path(scene, tolerance, meter, asked, backward=False):
+        if fallen:
+            yield event
+        fallen = fallen or event.kind is Kind.FALL
 
 
 def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
@@ -180,13 +187,11 @@ def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
     """
     if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
         return False
-    fallen, beyond = False, rise("log_rate", scene.log_norm_rate + _ABOVE)
-    watches = beyond, maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
-    for event in _path(scene, tolerance, meter, watches, backward=False):
-        if fallen and event.kind in (Kind.RISE, Kind.MAXIMUM):
+    beyond = rise("log_rate", scene.log_norm_rate + _ABOVE)
+    for event in _coming_back(scene, tolerance, meter, beyond):
+        if event.kind in (Kind.RISE, Kind.MAXIMUM):
             # a step may pass the norm and come back
             return event.kind is Kind.RISE or event.point.log_rate > scene.log_norm_rate
-        fallen = fallen or event.kind is Kind.FALL
     return False
 
 

@@ -56,11 +56,6 @@ class Slot:
         """The fields that call for a part by their values."""
         return {part.called_by: part for part in self.choices.values() if part.called_by}
 
-    @cached_property
-    def is_named(self) -> bool:
-        """True if a field of a scene names the choice; else the value of another calls for it."""
-        return not self.callers
-
 
 SLOTS: tuple[Slot, ...] = (
     Slot("law", laws.LawOfStates, laws.PARTS, "slip", "state evolution law"),
@@ -81,8 +76,8 @@ SLOTS: tuple[Slot, ...] = (
     ),
     Slot("loading", loading.Loading, loading.PARTS, "step", "what the load point does"),
 )
-#: Slots of which there is a choice to be named.
-NAMED = tuple(slot for slot in SLOTS if slot.is_named and len(slot.choices) > 1)
+#: Slots whose choice a field of a scene names; that in others is called for by other fields.
+NAMED = tuple(slot for slot in SLOTS if not slot.callers)
 _EVERY_PART: tuple[type[Part], ...] = (
     Slider,
     *(part for slot in SLOTS for part in slot.choices.values()),

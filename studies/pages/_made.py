@@ -164,7 +164,7 @@ def _slot(slot: registry.Slot) -> str:
         for name, part in slot.choices.items()
     )  # fmt: skip
     made = table(("choice", "what it is", "equation", "its fields"), rows)
-    called = "" if slot.is_named else " A field of the choice, stated, calls for it."
+    called = "" if not slot.callers else " A field of the choice, stated, calls for it."
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
 
