@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from faulty import declared
 from running import SMALL as LATTICE
 from running import call, named_results
 
 import rsfstudy
-from rsfstudy.cli import assignments, command_line
+from rsfstudy.cli import assignments
 from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.claims import Claim
 from rsfstudy.files import store
@@ -153,12 +152,6 @@ def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
     assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
 
 
-def test_results_that_are_not_there_are_status_1(tmp_path):
-    checked = call("check", NAME, "--output", tmp_path)
-    assert checked.returncode == 1
-    assert "does not exist" in checked.stderr
-
-
 @pytest.mark.parametrize(
     ("text", "values"),
     [
@@ -172,10 +165,6 @@ def test_results_that_are_not_there_are_status_1(tmp_path):
 )
 def test_settings(text, values):
     assert assignments.setting(text, ())[1] == values
-
-
-def test_help_needs_no_results():
-    assert CliRunner().invoke(command_line.cli, ["--help"]).exit_code == 0
 
 
 def test_a_label_may_hold_commas_and_colons(tmp_path):

@@ -24,9 +24,7 @@ from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import laws, places, registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
@@ -212,14 +210,6 @@ def test_what_does_not_run_away_needs_larger_steps_for_larger_norms(outside):
     growth = steps.isel(instability_norm=1) / steps.isel(instability_norm=0)
     assert float(growth.sel(sharpness=1.0, stiffness_ratio=1.5)) > 1.2
     assert float(growth.sel(sharpness=0.5, stiffness_ratio=1.5)) < 1.01
-
-
-def test_a_law_that_is_one_of_rsfstudy_at_the_end_of_its_range(outside):
-    measure = CriticalStep(of="displacement_step")
-    ours = Scene(law="slip", normal_stress="constant", stiffness_ratio=0.8)
-    theirs = ours.with_(law="saturating", sharpness=0.0)
-    same, found = (measure(scene, Accuracy(1e-6)).values for scene in (ours, theirs))
-    assert found["critical_displacement"] == pytest.approx(same["critical_displacement"], rel=1e-5)
 
 
 def test_stress_that_wears_the_state_away(outside):

@@ -398,13 +398,6 @@ def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
     assert (code, "wrote" in said) == (0, True)
 
 
-def test_a_pipe_within_a_store_is_not_waited_for(tmp_path):
-    run(TINY, output=tmp_path, format="zarr")
-    os.mkfifo(tmp_path / "tiny.zarr" / "c")
-    with pytest.raises(DataError, match="c is no file, but a pipe, a device or a link"):
-        rsfstudy.open(tmp_path / "tiny.zarr")
-
-
 def test_what_may_not_be_read_is_told(tiny, tmp_path, monkeypatch):
     file = sealed(tiny, tmp_path / "tiny.nc")
 

@@ -2,14 +2,11 @@
 starts.
 """
 
-import json
 import pickle
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from running import cell_key
 
 from rsfstudy import Axis, Scene, Study
@@ -89,14 +86,6 @@ def test_points_keep_their_labels_where_they_keep_their_values():
     assert changed.axes[0].labels == ("constant", "alpha = 0.25", "alpha = 0.4")
     both = study(Axis("case", CASES)).with_(alpha=[0.25, 0.4, 0.56])
     assert [s.alpha for s in both.scenes()] == [None, 0.25, 0.4, 0.56]
-
-
-@given(st.lists(st.floats(1.01, 50.0), min_size=1, max_size=5, unique=True), st.booleans())
-def test_declarations_are_plain_data(values, zipped):
-    axes = [Axis("b_over_a", values), *([Axis("case", CASES)] if zipped else [])]
-    declared = study(*axes).with_(stiffness_ratio=1.2)
-    text = json.dumps(declared.describe(), allow_nan=False)
-    assert json.loads(text)["axes"][0]["values"] == values
 
 
 def declared(**fields) -> Study:
