@@ -107,8 +107,12 @@ def patient(monkeypatch):
 @pytest.fixture(autouse=True, scope="session")
 def the_checkout_stays():
     """Each of hundreds of runs would ask Git three times for the state of the same checkout."""
+    asked, checkout = provenance.git_state, provenance._PACKAGE.parent
+    known = functools.cache(asked)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(provenance, "git_state", functools.cache(provenance.git_state))
+        patch.setattr(
+            provenance, "git_state", lambda root: (known if root == checkout else asked)(root)
+        )
         yield
 
 

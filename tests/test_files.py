@@ -18,6 +18,7 @@ from running import FAULTY, SMALL, call, cell_key, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Scene, plots
+from rsfstudy.compute import provenance
 from rsfstudy.compute.provenance import git_state
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue
@@ -273,7 +274,7 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 
 def test_a_file_says_from_which_checkout_it_comes():
     said = json.loads(run().attrs["provenance"])["git"]
-    assert said == git_state(Path(rsfstudy.__file__).parent.parent)
+    assert said == provenance.git_state(Path(rsfstudy.__file__).parent.parent)
 
 
 # ---- from the file alone ------------------------------------------------------------------------
