@@ -31,10 +31,9 @@ sys.dont_write_bytecode = False
 
 
 #: Modules that take longest, which begin first: none of them is left for one process alone at the
-#: end. Figures draw the results of studies.
+#: end. What uses the results of studies comes later, when they are there: it would wait for each.
 DEAR = (
     "test_studies",
-    "test_figures",
     "test_resume",
     "test_doors",
     "test_faults",
@@ -43,6 +42,7 @@ DEAR = (
     "test_report",
     "test_compiled",
     "test_scale",
+    "test_figures",
     "test_fits_together",
     "test_notebook",
     "test_every_law",
