@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -60,47 +60,37 @@ class Cheapest(Reduction):
         names = dataset["integrator"].values.astype(str)
         if self.default not in names:
             return xr.Dataset()
-        numbers = {
-            "work": np.log(dataset["run_evaluations"]),
-            "default_time": np.log(dataset["run_time"]),
-            "default_request": dataset["requested_digits"].broadcast_like(dataset[self.of]),
-        }
-        wanted = xr.DataArray(
-            np.array(self.digits), dims="digits", coords={"digits": list(self.digits)}
-        )
-        interpolated = {
-            name: xr.apply_ufunc(
+        digits = xr.DataArray(list(self.digits), {"digits": list(self.digits)}, "digits")
+
+        def reached(values: Any) -> Any:
+            """Values of each integrator where it reaches the digits."""
+            core = [["requested_digits"], ["requested_digits"], ["digits"]]
+            return xr.apply_ufunc(
                 _at_digits,
                 dataset[self.of],
                 values,
-                wanted,
-                input_core_dims=[["requested_digits"], ["requested_digits"], ["digits"]],
+                digits,
+                input_core_dims=core,
                 output_core_dims=[["digits"]],
                 vectorize=True,
             )
-            for name, values in numbers.items()
-        }
-        work = np.exp(interpolated["work"])
-        least = work.min("integrator")
-        default = {
-            name: values.sel(integrator=self.default) for name, values in interpolated.items()
-        }
-        known = work.notnull().any("integrator")
-        cheapest = work.fillna(np.inf).argmin("integrator")
-        note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"
-        relative = work / np.exp(default["work"])
+
+        work = np.exp(reached(np.log(dataset["run_evaluations"])))
+        time = np.exp(reached(np.log(dataset["run_time"])))
+        asked = reached(dataset["requested_digits"].broadcast_like(dataset[self.of]))
+        least, default = work.min("integrator"), {"integrator": self.default}
+        cheapest = xr.DataArray(names, dims="n")[work.fillna(np.inf).argmin("integrator")]
+        by_default = work.sel(default, drop=True)
         result = {
-            "integrator": xr.DataArray(names, dims="n")[cheapest].where(known, "none"),
+            "integrator": cheapest.where(work.notnull().any("integrator"), "none"),
             "work": least,
-            "default_work": np.exp(default["work"]),
-            "default_time": np.exp(default["default_time"]),
-            "default_request": default["default_request"],
-            "ratio": np.exp(default["work"]) / least,
+            "default_work": by_default,
+            "default_time": time.sel(default, drop=True),
+            "default_request": asked.sel(default, drop=True),
+            "ratio": by_default / least,
+            "relative": work / by_default,
         }
-        result = {k: v.drop_vars("integrator", errors="ignore") for k, v in result.items()}
-        result["relative"] = relative.drop_vars("integrator").assign_coords(
-            integrator=dataset["integrator"]
-        )
+        note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"
         return xr.Dataset(
             {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in result.items()}
         )
