@@ -211,6 +211,12 @@ def _size(name: str, true: Values) -> float:
     return (sizes | {"trend1": 1.0 / (15.0 * DISTANCE)}).get(name, 1.0)
 
 
+STRESSED = {
+    "normal_stress": "imposed",
+    "alpha": 0.3,
+    "loading_of_record": "normal stress step",
+    "looked_for": "a b slip_distance mu_star alpha",
+}
 CASES = {
     "slip": {"law": "slip"},
     "slowness": {"law": "slowness"},
@@ -228,20 +234,8 @@ CASES = {
     "step down": {"law": "slowness", "loading_of_record": "step down"},
     "b < 0": {"law": "slowness", "b_over_a": -0.4},
     "b < 0, slip": {"law": "slip", "b_over_a": -0.4},
-    "normal stress step": {
-        "law": "slip",
-        "normal_stress": "imposed",
-        "alpha": 0.3,
-        "loading_of_record": "normal stress step",
-        "looked_for": "a b slip_distance mu_star alpha",
-    },
-    "the same, slowness": {
-        "law": "slowness",
-        "normal_stress": "imposed",
-        "alpha": 0.3,
-        "loading_of_record": "normal stress step",
-        "looked_for": "a b slip_distance mu_star alpha",
-    },
+    "normal stress step": {"law": "slip", **STRESSED},
+    "the same, slowness": {"law": "slowness", **STRESSED},
 }
 
 

@@ -17,21 +17,15 @@ from ._paper import PAPER, REFERENCE
 #: The two numbers of section 4 (slowness law, b/a = e, alpha = 0.56), and where the slip law at
 #: constant normal stress feels the norm most: weak net weakening.
 SOFT, STIFF = "slowness at k_cr", "slowness at 1.5 k_cr"
+SLOWNESS: dict[str, str | float] = {
+    "law": "slowness",
+    "normal_stress": "variable",
+    "alpha": 0.56,
+    "b_over_a": math.e,
+}
 BOUNDARIES: dict[str, dict[str, str | float]] = {
-    SOFT: {
-        "law": "slowness",
-        "normal_stress": "variable",
-        "alpha": 0.56,
-        "b_over_a": math.e,
-        "stiffness_ratio": 1.0,
-    },
-    STIFF: {
-        "law": "slowness",
-        "normal_stress": "variable",
-        "alpha": 0.56,
-        "b_over_a": math.e,
-        "stiffness_ratio": 1.5,
-    },
+    SOFT: {**SLOWNESS, "stiffness_ratio": 1.0},
+    STIFF: {**SLOWNESS, "stiffness_ratio": 1.5},
     **{
         f"slip at a/(b-a) = {inverse:g}": {
             "law": "slip",
