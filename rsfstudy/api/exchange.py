@@ -31,8 +31,9 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
     along = [name for name in ("time",) if name in dataset.dims]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
     kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
-    table = dataset[kept].to_dataframe() if along else _one_row(dataset[kept])
-    table = table.reset_index() if along else table
+    if not along:  # the numbers of one answer, in one row
+        return pd.DataFrame({str(n): [dataset[n].values.item()] for n in kept})
+    table = dataset[kept].to_dataframe().reset_index()
     if len(table) < 2:
         return table
     changing = [n for n in table if n in along or table[n].nunique(dropna=False) > 1]
@@ -40,10 +41,6 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
     table = table[changing]
     table.attrs["constant"] = constant
     return table
-
-
-def _one_row(dataset: xr.Dataset) -> pd.DataFrame:
-    return pd.DataFrame({str(n): [v.values.item()] for n, v in dataset.variables.items()})
 
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:

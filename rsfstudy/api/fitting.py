@@ -158,13 +158,14 @@ def fit(
         scene = {"normal_stress": "imposed", **scene}
     first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
     _check_free(free, laws, first)
+    there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
     measure = Fit(
         records=records,
         free=tuple(free),
         slip_distance_guess=guess,
         slip_distance_2_guess=10.0 * guess,
         step=numbers[0],
-        together=_together(records, numbers) if together else (),
+        together=there if together else (),
         before=_micrometres("before", before),
         after=_micrometres("after", after),
         noise=noise,
@@ -238,11 +239,6 @@ def _check_stressed(records: Sequence[Record], loading: str) -> None:
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
-def _together(records: Sequence[Record], numbers: Sequence[int]) -> tuple[tuple[str, int], ...]:
-    """The steps of all records, those that there are."""
-    return tuple((r.name, n) for r in records for n in numbers if n <= len(r.found))
-
-
 def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> float:
     """Slip distance to begin with, in um."""
     if stated is not None:
@@ -294,9 +290,7 @@ def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: floa
 def _check_free(free: Sequence[str], laws: Sequence[str], scene: Scene) -> None:
     """Refuse parameters that a law does not have."""
     for law in laws:
-        states = (
-            scene.with_(law=law).parts.law.states if law != scene.law else scene.parts.law.states
-        )
+        states = (scene if law == scene.law else scene.with_(law=law)).parts.law.states
         wrong = {"b1", "b2", "slip_distance_2"} if states == 1 else {"b"}
         if law != "family":
             wrong.add("law_exponent")

@@ -27,10 +27,10 @@ def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
         if name in values_by_name:
             raise InvalidValue("--set", text, f"sets {name} twice")
         values_by_name[name] = values
-        if name == "loading":
-            files = values if isinstance(values, list) else [values]
-            loadings = [loading(each, study.laboratory) for each in files]
-            values_by_name[name] = loadings if isinstance(values, list) else loadings[0]
+        if name == "loading" and isinstance(values, list):
+            values_by_name[name] = [loading(each, study.laboratory) for each in values]
+        elif name == "loading":
+            values_by_name[name] = loading(values, study.laboratory)
     return values_by_name
 
 

@@ -17,12 +17,7 @@ from typing import Any
 
 import click
 
-from rsfstudy.cli import (
-    command_line_fit,
-    command_line_referee,
-    command_line_simulate,
-    options,
-)
+from rsfstudy.cli import command_line_fit, command_line_referee, command_line_simulate, options
 from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS, OUTPUT
 from rsfstudy.doors import in_words

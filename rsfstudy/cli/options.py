@@ -139,10 +139,7 @@ def fields(words: str) -> Callable[[F], F]:
 
 
 figure = click.option(
-    "--figure",
-    "form",
-    type=click.Choice(FIGURES),
-    help="File format of figures.  [default: png]",
+    "--figure", "form", type=click.Choice(FIGURES), help="File format of figures.  [default: png]"
 )
 
 

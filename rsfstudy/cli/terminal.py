@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pandas as pd
 import xarray as xr
@@ -55,7 +55,8 @@ def declaration(study: Study, output: Path) -> None:
         rig = {n: f"{v:g} {STATED[n].units}" for n, v in study.laboratory.as_dict().items()}
         about["laboratory"] = ", ".join(f"{n} = {v}" for n, v in rig.items())
     measured = {n: v for n, v in study.measure.describe().items() if n not in varied}
-    about["measure"] = ", ".join(f"{n} = {_brief(v)}" for n, v in measured.items())
+    measured |= {n: f"{len(v)} of them" for n, v in measured.items() if isinstance(v, tuple | list)}
+    about["measure"] = ", ".join(f"{n} = {v}" for n, v in measured.items())
     gives = study.measure.variables
     with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
     told = [f"{n}{words}" for n, words in with_errors.items() if not n.endswith("_error")]
@@ -70,11 +71,6 @@ def declaration(study: Study, output: Path) -> None:
         filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
     )
     layout.pairs({name: text or "-" for name, text in about.items()})
-
-
-def _brief(value: Any) -> str:
-    """A field of a measure; of a list of whole problems, how many they are."""
-    return f"{len(value)} of them" if isinstance(value, tuple | list) else str(value)
 
 
 def announce(study: Study, output: Path, accuracy: bool, advice: bool) -> None:
