@@ -283,22 +283,21 @@ def export(file: Path, csv: bool, mat: bool, output: Path | None) -> int:
 
 
 def _target(output: Path | None, form: str | None, every: bool) -> Path | None:
-    """The file that --output names, if it is a figure."""
+    """The file that --output names, if it is a figure and no directory; one that looks like another
+    kind of file must be a directory already.
+    """
     ending = "" if output is None else output.suffix[1:].lower()
-    if ending not in FIGURES:
-        _check_directory(output)
+    if output is None or not ending:
         return None
-    if every or form not in (None, ending):
-        raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
-    return output
-
-
-def _check_directory(output: Path | None) -> None:
-    """Refuse a directory whose name looks like that of a figure, unless it is there."""
-    if output is not None and output.suffix and not output.is_dir():
+    if ending in FIGURES:
+        if every or form not in (None, ending):
+            raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
+        return output
+    if not output.is_dir():
         rule = "ends in no format that figures are written in"
         remedy = "A directory with such a name must be there already."
         raise InvalidValue("--output", str(output), rule, choices=FIGURES, remedy=remedy)
+    return None
 
 
 # ---- arguments ------------------------------------------------------------------------------

@@ -97,8 +97,8 @@ def _steps(record: Record) -> None:
         values = step.begins, step.ends - step.begins, step.before, step.after
         rows.append(dict(zip(heads, (str(number), *(f"{v:.6g}" for v in values)), strict=True)))
     layout.show(Table(rows))
-    if left := len(record.found) - _MOST_STEPS:
-        console.print(f"and {left} more" if left > 0 else "", end="\n" * (left > 0))
+    if (left := len(record.found) - _MOST_STEPS) > 0:
+        console.print(f"and {left} more")
 
 
 def tables(dataset: xr.Dataset) -> int:
