@@ -67,13 +67,19 @@ def place(text: str) -> tuple[str, str]:
     return name, value
 
 
+def named(option: str, text: str, rule: str) -> tuple[str, str]:
+    """Both sides of a text that reads NAME=VALUE; the rule names what it must read."""
+    name, equals, given = (part.strip() for part in text.partition("="))
+    if not (name and equals and given):
+        raise InvalidValue(option, text, rule)
+    return name, given
+
+
 def fields(settings: tuple[str, ...]) -> dict[str, Any]:
     """Fields of a scene that ``--set`` states."""
     found: dict[str, Any] = {}
     for text in settings:
-        name, equals, given = (part.strip() for part in text.partition("="))
-        if not (name and equals and given):
-            raise InvalidValue("--set", text, "must read FIELD=VALUE, as in law=slowness")
+        name, given = named("--set", text, "must read FIELD=VALUE, as in law=slowness")
         if name in found:
             raise InvalidValue("--set", text, f"sets {name} twice")
         found[name] = value(given)
@@ -84,19 +90,15 @@ def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
     start:stop:count:log.
     """
-    name, equals, values = text.partition("=")
-    if not equals or not name.strip() or not values.strip():
-        raise InvalidValue("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
-    if values.strip() in labels:
-        return name.strip(), [values.strip()]
+    name, values = named("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
+    if values in labels:
+        return name, [values]
     parts = [part.strip() for part in values.split(",")]
     if len(parts) > 1:
         if not all(parts):
             raise InvalidValue("--set", text, "leaves a value out")
-        return name.strip(), [value(part) for part in parts]
-    if ":" in values:
-        return name.strip(), spaced("--set", text, values)
-    return name.strip(), value(parts[0])
+        return name, [value(part) for part in parts]
+    return name, spaced("--set", text, values) if ":" in values else value(values)
 
 
 def value(text: str) -> Any:

@@ -72,14 +72,8 @@ def is_fit(dataset: xr.Dataset) -> bool:
 
 
 def _columns(texts: Sequence[str]) -> dict[str, str] | None:
-    found = {}
-    for text in texts:
-        name, equals, heading = (part.strip() for part in text.partition("="))
-        if not (name and equals and heading):
-            rule = "must read NAME=HEADING, as in 'time=t (s)'"
-            raise InvalidValue("--columns", text, rule)
-        found[name] = heading
-    return found or None
+    rule = "must read NAME=HEADING, as in 'time=t (s)'"
+    return dict(assignments.named("--columns", text, rule) for text in texts) or None
 
 
 def _number(text: str) -> int:
