@@ -76,14 +76,22 @@ def _source(app: Any, page: str, text: list[str]) -> None:
 
 
 def _markdown(notebook: str) -> str:
-    """The texts and the code of a notebook, which is kept without its output."""
-    cells = ((cell["cell_type"], "".join(cell["source"])) for cell in json.loads(notebook)["cells"])
-    return "\n\n".join(
-        re.sub(r"\$[^$]+\$", lambda formula: _made.symbol(formula[0]), text)
-        if kind == "markdown"
-        else f"```python\n{text}\n```"
-        for kind, text in cells
-    )
+    """The texts and the code of a notebook, with what it prints and draws."""
+    parts: list[str] = []
+    for cell in json.loads(notebook)["cells"]:
+        text = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            parts.append(re.sub(r"\$[^$]+\$", lambda formula: _made.symbol(formula[0]), text))
+            continue
+        parts.append(f"```python\n{text}\n```")
+        for output in cell["outputs"]:
+            shown = output.get("data", {"text/plain": output.get("text", "")})
+            if "image/png" in shown:
+                image = "".join(shown["image/png"]).replace("\n", "")
+                parts.append(f"![What the code above draws](data:image/png;base64,{image})")
+            else:
+                parts.append(f"```text\n{''.join(shown['text/plain'])}\n```")
+    return "\n\n".join(parts)
 
 
 def _entrance(app: Any, error: Exception | None) -> None:
