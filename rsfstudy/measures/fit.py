@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.fitting import posterior
+from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
     LOGARITHMIC,
@@ -311,8 +312,9 @@ class Fit(Measure):
         values = self._told(found, np.concatenate(rows), model)
         values |= (place := _place(windows[0]))
         for name in self.parameters:
-            of = search.bounds if name in untold else search.interval
-            values[f"{name}_low"], values[f"{name}_high"] = of(found, name)
+            told = name not in untold
+            ends = interval(search, found, name) if told else search.bounds(found, name)
+            values[f"{name}_low"], values[f"{name}_high"] = ends
         if self.posterior:
             values |= self._drawn(search, found)
         if untold:

@@ -10,8 +10,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
-from scipy.stats import t as student
 
+from rsfstudy.analysis.fitting.intervals import Profile, reach
 from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, Model, Values, check_free, check_positive
 from rsfstudy.analysis.fitting.noise import check_noise
@@ -159,13 +159,15 @@ class SyntheticFit(Measure):
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         model = self._joint(fitted, accuracy, meter, clean + size * noise)
         first = self._first(fitted, true)
-        found = Search(model, first, self._free, self.noise).run()
+        search = Search(model, first, self._free, self.noise)
+        found = search.run()
         naive = found
         if self.noise != "white":
             naive = Search(model, found.values, self._free, "white").run()
         values: dict[str, Value] = {
-            **self._held(found, true, ""),
-            **{f"naive_{n}": v for n, v in self._held(naive, true, "inside").items()},
+            **self._deviations(found, true),
+            **self._inside(found, self._squared_distances(search, found, true), ""),
+            **self._inside(naive, np.square(self._off(naive, true) / _spread(naive)), "naive_"),
             "promised_spread": self._shown(self._promised(truth, true)),
             "told": self._shown(np.array([n not in found.untold for n in self._free], dtype=float)),
             "criterion": found.criterion,
@@ -221,25 +223,38 @@ class SyntheticFit(Measure):
             parts.append(Model(scene, time, moved, seen, loading, smooth, meter))
         return Joint(tuple(parts))
 
-    def _held(self, found: Fitted, true: Values, only: str) -> dict[str, np.ndarray]:
-        """Deviations, spreads, and whether the truth lies within the intervals."""
-        at, truth = (
-            np.array([math.log(v[n]) if n in LOGARITHMIC else v[n] for n in self._free])
-            for v in (found.values, true)
-        )
-        spread = np.sqrt(np.diag(found.covariance))
+    def _off(self, found: Fitted, true: Values) -> np.ndarray:
+        """What is found less the truth."""
+        return np.array([_coordinate(n, found.values) - _coordinate(n, true) for n in self._free])
+
+    def _deviations(self, found: Fitted, true: Values) -> dict[str, np.ndarray]:
+        """Parameters, how far they are from the truth, and how far they may be."""
+        at = np.array([_coordinate(n, found.values) for n in self._free])
         slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in self._free])
-        off = at - truth
-        one, two = (student.isf(0.5 * (1.0 - p), found.degrees) * spread for p in (ONE, TWO))
         values = {
             "estimate": at,
-            "deviation": off,
+            "deviation": self._off(found, true),
             "deviation_error": np.array([found.errors[n] for n in self._free]) / slopes,
-            "spread": spread,
-            "inside_one": (np.abs(off) <= one).astype(float),
-            "inside_two": (np.abs(off) <= two).astype(float),
+            "spread": _spread(found),
         }
-        return {name: self._shown(v) for name, v in values.items() if name.startswith(only)}
+        return {name: self._shown(v) for name, v in values.items()}
+
+    def _squared_distances(self, search: Search, found: Fitted, true: Values) -> np.ndarray:
+        """Squared distances of the likelihood to the truth."""
+        distances = [
+            Profile(search, found, name).squared_distance(_coordinate(name, true))
+            for name in self._free
+        ]
+        return np.array(distances)
+
+    def _inside(self, found: Fitted, squared: np.ndarray, prefix: str) -> dict[str, np.ndarray]:
+        """Whether the truth lies within the intervals."""
+        return {
+            f"{prefix}inside_{words}": self._shown(squared <= reach(found, share) ** 2).astype(
+                float
+            )
+            for words, share in (("one", ONE), ("two", TWO))
+        }
 
     def _promised(self, truth: Joint, true: Values) -> np.ndarray:
         """Standard errors by Fisher's information, the noise being known."""
@@ -252,6 +267,14 @@ class SyntheticFit(Measure):
         scales = np.sqrt(np.diag(information))
         inverse = np.linalg.pinv(information / np.outer(scales, scales), hermitian=True)
         return np.asarray(self.noise_size * np.sqrt(np.diag(inverse)) / scales)
+
+
+def _coordinate(name: str, values: Values) -> float:
+    return math.log(values[name]) if name in LOGARITHMIC else values[name]
+
+
+def _spread(found: Fitted) -> np.ndarray:
+    return np.asarray(np.sqrt(np.diag(found.covariance)))
 
 
 def _pieces(text: str, rows: int) -> list[_Piece]:

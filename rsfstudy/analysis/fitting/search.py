@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.joint import Joint
@@ -38,9 +37,8 @@ _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Newton at the end, of which the last one moves by less than a part of standard errors.
 _PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 8)
 _DONE = 1e-3
-#: Fewest degrees of freedom of intervals, what they cover, and by how much of itself the squared
-#: distance to their ends may miss before the likelihood is followed there, how often, how closely.
-_FEWEST, COVERS, _PARABOLIC, _FOLLOWED, _CLOSE = 3.0, 0.95, 0.2, 6, 0.05
+#: Fewest degrees of freedom of intervals.
+_FEWEST = 3.0
 #: Standard error of a logarithm, and of a or b over the larger of both, beyond which a record does
 #: not tell them; and the standard errors that b must differ from 0 by to have a slip distance.
 _TOLD, _ACTS = 0.5, 2.0
@@ -166,7 +164,7 @@ class Search:
         x, noise = self._begin(), noises.white(self.model.time)
         for number in range(1 if self.name == noises.WHITE and len(noise.sizes) == 1 else _PASSES):
             before = x
-            x, jacobian = self._least_squares(x, noise)
+            x, jacobian = self.least_squares(x, noise)
             left = self.residuals(self.values(x))
             if number and _is_still(x - before, noise.whitened(np.column_stack([jacobian, left]))):
                 break
@@ -199,8 +197,12 @@ class Search:
             raise Halt(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
         return self.coordinates(best[1])
 
-    def _least_squares(self, x: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that leave the least under a noise, and the derivatives there."""
+    def least_squares(
+        self, x: np.ndarray, noise: Noise, part: float = _FOUND
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates that leave the least under a noise, to a part of it, and the derivatives
+        there.
+        """
         derivatives = {}
 
         def left(x: np.ndarray) -> np.ndarray:
@@ -221,7 +223,7 @@ class Search:
             (self.low, self.high),
             x_scale="jac",
             xtol=_FOUND,
-            ftol=_FOUND,
+            ftol=part,
             gtol=1e-12,
             max_nfev=_CURVES,
         )
@@ -305,45 +307,6 @@ class Search:
         ends = self.low[place], self.high[place]
         low, high = (v if math.isfinite(v) else math.nan for v in ends)
         return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
-
-    def interval(self, found: Fitted, name: str) -> tuple[float, float]:
-        """Ends of the 95 % interval of a parameter: of the parabola that its likelihood is nearly,
-        else where the likelihood itself has fallen as far, or a bound.
-        """
-        x, place = self.coordinates(found.values), self.free.index(name)
-        reach = student.isf(0.5 * (1.0 - COVERS), found.degrees)
-        direction = found.covariance[:, place] / math.sqrt(found.covariance[place, place])
-        low, high = (self._end(found, x, place, s * direction, reach) for s in (-1.0, 1.0))
-        return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
-
-    def _end(
-        self, found: Fitted, x: np.ndarray, place: int, direction: np.ndarray, reach: float
-    ) -> float:
-        bound = self.high if direction[place] > 0.0 else self.low
-        most = float((bound - x)[place] / direction[place])
-        at = min(reach, most)
-        for number in range(0 if self.model.is_linear(self.free[place]) else _FOLLOWED):
-            moved = np.clip(x + at * direction, self.low, self.high)
-            fallen = self._fallen(found, moved, place)
-            if at == most and fallen < reach**2:
-                break
-            if abs(fallen / reach**2 - 1.0) < (_CLOSE if number else _PARABOLIC):
-                break
-            at = min(most, at * min(max(reach / math.sqrt(max(fallen, 1e-9)), 0.3), 3.0))
-        return float(x[place] + at * direction[place])
-
-    def _fallen(self, found: Fitted, x: np.ndarray, place: int) -> float:
-        """By how much the sum of squares has grown, in variances, where the other parameters move,
-        to first order, to where the least is left.
-        """
-        left = self.residuals(self.values(x), checked=True)
-        if not np.isfinite(left).all():
-            return math.inf
-        others = np.delete(found.jacobian, place, axis=1)
-        whitened = found.noise.whitened(np.column_stack([others, left])) / found.size
-        moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
-        rest = whitened[:, -1] - whitened[:, :-1] @ moved
-        return float(rest @ rest - np.square(found.innovations).sum())
 
 
 def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:

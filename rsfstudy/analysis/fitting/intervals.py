@@ -1,0 +1,110 @@
+"""Intervals of parameters: of Student's t where the likelihood is nearly a parabola, else of the
+likelihood itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import t as student
+
+from rsfstudy.analysis.fitting.model import LOGARITHMIC
+from rsfstudy.analysis.fitting.search import Fitted, Search
+
+#: What intervals cover, and by how much of itself a squared distance may miss that of a parabola
+#: before the likelihood is followed, how often, how closely; and the variances by which the least
+#: sum of squares may be missed then.
+COVERS, _PARABOLIC, _FOLLOWED, _CLOSE, _MISSED = 0.95, 0.2, 6, 0.05, 0.02
+
+
+def reach(found: Fitted, covers: float) -> float:
+    """Distance, in standard errors, to the ends of intervals that cover so much."""
+    return float(student.isf(0.5 * (1.0 - covers), found.degrees))
+
+
+def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
+    """Ends of the 95 % interval of a parameter: where the likelihood has fallen as far as Student's
+    t says, or the bounds of the search.
+    """
+    profile, far = Profile(search, found, name), reach(found, COVERS)
+    low, high = (profile.end(sign, far) for sign in (-1.0, 1.0))
+    return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
+
+
+class Profile:
+    """The likelihood of a parameter, all others being where it is greatest.
+
+    The noise is as the fit found it.
+
+    Parameters
+    ----------
+    search : Search
+    found : Fitted
+        Of that search.
+    name : str
+        The parameter.
+    """
+
+    def __init__(self, search: Search, found: Fitted, name: str) -> None:
+        self.search, self.found, self.place = search, found, found.free.index(name)
+        self.best = search.coordinates(found.values)
+        variance = float(found.covariance[self.place, self.place])
+        self.spread = math.sqrt(variance)
+        #: By how much the others go with the parameter.
+        self.along = found.covariance[:, self.place] / variance
+
+    def end(self, sign: float, far: float) -> float:
+        """Coordinate where the squared distance is that of so many standard errors, or a bound."""
+        bound = (self.search.low if sign < 0.0 else self.search.high)[self.place]
+        most = abs(float(bound - self.best[self.place]))
+        at = min(far * self.spread, most)
+        for _ in range(_FOLLOWED):
+            squared = self.squared_distance(float(self.best[self.place] + sign * at))
+            if (at == most and squared < far**2) or abs(squared / far**2 - 1.0) < _CLOSE:
+                break
+            at = min(most, at * min(max(far / math.sqrt(max(squared, 1e-9)), 0.3), 3.0))
+        return float(self.best[self.place] + sign * at)
+
+    def squared_distance(self, coordinate: float) -> float:
+        """Twice the logarithm by which the likelihood has fallen where the parameter, or its
+        logarithm, is this: by how much the sum of squares has grown, in variances of the noise.
+        """
+        moved = coordinate - self.best[self.place]
+        parabola = float(moved / self.spread) ** 2
+        if not parabola:
+            return 0.0
+        x = np.clip(self.best + moved * self.along, self.search.low, self.search.high)
+        x[self.place] = coordinate
+        nearly = self._to_first_order(x)
+        if not math.isfinite(nearly) or abs(nearly - parabola) < _PARABOLIC * parabola:
+            return parabola if math.isfinite(nearly) else nearly
+        others = np.arange(len(x)) != self.place
+        rest = Search(
+            self.search.model,
+            self.search.values(x),
+            [name for name in self.found.free if name != self.found.free[self.place]],
+            self.search.name,
+        )
+        rest.low, rest.high = self.search.low[others], self.search.high[others]
+        x[others], _ = rest.least_squares(x[others], self.found.noise, _MISSED / len(others))
+        left = self._left(x)
+        self.along = (x - self.best) / moved
+        return self._growth(left)
+
+    def _left(self, x: np.ndarray) -> np.ndarray:
+        """Residuals freed of correlation, over their size; NaN where no motion can be followed."""
+        left = self.search.residuals(self.search.values(x), checked=True)
+        return self.found.noise.whitened(left[:, None])[:, 0] / self.found.size
+
+    def _growth(self, left: np.ndarray) -> float:
+        return float(left @ left - np.square(self.found.innovations).sum())
+
+    def _to_first_order(self, x: np.ndarray) -> float:
+        """By how much squares have grown where the others move, to first order, to the least."""
+        left = self._left(x)
+        if not np.isfinite(left).all():
+            return math.inf
+        others = np.delete(self.found.jacobian, self.place, axis=1)
+        columns = self.found.noise.whitened(others) / self.found.size
+        return self._growth(left - columns @ np.linalg.lstsq(columns, left)[0])

@@ -1,0 +1,106 @@
+"""Intervals of fits against profiles by brute force, on a relaxation that is told badly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+from rsfstudy.analysis.fitting import intervals
+from rsfstudy.analysis.fitting.intervals import Profile
+from rsfstudy.analysis.fitting.model import QUICK, Differences, Values
+from rsfstudy.analysis.fitting.search import Fitted, Search
+
+ROWS, SIZE = 80, 1e-3
+FREE = ("b", "slip_distance", "mu_star")
+
+
+class Relaxation:
+    """``mu_star - b (1 - exp(-x/D_c))`` over 30 um, in place of the model of a record."""
+
+    def __init__(self, truth: Values) -> None:
+        self.time = self.displacement = np.linspace(0.0, 30.0, ROWS)
+        noise = np.random.default_rng(2).standard_normal(ROWS)
+        self.friction = self.curve(truth) + SIZE * noise
+
+    def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
+        """The relaxation."""
+        return np.asarray(
+            values["mu_star"]
+            - values["b"] * -np.expm1(-self.displacement / values["slip_distance"])
+        )
+
+    def trend(self, _values: Values) -> np.ndarray:
+        """None."""
+        return np.zeros(ROWS)
+
+    def is_linear(self, name: str) -> bool:
+        """Friction is linear in all but the slip distance."""
+        return name != "slip_distance"
+
+    def check(self, values: Values) -> None:
+        """All is right."""
+
+    def jacobian(
+        self, values: Values, free: Sequence[str], differences: Differences = QUICK
+    ) -> np.ndarray:
+        """In closed form."""
+        over = self.displacement / values["slip_distance"]
+        columns = {
+            "b": np.expm1(-over),
+            "slip_distance": values["b"] * over * np.exp(-over),
+            "mu_star": np.ones(ROWS),
+        }
+        return np.column_stack([columns[name] for name in free])
+
+
+def fit(distance: float) -> tuple[Relaxation, Search, Fitted]:
+    """A search on such a record, and what it found."""
+    truth = {"a": 0.01, "b": 0.01, "slip_distance": distance, "mu_star": 0.6}
+    model = Relaxation(truth)
+    search = Search(model, truth, FREE, "white")  # type: ignore[arg-type]
+    return model, search, search.run()
+
+
+def squares(model: Relaxation, b: float, distance: float) -> float:
+    """Least sum of squares whatever mu_star is, in closed form."""
+    left = model.friction + b * -np.expm1(-model.displacement / distance)
+    return ROWS * float(np.var(left))
+
+
+def by_hand(model: Relaxation, b: float) -> float:
+    """The same whatever D_c is too, by brute force over its logarithm."""
+    logs = np.linspace(math.log(1.0), math.log(300.0), 400)
+    at = int(np.argmin([squares(model, b, math.exp(u)) for u in logs]))
+    ends = logs[max(at - 1, 0)], logs[min(at + 1, 399)]
+    best = minimize_scalar(lambda u: squares(model, b, math.exp(u)), bounds=ends, method="bounded")
+    return float(best.fun)
+
+
+def test_intervals_end_where_the_likelihood_has_fallen() -> None:
+    model, search, found = fit(25.0)
+    far = intervals.reach(found, intervals.COVERS)
+    b = found.values["b"]
+    low, high = intervals.interval(search, found, "b")
+    least = by_hand(model, b)
+    exact = [
+        brentq(lambda v: (by_hand(model, v) - least) / found.size**2 - far**2, *bracket)
+        for bracket in ((0.3 * b, b), (b, 20.0 * b))
+    ]
+    # a squared distance may be off by a fifth: its root by a tenth
+    assert low - b == pytest.approx(exact[0] - b, rel=0.1)
+    assert high - b == pytest.approx(exact[1] - b, rel=0.1)
+    assert high - b > 1.5 * (b - low)  # no parabola
+
+
+def test_intervals_are_those_of_student_where_the_likelihood_is_a_parabola() -> None:
+    _model, search, found = fit(4.0)
+    for name in ("b", "mu_star"):
+        far = intervals.reach(found, intervals.COVERS) * found.stderr(name)
+        exact = found.values[name] - far, found.values[name] + far
+        assert intervals.interval(search, found, name) == pytest.approx(exact, rel=1e-12)
+    at = found.values["mu_star"] + 2.0 * found.stderr("mu_star")
+    assert Profile(search, found, "mu_star").squared_distance(at) == pytest.approx(4.0, rel=1e-9)
