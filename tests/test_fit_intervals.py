@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from rsfstudy.analysis.fitting import intervals
 from rsfstudy.analysis.fitting.intervals import Profile
@@ -85,14 +85,10 @@ def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     far = intervals.reach(found, intervals.COVERS)
     b = found.values["b"]
     low, high = intervals.interval(search, found, "b")
-    least = by_hand(model, b)
-    exact = [
-        brentq(lambda v: (by_hand(model, v) - least) / found.size**2 - far**2, *bracket)
-        for bracket in ((0.3 * b, b), (b, 20.0 * b))
-    ]
-    # a squared distance may be off by a fifth: its root by a tenth
-    assert low - b == pytest.approx(exact[0] - b, rel=0.1)
-    assert high - b == pytest.approx(exact[1] - b, rel=0.1)
+    # squared distances are off by a fifth, to first order, where a parabola is nearly one
+    for end, slack in ((low, 0.25), (high, 0.06)):
+        fallen = (by_hand(model, end) - by_hand(model, b)) / found.size**2
+        assert fallen == pytest.approx(far**2, rel=slack)
     assert high - b > 1.5 * (b - low)  # no parabola
 
 
