@@ -76,12 +76,12 @@ def waits(space):
     return found
 
 
-def excess(motion, columns, limits):
+def excess(motion, space, columns):
     """Not negative where the slow manifold has to be left; always negative elsewhere."""
     if motion.regime != SLOW or not motion.has_mass:
         return -1.0
     missing = columns[SPRING] - columns[FRICTION]
-    return weight_of_mass(columns[LOG_RATE], missing, limits) - 1.0
+    return weight_of_mass(columns[LOG_RATE], missing, space.limits) - 1.0
 
 
 def happens(watch, before, after, direction):
@@ -97,13 +97,13 @@ def happens(watch, before, after, direction):
 
 def reading(clock, given):
     """The quantity of a watch, `EXCESS`, `PASSED` or `MARGIN`, at a clock within the step."""
-    what, motion, space, limits = given
+    what, motion, space = given
     if what == PASSED:
         unknowns_at(motion, space, clock)
-        return motion.started + elapsed(motion, space, space.within, limits) - motion.target
+        return motion.started + elapsed(motion, space, space.within) - motion.target
     point_within(motion, space, clock)
     if what == EXCESS:
-        return excess(motion, space.between, limits)
+        return excess(motion, space, space.between)
     if what == MARGIN:
         return margin(space.between[LOG_RATE], space.between[RATIO], space.p[LOAD_VELOCITY])
     return quantity(watch_of(space, int(what)), space.between, space.p)
@@ -112,13 +112,13 @@ def reading(clock, given):
 _root = root_of(reading)
 
 
-def located(what, at_begin, at_end, motion, space, limits):
+def located(what, at_begin, at_end, motion, space):
     """Clock within the step at which a reading, given at both ends, changes sign, to 1e-13 of the
     step.
     """
     width = abs(motion.end - motion.clock)
     finest, relative = (1e-15 * width, 1e-15) if what == PASSED else (1e-13 * width, 1e-14)
-    given = what, motion, space, limits
+    given = what, motion, space
     return _root(motion.clock, motion.end, at_begin, at_end, finest, relative, given)
 
 
@@ -134,9 +134,9 @@ def add_event(motion, events, code, clock, passed, columns, p):
     motion.events = n + 1
 
 
-def report_end(motion, space, events, code, limits):
+def report_end(motion, space, events, code):
     """Tell of the end of the step, by a code."""
-    passed = passed_at_end(motion, space, limits)
+    passed = passed_at_end(motion, space)
     add_event(motion, events, float(code), motion.end, passed, space.after, space.p)
 
 
@@ -149,12 +149,12 @@ def slipped(motion, clock, passed, spring, p):
     return motion.slip + (p[LOAD_VELOCITY] * passed - (spring - motion.spring) / p[STIFFNESS])
 
 
-def report_beginning(motion, space, last, events, limits):
+def report_beginning(motion, space, last, events):
     """Tell that a regime or segment has begun, and what happened on the way to it from the last
     point of the one before: at the more extreme of both, or at the first beyond a level. Returns
     whether that ends the motion.
     """
-    p, passed = space.p, passed_at_begin(motion, space, limits)
+    p, passed = space.p, passed_at_begin(motion, space)
     p_before = space.p_before if motion.begins == KINK else p
     if motion.begins != KINK or motion.kinks < motion.told:
         add_event(motion, events, float(motion.begins), motion.clock, passed, space.before, p)
@@ -185,7 +185,7 @@ def between(watch: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int
     return BEFORE if kept and watch[OF] == LOG_RATE else AFTER
 
 
-def detect(motion, space, limits):
+def detect(motion, space):
     """Find when each thing watched for happens within the step; NaN where it does not. Returns how
     many do.
     """
@@ -205,18 +205,18 @@ def detect(motion, space, limits):
         else:
             before, after = quantity(watch, space.before, p), quantity(watch, space.after, p)
             if happens(watch, before, after, motion.direction):
-                space.when[w] = located(float(w), before, after, motion, space, limits)
+                space.when[w] = located(float(w), before, after, motion, space)
         if not math.isnan(space.when[w]):
             count += 1
     return count
 
 
-def report(motion, space, events, limits):
+def report(motion, space, events):
     """Tell what happens within the step, in its order. Returns 0 where nothing does, 1 where the
     asker can wait for it, 2 where not, and 3 where it ends the motion.
     """
     urgent, p = 0, space.p
-    for _ in range(detect(motion, space, limits)):
+    for _ in range(detect(motion, space)):
         first = -1
         for w in range(space.watched):
             later = first >= 0 and motion.direction * (space.when[w] - space.when[first]) >= 0.0
@@ -225,11 +225,11 @@ def report(motion, space, events, limits):
         clock = space.when[first]
         space.when[first] = math.nan
         if clock == motion.end:
-            passed = passed_at_end(motion, space, limits)
+            passed = passed_at_end(motion, space)
             add_event(motion, events, float(first), clock, passed, space.after, p)
         else:
             point_within(motion, space, clock)
-            passed = motion.started + elapsed(motion, space, space.within, limits)
+            passed = motion.started + elapsed(motion, space, space.within)
             add_event(motion, events, float(first), clock, passed, space.between, p)
         watch = watch_of(space, first)
         urgent = max(urgent, 1 if watch[WAITS] else 2)

@@ -146,9 +146,10 @@ def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows,
             len(watches) // len(WATCHED),
             p,
             p_before,
+            limits,
             stepper,
         )
-        end = through_regime(motion, space, last, samples, events, rows, limits)
+        end = through_regime(motion, space, last, samples, events, rows)
         if end == CHANGES:
             motion.regime, motion.begins, motion.length = FAST - motion.regime, CHANGE, 0.0
             enter(motion, y, last)
@@ -216,7 +217,7 @@ def enter(motion, y, last):
         y[1 + motion.states] = 0.0
 
 
-def through_regime(motion, space, last, samples, events, rows, limits):
+def through_regime(motion, space, last, samples, events, rows):
     """Follow one regime; returns why it ends, or why the call has to."""
     if motion.begins:
         motion.pace = 0.0
@@ -227,23 +228,23 @@ def through_regime(motion, space, last, samples, events, rows, limits):
         copy(moved(space.y, space.unknowns), space.rates, space.unknowns)
     evaluate(space.point, space.y, space.rates, space.p, space.before)
     while True:
-        taken = take_step(motion, space, limits)
+        taken = take_step(motion, space)
         if taken != TAKEN:
             return taken
-        if is_recorded(motion, space, samples, limits):
+        if is_recorded(motion, space, samples):
             halve_unresolved(motion, space)
         evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
         if math.isnan(space.after[LOG_RATE]):
             return NO_LENGTH
-        if motion.terminates and not goes_on(motion, space, limits):
+        if motion.terminates and not goes_on(motion, space):
             return HALTED
-        leaves, over = cut_short(motion, space, limits)
+        leaves, over = cut_short(motion, space)
         if motion.begins:
             record_begin(motion, space, rows)
-            if report_beginning(motion, space, last, events, limits):
+            if report_beginning(motion, space, last, events):
                 return ENDED
-        complete = motion.records and record(motion, space, rows, samples, over, limits)
-        urgent = report(motion, space, events, limits)
+        complete = motion.records and record(motion, space, rows, samples, over)
+        urgent = report(motion, space, events)
         if motion.begins == BEGIN and not waits(space):
             urgent = max(urgent, 2)
         motion.begins = 0
@@ -251,15 +252,15 @@ def through_regime(motion, space, last, samples, events, rows, limits):
             return ENDED
         if complete:
             urgent = 2
-            report_end(motion, space, events, SAMPLED, limits)
+            report_end(motion, space, events, SAMPLED)
         if over and motion.kinks > 0:
             motion.urgent = int(urgent == 2)
             return KINKS
         if over:
-            report_end(motion, space, events, END, limits)
+            report_end(motion, space, events, END)
             return ENDED
-        if leaves or returns(motion, space, limits):
-            motion.started = passed_at_end(motion, space, limits)
+        if leaves or returns(motion, space):
+            motion.started = passed_at_end(motion, space)
             copy(space.after, last, PSIS + motion.states)
             return CHANGES
         if motion.terminates and motion.termination != GOES_ON:
@@ -270,7 +271,7 @@ def through_regime(motion, space, last, samples, events, rows, limits):
             return HANDS_OVER
 
 
-def goes_on(motion, space, limits):
+def goes_on(motion, space):
     """True if a motion does, if only through this step: that then ends where the motion does."""
     columns, velocity = space.after, space.p[LOAD_VELOCITY]
     motion.stress = columns[RATIO]
@@ -281,28 +282,28 @@ def goes_on(motion, space, limits):
     at_end = margin(columns[LOG_RATE], columns[RATIO], velocity)
     if at_begin <= 0.0:
         return False
-    cut(motion, space, located(MARGIN, at_begin, at_end, motion, space, limits))
+    cut(motion, space, located(MARGIN, at_begin, at_end, motion, space))
     return True
 
 
-def cut_short(motion, space, limits):
+def cut_short(motion, space):
     """Let the step end where the regime has to be left, and where time is over; whether it is."""
-    before, after = excess(motion, space.before, limits), excess(motion, space.after, limits)
+    before, after = excess(motion, space, space.before), excess(motion, space, space.after)
     leaves = after >= 0.0 > before
     if leaves:
-        cut(motion, space, located(EXCESS, before, after, motion, space, limits))
+        cut(motion, space, located(EXCESS, before, after, motion, space))
     if motion.pace > 0.0 and motion.end == motion.clock + motion.taken:
         return leaves, True
-    over = passed_at_end(motion, space, limits) >= motion.lasts
+    over = passed_at_end(motion, space) >= motion.lasts
     if over:
         motion.target = motion.lasts
-        at_begin = passed_at_begin(motion, space, limits) - motion.lasts
-        at_end = passed_at_end(motion, space, limits) - motion.lasts
-        end_in_time(motion, space, located(PASSED, at_begin, at_end, motion, space, limits), limits)
+        at_begin = passed_at_begin(motion, space) - motion.lasts
+        at_end = passed_at_end(motion, space) - motion.lasts
+        end_in_time(motion, space, located(PASSED, at_begin, at_end, motion, space))
     return leaves, over
 
 
-def end_in_time(motion, space, clock, limits):
+def end_in_time(motion, space, clock):
     """Let the step end where time is over.
 
     Dense output tells the clock. Where stability limits steps it is far less accurate than their
@@ -310,14 +311,14 @@ def end_in_time(motion, space, clock, limits):
     """
     for _ in range(CORRECTIONS):
         retake(motion, space, clock)
-        late = passed_at_end(motion, space, limits) - motion.lasts
-        clock -= late / elapsed(motion, space, space.rates_at_end, limits)
+        late = passed_at_end(motion, space) - motion.lasts
+        clock -= late / elapsed(motion, space, space.rates_at_end)
     evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
 
 
-def returns(motion, space, limits):
+def returns(motion, space):
     """True if the full equations have done their work."""
-    if motion.regime == SLOW or not may_return(space.after[LOG_RATE], limits):
+    if motion.regime == SLOW or not may_return(space.after[LOG_RATE], space.limits):
         return False
     columns, below = space.after, space.between
     space.within[0] = columns[SPRING]
@@ -325,7 +326,7 @@ def returns(motion, space, limits):
         space.within[1 + i] = columns[PSIS + i]
     evaluate(space.balance, space.within, space.within, space.p, below)
     missing = columns[SPRING] - below[1]
-    return has_returned(columns[LOG_RATE], columns[GROWTH], below[0], missing, limits)
+    return has_returned(columns[LOG_RATE], columns[GROWTH], below[0], missing, space.limits)
 
 
 def move_on(motion, space):

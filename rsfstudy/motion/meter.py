@@ -84,9 +84,10 @@ class Meter:
             Right-hand sides in one and in the other, steps, and Jacobians: before, and now.
         """
         others = self.spent - known[0] - known[1]
-        for regime, before, now in zip(regimes, known, spent, strict=False):
-            if now > before:
-                self.add(regime, now - before)
+        if spent[0] > known[0]:
+            self.add(regimes[0], spent[0] - known[0])
+        if spent[1] > known[1]:
+            self.add(regimes[1], spent[1] - known[1])
         self.steps += spent[2] - known[2]
         self.jacobians += spent[3] - known[3]
         return others

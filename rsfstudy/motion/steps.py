@@ -26,25 +26,25 @@ from rsfstudy.slider.places import LOG_LOAD_RATE
 ALLOWED, MOST_HALVINGS, GROWS, APART = 300.0, 6, 1.3, 5e-3
 
 
-def elapsed(motion, space, y, limits):
+def elapsed(motion, space, y):
     """Time since the regime began, at some unknowns; NaN where nothing tells it."""
     if not motion.has_clock:
         return math.nan
-    unit = limits.inertial_time if motion.regime == FAST else 1.0
+    unit = space.limits.inertial_time if motion.regime == FAST else 1.0
     return unit * y[space.unknowns - 1]
 
 
-def passed_at_begin(motion, space, limits):
+def passed_at_begin(motion, space):
     """Time since the start, at the beginning of the step."""
-    return motion.started + elapsed(motion, space, space.y, limits)
+    return motion.started + elapsed(motion, space, space.y)
 
 
-def passed_at_end(motion, space, limits):
+def passed_at_end(motion, space):
     """Time since the start, at the end of the step."""
-    return motion.started + elapsed(motion, space, space.new, limits)
+    return motion.started + elapsed(motion, space, space.new)
 
 
-def take_step(motion, space, limits):
+def take_step(motion, space):
     """Take a step whose local error is allowed; why not, where there is none."""
     longest = LONGEST_STEP
     if motion.limits_steps:
@@ -54,7 +54,7 @@ def take_step(motion, space, limits):
         longest = min(longest, motion.resolved)
     length = 0.0
     if motion.kinks > 0:
-        length = step_to_kink(motion, space, min(longest, motion.length), limits)
+        length = step_to_kink(motion, space, min(longest, motion.length))
     if length == 0.0:
         length = attempt(motion, space, longest)
     motion.steps += 1
@@ -68,10 +68,10 @@ def take_step(motion, space, limits):
     return TAKEN
 
 
-def step_to_kink(motion, space, longest, limits):
+def step_to_kink(motion, space, longest):
     """Length of a step that ends at the next kink, if that is not farther; else 0."""
-    left = motion.lasts - passed_at_begin(motion, space, limits)
-    length = left / elapsed(motion, space, space.rates, limits)
+    left = motion.lasts - passed_at_begin(motion, space)
+    length = left / elapsed(motion, space, space.rates)
     return reach(motion, space, length) if 0.0 < length <= longest else 0.0
 
 

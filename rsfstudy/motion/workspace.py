@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy.motion.calls import evaluate, moved
+from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.layout import FUNCTIONS, PSIS, SLOW
 from rsfstudy.motion.steppers.unrolled import ALL_STAGES, ROWS, SIZES, STAGES
 
@@ -41,6 +42,8 @@ class Workspace(NamedTuple):
         How many rows.
     p, p_before : array
         The numbers of the scene, and what they were before the last kink.
+    limits : Limits
+        When to change between the regimes.
     stepper : object
         What takes the steps.
     """
@@ -69,6 +72,7 @@ class Workspace(NamedTuple):
     watched: int
     p: Array
     p_before: Array
+    limits: Limits
     stepper: Any
 
 
@@ -79,7 +83,7 @@ def size(unknowns: int, states: int, watches: int) -> int:
 
 
 def workspace(
-    block, y, unknowns, scales, states, functions, watches, watched, p, p_before, stepper
+    block, y, unknowns, scales, states, functions, watches, watched, p, p_before, limits, stepper
 ):
     """The workspace of a regime, in a block of that size."""
     new = moved(block, SIZES)
@@ -119,6 +123,7 @@ def workspace(
         watched,
         p,
         p_before,
+        limits,
         stepper,
     )
 

@@ -100,19 +100,29 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
     forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
-    scales = dict.fromkeys(("spring", *_states(scene)), scene.a)
-    slow = _along_path(scene, dynamics.regime, forms.between_ruptures, scales, clock=clock)
-    return slow._replace(balance=forms.balance)
+    unknowns: tuple[str, ...] = ("spring", *_states(scene))
+    scales, form = (scene.a,) * len(unknowns), forms.between_ruptures
+    return _along_path(
+        scene, dynamics.regime, form, unknowns, scales, clock=clock, balance=forms.balance
+    )
 
 
 def _along_path(
-    scene: Scene, regime: str, form: Form, scales: dict[str, float], *, clock: bool
+    scene: Scene,
+    regime: str,
+    form: Form,
+    unknowns: tuple[str, ...],
+    scales: tuple[float, ...],
+    *,
+    clock: bool,
+    balance: Function | None = None,
 ) -> Equations:
-    """Equations along the path, of unknowns with these scales."""
-    rate = form.rate_with_time if clock else form.rate
-    scales = scales | {"time": 1.0} if clock else scales
-    unknowns, sizes = tuple(scales), tuple(scales.values())
-    return Equations(regime, unknowns, sizes, rate, form.point, scene.numbers, scene.states)
+    """Equations along the path, with time as a passenger where a `clock` is wanted."""
+    rate = form.rate
+    if clock:
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), form.rate_with_time
+    p, count = scene.numbers, scene.states
+    return Equations(regime, unknowns, scales, rate, form.point, p, count, balance)
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -127,9 +137,10 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
-    a, others = scene.a, dict.fromkeys(_states(scene)[1:], scene.a)
-    scales = {"spring": a, "log_rate": 1.0, "friction": a, **others}
-    return _along_path(scene, IN_RUPTURE, _full(scene), scales, clock=clock)
+    a, others = scene.a, _states(scene)[1:]
+    unknowns = ("spring", "log_rate", "friction", *others)
+    scales = (a, 1.0, a, *[a] * len(others))
+    return _along_path(scene, IN_RUPTURE, _full(scene), unknowns, scales, clock=clock)
 
 
 def _full(scene: Scene) -> Form:
