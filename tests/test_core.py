@@ -136,7 +136,7 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
 
         switch_weight = property(lambda self: self.weight)
         switch_correction = property(lambda _self: math.inf)
-        landing = property(lambda _self: 1e-9)
+        remaining_slip = property(lambda _self: 1e-9)
         solver = property(lambda _self: 1e-11)
 
     exact, _drop, number = REFERENCES["slip"]

@@ -132,7 +132,7 @@ def _tops_at_start(scene: Scene, event: Event) -> bool:
 
 def _left_out(scene: Scene, accuracy: Accuracy) -> float:
     """Error of log10(V/V_*) after a jump, by the slip of a rise that is not followed."""
-    slip = accuracy.landing if _jumps(scene) else 0.0
+    slip = accuracy.remaining_slip if _jumps(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 

@@ -110,7 +110,7 @@ class Accuracy:
         return math.cbrt(15.0 * min(self.rtol, _LOOSEST_SWITCH) * self.refinement)
 
     @property
-    def landing(self) -> float:
+    def remaining_slip(self) -> float:
         """Slip in D_c that may remain when the inertial equations hand back to the slow
         manifold.
         """

@@ -32,7 +32,7 @@ class Limits(NamedTuple):
         Slip rate norm w at which to leave the slow manifold, which is a series in (K/a) w**2.
     correction : float
         Change of ln V by inertia up to which the slow manifold may be used.
-    landing : float
+    remaining_slip : float
         Slip in D_c that may remain when the full equations hand back.
     softness : float
         K/a.
@@ -44,7 +44,7 @@ class Limits(NamedTuple):
 
     norm: float
     correction: float
-    landing: float
+    remaining_slip: float
     softness: float
     a: float
     inertial_time: float
@@ -56,7 +56,7 @@ def limits(scene: Scene, accuracy: Accuracy) -> Limits:
     return Limits(
         math.sqrt(accuracy.switch_weight / softness),
         accuracy.switch_correction,
-        accuracy.landing,
+        accuracy.remaining_slip,
         softness,
         scene.a,
         scene.inertial_time,
@@ -90,7 +90,7 @@ def begins_slow(log_rate: float, below: float, missing: float, given: Limits) ->
     """
     rate = norm_at(log_rate, given) / given.norm
     slow = max(weight_of_mass(below, missing, given), rate) < 1.0
-    return slow and slip_of_rise(log_rate, below, given) <= given.landing
+    return slow and slip_of_rise(log_rate, below, given) <= given.remaining_slip
 
 
 def may_return(log_rate: float, given: Limits) -> bool:
@@ -116,13 +116,13 @@ def has_returned(
     ln V by which that trails, which is what is missing over a.
     """
     norm = max(norm_at(log_rate, given), norm_at(below, given))
-    has_peak = missing < 0.0 and given.softness * norm**2 > given.landing
-    has_trough = missing > 0.1 * given.landing * given.a
+    has_peak = missing < 0.0 and given.softness * norm**2 > given.remaining_slip
+    has_trough = missing > 0.1 * given.remaining_slip * given.a
     if (growth > 0.0 and (log_rate > below + 1.0 or has_peak)) or (growth < 0.0 and has_trough):
         return False
     remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_rate - below))
     settled = max(norm / given.norm, weight_of_mass(below, missing, given)) < 0.5
-    return settled and remaining < given.landing
+    return settled and remaining < given.remaining_slip
 
 
 def termination_of(log_rate: float, normal_stress: float, load_velocity: float) -> int:
