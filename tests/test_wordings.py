@@ -65,7 +65,7 @@ def calling(part: type) -> dict[str, Any]:
     if part.called_by:
         return {part.called_by: True if is_flag(part, part.called_by) else 0.01}
     slot = next(slot for slot in SLOTS if part in slot.choices.values())
-    return {slot.name: part.name} if slot.is_named and part.name != slot.default else {}
+    return {slot.name: part.name} if not slot.callers and part.name != slot.default else {}
 
 
 def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
