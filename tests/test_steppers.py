@@ -166,7 +166,7 @@ def begun(
     nothing = memoryview(np.zeros(1))
     space = workspace(
         block, unknowns, n, scales, states, functions, nothing, 0, equations.p, equations.p,
-        stepper,
+        None, stepper,
     )  # fmt: skip
     stepper.begin(motion, space)
     return stepper, motion, space

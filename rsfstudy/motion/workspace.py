@@ -43,7 +43,7 @@ class Workspace(NamedTuple):
     p, p_before : array
         The numbers of the scene, and what they were before the last kink.
     limits : Limits
-        When to change between the regimes.
+        When to change between the regimes; none is read where there is no mass.
     stepper : object
         What takes the steps.
     """
