@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.container import ErrorbarContainer
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
@@ -19,7 +20,7 @@ from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.plots import _text
+from rsfstudy.plots import _text, lines
 from rsfstudy.plots._axes import is_log_spaced
 from rsfstudy.quantity import Quantity
 
@@ -174,6 +175,16 @@ def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
     assert len(points) == zeta.sizes["case"]
 
 
+def test_panels_are_repeated_along_an_axis_that_the_figure_does_not_know():
+    """Of few points, which titles say; of many points a map tells."""
+    rates = [0.01, 1.0, 100.0]
+    more = run("linear_stability", load_velocity_ratio=rates, b_over_a=[2.0, 2.5])
+    declared = [axes.get_title() for axes in plots.figure(more.isel(b_over_a=0)).axes]
+    titles = [axes.get_title() for axes in plots.figure(more).axes]
+    assert len(titles) == 2 * len(declared)
+    assert [title.rpartition("= ")[2] for title in titles] == ["2", "2", "2.5", "2.5"]
+
+
 def test_many_names_along_an_axis_are_thinned():
     names = Axis("sample", {f"number {n}": {"phi": 50.0 + 0.05 * n} for n in range(300)})
     (axes, *_others) = plots.figure(lattice(names)).axes
@@ -317,6 +328,13 @@ def test_curves_that_lie_on_each_other_are_one():
         r"variable normal stress, $\phi$ = 50°",
         r"variable normal stress, $\phi$ = 60°",
     ]
+
+
+def test_curves_with_no_place_in_common_are_all_named():
+    laws = {"law": ["slip", "slowness"], "phi": 60.0}
+    same = xr.DataArray(np.ones((2, 3)), laws, dims=("law", "phase"))
+    ((_curve, text),) = lines._different(list(same), ["law", "phi"])
+    assert text == "slip law and slowness law"
 
 
 def test_two_axes_of_numbers_are_a_map_with_statuses_that_are_no_number():
@@ -464,6 +482,10 @@ def test_formulas_are_never_broken():
     assert " ".join(lines) == text
     assert all(line.count("$") % 2 == 0 for line in lines)
     assert _text.wrapped(r"it costs \$5 or \$6", 10) == "it costs\n\\$5 or \\$6"
+    assert (
+        _text.wrapped("two states, b_1 = 1.4 a, at last", 14)
+        == "two states,\nb_1 = 1.4 a,\nat last"
+    )
 
 
 @pytest.mark.parametrize(

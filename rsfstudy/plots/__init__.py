@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import importlib
 import io
+import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +59,8 @@ NAMES = (*_ANY, _FITS, *names.names())
 _ON_SCREEN = 150
 #: What would make two files of one figure differ.
 _DATES: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+#: Most points of axes that a figure does not know for which its panels are repeated.
+_REPEATED = 4
 #: Height in mm of a panel of a scatter matrix.
 _OF_SQUARE = 44.0
 
@@ -181,10 +186,40 @@ def _fitting(
     elif isinstance(own, Declared):
         known -= set(declaration(dataset).overrides) - own.dimensions
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
-    if variable is not None or own is None or isinstance(own, str) or not varied <= known:
+    further = sorted(varied - known)
+    many = math.prod(sizes[dimension] for dimension in further) > _REPEATED
+    if variable is not None or own is None or isinstance(own, str) or many:
         return _of_any(dataset, variable), dataset
     drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
-    return drawing, dataset.squeeze(sorted(set(map(str, sizes)) - known), drop=False)
+    dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
+    panels = _repeated(drawing, dataset, further)
+    return (replace(drawing, panels=panels) if panels else _of_any(dataset)), dataset
+
+
+def _repeated(
+    drawing: Declared, dataset: xr.Dataset, further: Sequence[str]
+) -> Sequence[Panel | Draw]:
+    """The panels of a figure at each point of axes that it does not know, which titles say."""
+    if not further:
+        return drawing.panels
+    found: list[Panel | Draw] = []
+    for at in np.ndindex(*(dataset.sizes[dimension] for dimension in further)):
+        where = dict(zip(further, at, strict=True))
+        part = dataset.isel(where)
+        said = ", ".join(place(part, dimension) for dimension in further)
+        for panel in drawing.panels:
+            if isinstance(panel, Panel):
+                found += [_panel.within(one, where, said) for one in _panel.expanded(panel, part)]
+            else:
+                found.append(partial(_drawn_within, panel, where, said))
+    return found
+
+
+def _drawn_within(
+    panel: Draw, where: Mapping[str, int], said: str, dataset: xr.Dataset, axes: Axes
+) -> None:
+    panel(dataset.isel(where), axes)
+    axes.set_title(", ".join(filter(None, (axes.get_title(), said))))
 
 
 def _with_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:

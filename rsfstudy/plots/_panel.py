@@ -65,6 +65,15 @@ def _part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.isel({d: _numbers(dataset[d], place) for d, place in at.items()})
 
 
+def within(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
+    """The panel at a place on further axes, which its title says too."""
+
+    def title(part: xr.Dataset) -> str:
+        return ", ".join(filter(None, (_text(panel.title, part, _places(part, panel.at)), said)))
+
+    return replace(panel, at={**where, **panel.at}, title=title, when=None)
+
+
 def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     """Draw all of a panel that does not depend on others."""
     part = _part(panel, dataset)

@@ -29,7 +29,7 @@ from rsfstudy.vocabulary import quantity
 
 #: Most panels, and most lines that a legend names; lines along a longer axis of numbers are told
 #: apart by a scale of colours.
-_PANELS, _NAMED, _COLOURED = 4, 24, 6
+_PANELS, _NAMED, _COLOURED = 4, 12, 6
 #: Most curves that lie on each other and are all named.
 _FEW = 3
 #: Most points of a line with markers.
