@@ -58,12 +58,16 @@ class Profile:
         """Coordinate where the squared distance is that of so many standard errors, or a bound."""
         bound = (self.search.low if sign < 0.0 else self.search.high)[self.place]
         most = abs(float(bound - self.best[self.place]))
-        at = min(far * self.spread, most)
-        for _ in range(_FOLLOWED):
+        at, power, before = min(far * self.spread, most), 2.0, (0.0, 0.0)
+        for number in range(_FOLLOWED):
             squared = self.squared_distance(float(self.best[self.place] + sign * at))
             if (at == most and squared < far**2) or abs(squared / far**2 - 1.0) < _CLOSE:
                 break
-            at = min(most, at * min(max(far / math.sqrt(max(squared, 1e-9)), 0.3), 3.0))
+            here = math.log(at), math.log(min(max(squared, 1e-9), 1e9))
+            if number:  # the likelihood may flatten, or fall faster than a parabola
+                power = min(max((here[1] - before[1]) / (here[0] - before[0]), 0.3), 6.0)
+            factor = math.exp((2.0 * math.log(far) - here[1]) / power)
+            at, before = min(most, at * min(max(factor, 0.3), 3.0)), here
         return float(self.best[self.place] + sign * at)
 
     def squared_distance(self, coordinate: float) -> float:

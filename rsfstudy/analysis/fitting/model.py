@@ -73,8 +73,8 @@ _DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: Right-hand sides of a motion, and of each piece of its loading, beyond which it fits no record:
 #: those that do take some thousands, and some twenty a piece. A spring that is stiff for its direct
-#: effect takes 2 k x/a, x being the displacement of the window.
-_MOST, _MOST_EACH = 50_000, 60
+#: effect takes 2 k x/a, x being the displacement of the window: of twice that so many at most.
+_MOST, _MOST_EACH, _MOST_STIFF = 50_000, 60, 500_000
 
 
 def check_free(free: Sequence[str]) -> None:
@@ -178,7 +178,8 @@ class Model:
             longer of two slip distances first.
         """
         budget = self.meter.budget
-        most = self.meter.spent + _MOST + _MOST_EACH * len(self.loading)
+        stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
+        most = _MOST + _MOST_EACH * len(self.loading) + int(min(stiff, _MOST_STIFF))
         try:
             scene = self.scene_of(values)
             swapped = values.get("slip_distance_2", math.inf) <= values["slip_distance"]
@@ -189,7 +190,7 @@ class Model:
             at = np.maximum(self.time - late - self.loading[0, 0], 0.0) * scale
             accuracy = self.accuracy.refined() if refined else self.accuracy
             recording, end = Recording(at=at), float(at[-1]) * (1.0 + 1e-12)
-            self.meter.budget = min(budget, most)
+            self.meter.budget = min(budget, self.meter.spent + most)
             for _event in follow(scene, accuracy, self.meter, recording=recording, until=end):
                 pass
         except Halt as halt:

@@ -229,7 +229,8 @@ class _Products:
         for run in runs:
             known = min(run.before, order)
             rows = slice(run.first - known, min(run.first + order, run.last))
-            self.early.append((columns[rows], known, numbers[rows]))
+            if order:
+                self.early.append((columns[rows], known, numbers[rows]))
             part = columns[run.first : run.last]
             later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
             for i in range(order + 1 if len(part) > order else 0):

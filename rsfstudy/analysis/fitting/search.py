@@ -42,6 +42,8 @@ _FEWEST = 3.0
 #: Standard error of a logarithm, and of a or b over the larger of both, beyond which a record does
 #: not tell them; and the standard errors that b must differ from 0 by to have a slip distance.
 _TOLD, _ACTS = 0.5, 2.0
+#: By how much the criterion of a record must be better with its steps than without them.
+_DECIDES = 10.0
 
 
 @dataclass(frozen=True)
@@ -240,7 +242,7 @@ class Search:
             if not np.isfinite(whitened).all():
                 text = "the best motion cannot be followed"
                 raise Halt(Status.INTEGRATION_FAILED, text)
-            moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
+            moved = _solved(whitened)
             beyond = np.clip(x + moved, self.low, self.high)
             moved = beyond - x
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
@@ -262,6 +264,8 @@ class Search:
         errors = (3.0 * off + np.abs(moved)) * slopes
         variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
         band = np.sqrt(np.maximum(variances, 0.0))  # rounding, where a parameter is not told
+        criterion = _criterion(innovations, noise, len(x))
+        steps = self._criterion_without_steps(jacobian) - criterion > _DECIDES
         return Fitted(
             values=values,
             free=self.free,
@@ -275,12 +279,28 @@ class Search:
             innovations=innovations / size,
             band=band,
             jacobian=jacobian,
-            criterion=_criterion(innovations, noise, len(x)),
-            untold=self._untold(x, values, covariance),
+            criterion=criterion,
+            untold=self._untold(x, values, covariance, steps),
         )
 
-    def _untold(self, x: np.ndarray, values: Values, covariance: np.ndarray) -> tuple[str, ...]:
-        """Free parameters that the record does not tell."""
+    def _criterion_without_steps(self, jacobian: np.ndarray) -> float:
+        """The criterion of trends alone (a = b = 0), with noise of their own."""
+        linear = [self.model.is_linear(name) for name in self.free]
+        columns = np.column_stack([jacobian[:, linear], self.model.friction])
+        if not any(name.startswith("mu_star") for name in self.free):
+            columns = np.insert(columns, 0, 1.0, axis=1)
+        noise = noises.white(self.model.time)
+        for _ in range(2):
+            left = columns[:, -1] - columns[:, :-1] @ _solved(noise.whitened(columns))
+            noise = noises.fitted(self.name, self.model.time, left, columns[:, :-1])
+        whitened = noise.whitened(columns)
+        innovations = whitened[:, -1] - whitened[:, :-1] @ _solved(whitened)
+        return _criterion(innovations, noise, columns.shape[1] - 1)
+
+    def _untold(
+        self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool
+    ) -> tuple[str, ...]:
+        """Free parameters that the record does not tell; all but trends where it has no steps."""
         spread = dict(zip(self.free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         bound = (x - self.low < 1e-6) | (self.high - x < 1e-6)
         effects = {"slip_distance": "b", "slip_distance_2": "b2"}
@@ -297,7 +317,7 @@ class Search:
             effect = effects.get(name, "")
             if effect in spread:
                 told = told and abs(values[effect]) > _ACTS * spread[effect]
-            if not told:
+            if not told or not (steps or self.model.is_linear(name)):
                 found.append(name)
         return tuple(found)
 
@@ -317,6 +337,11 @@ def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
     every = parameters + noise.order * len(noise.sizes) + len(noise.sizes)
     likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
     return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
+
+
+def _solved(columns: np.ndarray) -> np.ndarray:
+    """Least squares: factors of all columns but the last one, which they add up to."""
+    return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
 
 
 def _is_still(moved: np.ndarray, whitened: np.ndarray, part: float = _STILL) -> bool:
