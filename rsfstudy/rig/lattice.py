@@ -137,7 +137,9 @@ class Cells:
             By name, dimensions and values; a field that bears the name of an axis in units is
             called ``dimensionless_...`` here.
         """
-        along = [axis for axis in self.axes if axis.units]
+        # of an axis of one point a second one tells what depends on it
+        alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_plain}
+        along = [_doubled(a) if a.dimension in alone else a for a in self.axes if a.units]
         shape = tuple(len(axis) for axis in along)
         found: dict[str, np.ndarray] = {}
         for rows in alike(along):
@@ -151,7 +153,11 @@ class Cells:
             for name, values in self._named(numbers).items():
                 whole = found.setdefault(name, np.full(shape, np.nan))
                 whole[np.ix_(*rows)] = values
-        return {name: _squeezed(along, values) for name, values in found.items()}
+        squeezed = {name: _squeezed(along, values) for name, values in found.items()}
+        return {
+            name: (dims, values[tuple(slice(1 if d in alone else None) for d in dims)])
+            for name, (dims, values) in squeezed.items()
+        }
 
     def _named(self, row: Mapping[str, Any]) -> dict[str, Any]:
         units, rig = self.units, self.rig(row)
@@ -175,6 +181,15 @@ def _alike(theirs: Any, value: Any) -> bool:
 def _scales(rig: Mapping[str, Any]) -> dict[str, Any]:
     """Value of 1 in SI units, by what quantities are measured in."""
     return {name: scale.factor for name, scale in scales_of_rig(rig).items()}
+
+
+def _doubled(axis: Axis) -> Axis:
+    """An axis of one point, with another near it."""
+    (row,) = axis.rows
+    near = {
+        name: 1.01 * value if isinstance(value, float) else value for name, value in row.items()
+    }
+    return axis.with_rows([row, near], axis.units)
 
 
 def _squeezed(along: Sequence[Axis], values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
