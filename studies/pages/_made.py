@@ -169,9 +169,9 @@ def _slot(slot: registry.Slot) -> str:
 
 
 def equation(part: type[Part]) -> str:
-    """The equations that the functions of a part state in their docstrings."""
+    """The equations that the docstrings of a part and of its functions state."""
     functions = [value.__func__ for value in vars(part).values() if isinstance(value, staticmethod)]
-    texts = [inspect.getdoc(one) or "" for one in functions]
+    texts = [inspect.getdoc(one) or "" for one in (part, *functions)]
     first = [text.split("\n\nParameters\n")[0] for text in texts]
     found = [one for text in first for one in re.findall(r"``([^`]+=[^`]+)``", text)]
     return ", ".join(f"`{' '.join(one.split())}`" for one in dict.fromkeys(found))

@@ -162,7 +162,7 @@ def bounded(rate: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Inertia(Dynamics):
-    """A slider with mass."""
+    """A slider with mass: ``m dV/dt = tau - sigma mu``, with ``m = k (T/2 pi)**2``."""
 
     inertia: bool = flag(False, "whether the slider has mass")
 

@@ -9,7 +9,7 @@ from rsfstudy.slider.fluid import Fluid
 
 @dataclass(frozen=True, kw_only=True)
 class Drained(Fluid):
-    """Constant pore pressure: nothing to add to the friction relation."""
+    """Constant pore pressure, ``dp/dt = 0``: nothing to add to the friction relation."""
 
     name = "drained"
     no_meaning = "while the fault is drained", "set fluid='dilatant'"

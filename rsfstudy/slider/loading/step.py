@@ -12,7 +12,9 @@ from rsfstudy.slider.parts import number
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Loading):
-    """Load point velocity after the step, and change of displacement and normal stress in it."""
+    """Load point velocity ``V_0(t) = V_0`` for t > 0, and change of displacement and normal stress in
+    the step.
+    """
 
     load_velocity_ratio: float | None = last_velocity()
     displacement_step: float = number(

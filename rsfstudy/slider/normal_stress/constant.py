@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Constant(NormalStress):
-    """Constant normal stress: nothing to add to the friction relation."""
+    """Constant normal stress, ``sigma = sigma_*``: nothing to add to the friction relation."""
 
     name = "constant"
     no_meaning = "while normal stress is constant", "set normal_stress='variable'"

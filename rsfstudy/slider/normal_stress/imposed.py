@@ -24,7 +24,9 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Imposed(StateEffect):
-    """Normal stress that the loading imposes, with an effect `alpha` of it on the state."""
+    """Normal stress that the loading imposes, ``sigma = sigma_* + Delta sigma(t)``, with an effect
+    `alpha` of it on the state.
+    """
 
     name = "imposed"
     no_meaning = "while normal stress does not follow shear stress", "set normal_stress='variable'"
