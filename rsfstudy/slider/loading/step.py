@@ -12,8 +12,8 @@ from rsfstudy.slider.parts import number
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Loading):
-    """Load point velocity ``V_0(t) = V_0`` for t > 0, and change of displacement and normal stress in
-    the step.
+    """Load point velocity ``V_0(t) = V_0`` for t > 0, and change of displacement and normal stress
+    in the step.
     """
 
     load_velocity_ratio: float | None = last_velocity()
