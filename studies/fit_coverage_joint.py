@@ -21,9 +21,9 @@ study = Study(
         "Velocity steps of a slider with two states, with white noise and with noise of a "
         "correlation of 0.9, are fitted by the law that made them: a step up alone, and a step up "
         "and one back as one, each with its own friction before it and its own trend. Correlated "
-        "noise leaves 26 independent rows to a step, for seven parameters: intervals then cover "
-        "less than they promise, those of the trend and of what varies as slowly least. Markers "
-        "are as in fit_coverage."
+        "noise leaves 26 independent rows to a step: one step tells the longer slip distance to a "
+        "third then, and intervals of what goes with it are those of the likelihood, which is no "
+        "parabola. Markers are as in fit_coverage."
     ),
     base=Scene(
         law="two_slowness_states",
