@@ -330,6 +330,11 @@ def test_curves_that_lie_on_each_other_are_one():
     ]
 
 
+def test_statuses_are_drawn_by_their_names_where_there_is_no_map():
+    (axes,) = plots.figure(lattice(RATES), variable="status").axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["ok"]
+
+
 def test_curves_with_no_place_in_common_are_all_named():
     laws = {"law": ["slip", "slowness"], "phi": 60.0}
     same = xr.DataArray(np.ones((2, 3)), laws, dims=("law", "phase"))

@@ -41,6 +41,12 @@ def is_number(values: xr.DataArray) -> bool:
     return values.dtype.kind in "fiub" and "flag_values" not in values.attrs
 
 
+def flag_meanings(values: xr.DataArray) -> dict[float, str]:
+    """What the flags mean that a variable holds, in words; empty for one of numbers."""
+    words = [word.replace("_", " ") for word in str(values.attrs.get("flag_meanings", "")).split()]
+    return dict(zip(np.ravel(values.attrs.get("flag_values", [])).tolist(), words, strict=True))
+
+
 def measured(dataset: xr.Dataset) -> list[str]:
     """Variables measured in each cell: no error estimates nor costs, the headline first."""
     cells = set(dataset["status"].dims)

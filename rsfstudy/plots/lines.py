@@ -15,6 +15,7 @@ from rsfstudy.plots._axes import (
     axis_of,
     colour_bar,
     colours,
+    flag_meanings,
     is_log_spaced,
     is_number,
     is_numeric,
@@ -43,7 +44,9 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if variable is None:
         names = varied(dataset)[:_PANELS] or [str(next(iter(dataset.data_vars)))]
     else:
-        names = [variable] if variable in dataset and is_number(dataset[variable]) else []
+        known = variable in dataset
+        drawn = known and (is_number(dataset[variable]) or flag_meanings(dataset[variable]))
+        names = [variable] if drawn else []
     named = len(names) == 1 and not declaration(dataset).overrides
     return [
         _panel(dataset, name, dataset.attrs.get("title", "") if named else "") for name in names
@@ -63,6 +66,11 @@ def _panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
 
 def _lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
     values = dataset[name]
+    if told := flag_meanings(values):
+        flags, places = np.unique(values.values, return_inverse=True)
+        values = values.copy(data=np.reshape(places, values.shape).astype(float))
+        axes.set_yticks(range(flags.size), [told[flag] for flag in flags.tolist()])
+        axes.set_ylim(-0.5, flags.size - 0.5)
     x = axis_of(axes, dataset, along) if along else np.zeros(1)
     numeric = bool(along) and is_numeric(dataset, along)
     coloured = _coloured(dataset, values, along)

@@ -21,7 +21,14 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.spatial import cKDTree
 
 from rsfstudy.declare.figure import Panel
-from rsfstudy.plots._axes import is_log_spaced, is_number, is_numeric, is_wide, measured
+from rsfstudy.plots._axes import (
+    flag_meanings,
+    is_log_spaced,
+    is_number,
+    is_numeric,
+    is_wide,
+    measured,
+)
 from rsfstudy.plots._text import label, pretty
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.status import Status
@@ -48,7 +55,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
-    if not (is_number(values) or _meanings(values)):
+    if not (is_number(values) or flag_meanings(values)):
         return []
     plane, cells = _plane(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
@@ -62,7 +69,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         marks=[partial(draw_map, names[0], plane, _scale(values))],
         y_label=label(quantity(plane[0], stated_by(dataset)), 200),
         title=None if others else pretty(dataset.attrs.get("title", "")),
-        legend_title=label(about, 60) if _meanings(values) else None,
+        legend_title=label(about, 60) if flag_meanings(values) else None,
     )
     return [panel(at=dict(zip(others, at, strict=True))) for at in places]
 
@@ -93,7 +100,7 @@ def draw_map(
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
     if found := scale or _scale(dataset[name]):
         drawn = _colours(axes, at, values.values, norm=found[0])
-        if meanings := _meanings(dataset[name]):
+        if meanings := flag_meanings(dataset[name]):
             for flag in found[1]:
                 colour = drawn.to_rgba(np.array(flag))
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
@@ -108,12 +115,6 @@ def draw_map(
         _statuses(axes, at, status.transpose(*plane).values, unknown)
 
 
-def _meanings(values: xr.DataArray) -> dict[float, str]:
-    """What the flags mean that a variable holds, in words; empty for one of numbers."""
-    words = [word.replace("_", " ") for word in str(values.attrs.get("flag_meanings", "")).split()]
-    return dict(zip(np.ravel(values.attrs.get("flag_values", [])).tolist(), words, strict=True))
-
-
 def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """A scale of colours, and where contours are on it, or the flags that there are; none where
     nothing is known.
@@ -121,7 +122,7 @@ def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     values = data.values.astype(float)
     if not np.isfinite(values).any():
         return None
-    if _meanings(data):
+    if flag_meanings(data):
         flags = np.unique(values[np.isfinite(values)])
         return BoundaryNorm(_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
