@@ -26,6 +26,8 @@ _WIDE = 100.0
 _NARROW = 50.0
 #: Most names along an axis.
 _NAMES = 45
+#: Most names along x that lie side by side; more stand upright.
+_UPRIGHT = 12
 #: What the points of some axes are said to be.
 _NOUNS = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load point {}"}
 
@@ -103,7 +105,11 @@ def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
     points = dataset[dimension].values
     if is_numeric(dataset, dimension):
         return np.asarray(points, dtype=float)
-    name_points(axes.xaxis, [str(point) for point in points], max(8, 48 // points.size))
+    upright = points.size > _UPRIGHT
+    width = 40 if upright else max(8, 48 // points.size)
+    name_points(axes.xaxis, [str(point) for point in points], width)
+    if upright:
+        axes.tick_params(axis="x", labelrotation=90.0, labelsize=5.0)
     axes.set_xlim(-0.5, points.size - 0.5)
     return np.arange(points.size, dtype=float)
 
