@@ -17,7 +17,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Watch, rise
+from rsfstudy.motion.events import Event, EventSpecification, rise
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading.oscillation import Oscillation
@@ -166,9 +166,9 @@ def _cycle(
     return start, (first, second)
 
 
-def _watches(scene: Scene) -> list[Watch]:
+def _watches(scene: Scene) -> list[EventSpecification]:
     """An event comes as the slip rate reaches the instability norm."""
-    return [rise("log_rate", scene.log_norm_rate)]
+    return [rise("log_slip_rate", scene.log_norm_rate)]
 
 
 def _events(motion: Iterator[Event], count: int) -> list[float]:
@@ -228,7 +228,7 @@ def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
     setattr(fast, "terminal", True)  # noqa: B010  # as SciPy asks for it
     latest = 2.0 * found.left
     over = min((scene.oscillation_cycles or math.inf) * scene.oscillation_period, latest)
-    y: Any = [found.begin.spring, found.begin.psis[0], 0.0, 0.0]
+    y: Any = [found.begin.spring_stress, found.begin.psis[0], 0.0, 0.0]
     # no step is longer than part of a wave
     for begin, end, longest in (
         (0.0, over, scene.oscillation_period / 8.0),

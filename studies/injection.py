@@ -118,7 +118,7 @@ class _Departures(NamedTuple):
 
     Attributes
     ----------
-    time, pressure, log_rate : ndarray
+    time, pressure, log_slip_rate : ndarray
         Of the motion: time, pore pressure in the fault, and ln(V/V_*).
     when, log_size : ndarray
         Times at which the departure of ln V is largest, either way, and the logarithms of these.
@@ -126,7 +126,7 @@ class _Departures(NamedTuple):
 
     time: np.ndarray
     pressure: np.ndarray
-    log_rate: np.ndarray
+    log_slip_rate: np.ndarray
     when: np.ndarray
     log_size: np.ndarray
 
@@ -170,7 +170,7 @@ class _Departures(NamedTuple):
             roots = np.roots(slopes)
             turn = top + float(roots[np.argmin(np.abs(roots))].real)
             pressure = float(np.interp(turn, self.time, self.pressure))
-            velocity = math.exp(np.interp(turn, self.time, self.log_rate))
+            velocity = math.exp(np.interp(turn, self.time, self.log_slip_rate))
             values[f"{at}_pressure"] = pressure
             critical = critical_stiffness(scene, pressure, velocity)
             values[f"{at}_stiffness_ratio"] = scene.stiffness / critical

@@ -17,7 +17,7 @@ from rsfstudy import Scene
 from rsfstudy.compute import clusters, provenance, workers
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, Watch, settling
+from rsfstudy.motion.events import Event, EventSpecification, settling
 from rsfstudy.motion.meter import Meter
 
 settings.register_profile(
@@ -80,7 +80,7 @@ def follow(
     rtol: float,
     until: Callable[[Event], bool],
     budget: int = 2_000_000,
-    watches: Sequence[Watch] = (),
+    watches: Sequence[EventSpecification] = (),
 ) -> Meter:
     """Follow a scene until the callback says so, which sees its start, the beginning of each regime
     and the end of each step; and what else is watched for.

@@ -20,7 +20,7 @@ import numpy as np
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.events import Kind, Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.events import EventSpecification, Kind, fall, maximum, minimum, rise, settling
 from rsfstudy.motion.recording import OBSERVED, Recording
 
 try:
@@ -34,10 +34,15 @@ ROWS, BUDGET = 12, 40_000
 
 
 #: What most motions are asked for: extrema, and levels where nothing else happens.
-EXTREMA = maximum("log_rate"), minimum("log_rate"), maximum("spring"), minimum("spring")
-USUAL = (*EXTREMA, rise("log_rate", 0.9), fall("log_rate", 0.5))
+EXTREMA = (
+    maximum("log_slip_rate"),
+    minimum("log_slip_rate"),
+    maximum("spring_stress"),
+    minimum("spring_stress"),
+)
+USUAL = (*EXTREMA, rise("log_slip_rate", 0.9), fall("log_slip_rate", 0.5))
 #: Where the friction coefficient that is read has extrema of its own.
-READ = maximum("reading"), minimum("reading"), maximum("log_rate"), minimum("log_rate")
+READ = maximum("reading"), minimum("reading"), maximum("log_slip_rate"), minimum("log_slip_rate")
 
 
 class Motion(NamedTuple):
@@ -58,7 +63,7 @@ class Motion(NamedTuple):
     """
 
     fields: Mapping[str, Any]
-    watches: tuple[Watch, ...] = USUAL
+    watches: tuple[EventSpecification, ...] = USUAL
     until: float = 40.0
     rows: int = ROWS
     rtol: float = 1e-7
@@ -77,20 +82,20 @@ class Track(NamedTuple):
 
     fields: Mapping[str, Any]
     state: tuple[float, ...]
-    watches: tuple[Watch, ...]
+    watches: tuple[EventSpecification, ...]
     rows: int
     backward: bool = False
     samples: tuple[float, ...] = ()
-    log_rate: float | None = None
+    log_slip_rate: float | None = None
     rtol: float = 1e-7
     budget: int = BUDGET
 
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """What is told, one event after the other."""
-        if self.log_rate is None:
+        if self.log_slip_rate is None:
             equations = between_ruptures(scene, clock=False)
         else:
-            equations = rigid(scene, self.log_rate)
+            equations = rigid(scene, self.log_slip_rate)
         meter, how = Meter(self.budget, engine=engine), {"backward": self.backward}
         asked = (equations, self.state, 0.07 * self.rtol, meter, self.watches)
         if not self.samples:
@@ -169,7 +174,7 @@ MOTIONS: dict[str, Motion | Track] = {
     "slip": Motion({"law": "slip", **VARIABLE, **UP}),
     "slowness, down": Motion(
         {"law": "slowness", **VARIABLE, "load_velocity_ratio": 0.4, "stiffness_ratio": 1.3},
-        (*EXTREMA, fall("log_rate", -1.0)),
+        (*EXTREMA, fall("log_slip_rate", -1.0)),
         rtol=3e-8,
     ),
     "family": Motion(
@@ -282,11 +287,11 @@ MOTIONS: dict[str, Motion | Track] = {
     # other loadings, and another beginning
     "slip, displacement step": Motion(
         {"law": "slip", **VARIABLE, "stiffness_ratio": 1.25, "displacement_step": 0.8},
-        (*EXTREMA, fall("log_rate", -1.0)),
+        (*EXTREMA, fall("log_slip_rate", -1.0)),
     ),
     "slowness, displacement step, mass": Motion(
         {"law": "slowness", **VARIABLE, **MASS, "stiffness_ratio": 1.25, "displacement_step": 2.0},
-        (*EXTREMA, fall("log_rate", -1.0)),
+        (*EXTREMA, fall("log_slip_rate", -1.0)),
         until=100.0,
     ),
     "perrin_rice_zheng, normal stress step": Motion(
@@ -296,7 +301,7 @@ MOTIONS: dict[str, Motion | Track] = {
             "stiffness_ratio": 1.2,
             "normal_stress_step": -0.01,
         },
-        (*EXTREMA, fall("log_rate", -1.0)),
+        (*EXTREMA, fall("log_slip_rate", -1.0)),
     ),
     "two slowness states, normal stress step": Motion(
         {
@@ -369,13 +374,23 @@ MOTIONS: dict[str, Motion | Track] = {
     "slip, path": Track(
         {"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0, "stiffness_ratio": 1.2},
         (0.04, 0.01),
-        (maximum("spring"), rise("log_rate", 1.5), fall("friction", 0.02), fall("psi", -0.01)),
+        (
+            maximum("spring_stress"),
+            rise("log_slip_rate", 1.5),
+            fall("friction", 0.02),
+            fall("psi", -0.01),
+        ),
         rows=5,
     ),
     "slip, path backward": Track(
         {"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0, "stiffness_ratio": 1.2},
         (0.046, -0.03),
-        (maximum("spring"), fall("log_rate", -1.0), fall("friction", 0.02), rise("psi", -0.01)),
+        (
+            maximum("spring_stress"),
+            fall("log_slip_rate", -1.0),
+            fall("friction", 0.02),
+            rise("psi", -0.01),
+        ),
         rows=5,
         backward=True,
     ),
@@ -385,7 +400,7 @@ MOTIONS: dict[str, Motion | Track] = {
         (fall("friction", 0.03), fall("state", -0.1)),
         rows=6,
         samples=(0.0, 0.5, 1.0),
-        log_rate=math.log(10.0),
+        log_slip_rate=math.log(10.0),
     ),
     # motions that cannot go on
     "slip, unbounded": Motion({"law": "slip", **CONSTANT, "stress_dependence": 0.5, **SLIPS}),
@@ -404,6 +419,6 @@ MOTIONS: dict[str, Motion | Track] = {
             "stiffness_ratio": 1.618,
             "load_velocity_ratio": 1.947,
         },
-        (rise("log_rate", 1.0),),
+        (rise("log_slip_rate", 1.0),),
     ),
 }

@@ -57,7 +57,7 @@ class FullEquations:
         self.slowness = "slowness" in law.name
         self.dilatant = scene.parts.fluid.name == "dilatant"
 
-    def log_rate(self, y: np.ndarray) -> np.ndarray:
+    def log_slip_rate(self, y: np.ndarray) -> np.ndarray:
         """ln(V/V_*)."""
         excess = y[..., 0] - self.scene.a * y[..., 1]
         if self.dilatant:
@@ -69,7 +69,7 @@ class FullEquations:
 
     def rates(self, y: np.ndarray) -> np.ndarray:
         """Derivatives against slip plus load point displacement, of any number of points."""
-        scene, x, states = self.scene, self.log_rate(y), self._law(y)
+        scene, x, states = self.scene, self.log_slip_rate(y), self._law(y)
         v, load = np.exp(x), scene.load_velocity
         time = 1.0 / (v + load)
         loading = scene.stiffness * (load - v) * time
@@ -125,10 +125,10 @@ class FullEquations:
         scales[1], scales[-1] = 1.0, max(1.0 / self.scene.load_velocity, abs(y[-1]))
         return scales
 
-    def section(self, spring: float, psis: tuple[float, ...]) -> np.ndarray:
+    def section(self, spring_stress: float, psis: tuple[float, ...]) -> np.ndarray:
         """Where V is V_0: unknowns, with time zero behind them."""
-        y = np.array([spring, 0.0, *psis, 0.0])
-        y[1] = (self.log_rate(y) - self.load) * (1.0 - (psis[-1] if self.dilatant else 0.0))
+        y = np.array([spring_stress, 0.0, *psis, 0.0])
+        y[1] = (self.log_slip_rate(y) - self.load) * (1.0 - (psis[-1] if self.dilatant else 0.0))
         return y
 
     def event(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +139,7 @@ class FullEquations:
         lowest, last = start[0], (y, 0.0)
 
         def above(y: np.ndarray) -> float:
-            return float(self.log_rate(y)) - self.load
+            return float(self.log_slip_rate(y)) - self.load
 
         while True:
             after, term = self.step(y, size)
@@ -148,16 +148,16 @@ class FullEquations:
                 continue
             if y[1] > 0.0 >= after[1]:
                 peak = self._locate(y, size, lambda at: float(at[1]))
-                fastest = max(fastest, peak, key=self.log_rate)
-            if self.log_rate(y) <= min(self.log_rate(last[0]), self.log_rate(after)):
+                fastest = max(fastest, peak, key=self.log_slip_rate)
+            if self.log_slip_rate(y) <= min(self.log_slip_rate(last[0]), self.log_slip_rate(after)):
                 troughs = self._trough(*last), self._trough(y, size)
-                slowest = min(slowest, *troughs, key=self.log_rate)
+                slowest = min(slowest, *troughs, key=self.log_slip_rate)
             if (above(y) > 0.0) is not (above(after) > 0.0) and not np.array_equal(y, start):
                 crossing = self._locate(y, size, above)
                 lowest = min(lowest, float(crossing[0]))
                 if fallen and above(after) > 0.0:
                     numbers = [crossing[-1], start[0] - lowest, start[0] - fastest[0]]
-                    rates = self.log_rate(np.array([slowest, fastest])) / math.log(10.0)
+                    rates = self.log_slip_rate(np.array([slowest, fastest])) / math.log(10.0)
                     return crossing, np.array([*numbers, *rates])
             fallen, last, y = fallen or above(after) < 0.0, (y, size), after
             size *= min(3.0, 0.8 * (_TOLERANCE / max(term, 1e-30)) ** (1.0 / _STAGES))
@@ -167,7 +167,7 @@ class FullEquations:
         low, high = 0.0, size
         for _ in range(45):
             places = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-            first, second = (self.log_rate(self.step(y, place)[0]) for place in places)
+            first, second = (self.log_slip_rate(self.step(y, place)[0]) for place in places)
             low, high = (low, places[1]) if first < second else (places[0], high)
         return self.step(y, low)[0]
 

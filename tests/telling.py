@@ -91,7 +91,7 @@ def told(motion: Motion | Track, engine: str, scene: Scene | None = None) -> Tol
 
 def unit_of(name: str, a: float) -> float:
     """The change of a number that weighs as much as one of 1 in ln V."""
-    return 1.0 if name in ("time", "slip", "log_rate", "growth") else a
+    return 1.0 if name in ("time", "slip", "log_slip_rate", "growth") else a
 
 
 def apart(motion: Motion | Track, reference: Told, other: Told) -> tuple[float, float]:

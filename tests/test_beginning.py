@@ -37,9 +37,9 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
         **dynamics,
     )
     begin = starting(scene)
-    assert begin.spring == stress
+    assert begin.spring_stress == stress
     assert begin.state == pytest.approx(state, abs=1e-13)
-    friction = scene.mu_star + scene.a * begin.log_rate + state
+    friction = scene.mu_star + scene.a * begin.log_slip_rate + state
     assert begin.coefficient == pytest.approx(friction, abs=1e-12)
 
 
@@ -56,8 +56,8 @@ def test_steps_come_on_top():
     scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)
     begin = starting(scene)
     after = starting(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
-    assert after.log_rate == pytest.approx(begin.log_rate, abs=1e-12)
-    assert after.spring == scene.stiffness * 0.5
+    assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
+    assert after.spring_stress == scene.stiffness * 0.5
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)
 
 

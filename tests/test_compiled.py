@@ -135,11 +135,11 @@ def told(scene: Scene, by: str, **options) -> tuple[list, Meter]:
     """Events of a motion by an engine, and the work."""
     load = scene.log_load_rate if scene.load_velocity else -1.0
     watches = (
-        maximum("log_rate"),
-        minimum("log_rate", waits=True),
-        rise("log_rate", load),
-        fall("log_rate", load, waits=True),
-        maximum("spring"),
+        maximum("log_slip_rate"),
+        minimum("log_slip_rate", waits=True),
+        rise("log_slip_rate", load),
+        fall("log_slip_rate", load, waits=True),
+        maximum("spring_stress"),
         fall("state", -0.01),
         settling(1e-3, ends=True),
     )
@@ -164,7 +164,15 @@ def agree(one: list, other: list, within: float = APART) -> None:
             continue
         assert b.time == pytest.approx(a.time, rel=within, abs=1e-9, nan_ok=True)
         assert b.slip == pytest.approx(a.slip, rel=within, abs=1e-7, nan_ok=True)
-        for name in ("log_rate", "spring", "friction", "psi", "state", "coefficient", "psis"):
+        for name in (
+            "log_slip_rate",
+            "spring_stress",
+            "friction",
+            "psi",
+            "state",
+            "coefficient",
+            "psis",
+        ):
             theirs, ours = getattr(b.point, name), getattr(a.point, name)
             assert theirs == pytest.approx(ours, rel=within, abs=0.1 * within), name
         assert b.point.normal_stress == pytest.approx(a.point.normal_stress, rel=within)
@@ -198,9 +206,9 @@ def test_paths_forward_and_backward(backward):
     for by in BOTH:
         meter = Meter(5_000, engine=by)
         watches = (
-            maximum("log_rate"),
-            minimum("log_rate"),
-            fall("log_rate", 0.1),
+            maximum("log_slip_rate"),
+            minimum("log_slip_rate"),
+            fall("log_slip_rate", 0.1),
             rise("psi", 0.02),
             fall("psi", 0.0),
         )
@@ -293,8 +301,8 @@ def test_one_scene_calls_take_an_engine():
 TABLE = {"part": 0.5}
 
 
-def tabulated(log_rate, state, p):
-    return -(state + p[LAW] * log_rate) * TABLE["part"]
+def tabulated(log_slip_rate, state, p):
+    return -(state + p[LAW] * log_slip_rate) * TABLE["part"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,10 +321,10 @@ def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     )
 
 
-def guarded(log_rate, state, p):
-    if log_rate > 1.0:
+def guarded(log_slip_rate, state, p):
+    if log_slip_rate > 1.0:
         raise ValueError("too fast for these experiments")
-    return -(state + p[LAW] * log_rate)
+    return -(state + p[LAW] * log_slip_rate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -334,8 +342,8 @@ def test_a_part_that_raises_is_refused():
         simulate(scene, duration=10.0, engine=COMPILED)
 
 
-def ending(log_rate, state, p):
-    return math.nan if log_rate > 1.0 else -(state + p[LAW] * log_rate)
+def ending(log_slip_rate, state, p):
+    return math.nan if log_slip_rate > 1.0 else -(state + p[LAW] * log_slip_rate)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ from rsfstudy.slider.equations import (
     between_ruptures,
     by_displacement,
     by_inertial_time,
-    log_rate_at,
+    log_slip_rate_at,
 )
 from rsfstudy.slider.places import LAW
 from rsfstudy.slider.point import Point
@@ -48,7 +48,7 @@ def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio
 
     def invariant(point):
         steadiness = point.imbalance / scene.b  # ln(V theta/D_c)
-        load = scene.log_load_rate - point.log_rate + steadiness
+        load = scene.log_load_rate - point.log_slip_rate + steadiness
         return math.exp(steadiness) - steadiness + weakening * (math.exp(load) - load)
 
     def until(event):
@@ -69,17 +69,17 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
 
     def invariant(point):
         return (
-            weakening * load * math.exp(-point.log_rate)
+            weakening * load * math.exp(-point.log_slip_rate)
             - weakening
-            + point.spring / scene.a
-            + weakening * point.log_rate
+            + point.spring_stress / scene.a
+            + weakening * point.log_slip_rate
         )
 
     def until(event):
         # the separatrix repels: what is left of 2e-12 grows with v**lambda
-        amplified = math.exp(max(1.0, weakening) * event.point.log_rate)
+        amplified = math.exp(max(1.0, weakening) * event.point.log_slip_rate)
         assert invariant(event.point) == pytest.approx(1.0, abs=1e-10 * amplified)
-        return event.point.log_rate > 6.0
+        return event.point.log_slip_rate > 6.0
 
     follow(scene, 1e-10, until)
 
@@ -90,14 +90,14 @@ def cycle(
     """Recurrence interval, and spring stress drop in a sigma_*, of one stick-slip cycle."""
     accuracy, meter = accuracy or Accuracy(rtol, 10**7), Meter(10**7)
     # spring stress turns where V = V_0; an arrest may pass that between two regimes
-    turning, times, trough = (maximum("spring"), minimum("spring")), [], math.inf
+    turning, times, trough = (maximum("spring_stress"), minimum("spring_stress")), [], math.inf
     for event in course.follow(scene, accuracy, meter, turning, clock=True):
-        trough = min(trough, event.point.spring)
+        trough = min(trough, event.point.spring_stress)
         if event.kind is not Kind.MAXIMUM:
             continue
         times.append(event.time)
         if len(times) == number + 1:
-            return times[-1] - times[-2], (event.point.spring - trough) / scene.a
+            return times[-1] - times[-2], (event.point.spring_stress - trough) / scene.a
         trough = math.inf
     raise AssertionError
 
@@ -166,10 +166,10 @@ def peaks(displacement, accuracy):
         displacement_step=displacement,
     )
     full, meter, begin = by_inertial_time(scene), Meter(10**6), None
-    for event in course.follow(scene, accuracy, meter, [maximum("log_rate"), EACH_STEP]):
+    for event in course.follow(scene, accuracy, meter, [maximum("log_slip_rate"), EACH_STEP]):
         if event.kind is Kind.MAXIMUM:
             break
-        begin = event.point if begin is None and event.point.log_rate > 10.0 else begin
+        begin = event.point if begin is None and event.point.log_slip_rate > 10.0 else begin
     assert set(meter.by_regime) == {"slow_manifold"}
     top = event.point
     stops = [lambda _t, y: full.rates(tuple(y))[1]]
@@ -177,21 +177,21 @@ def peaks(displacement, accuracy):
     theirs = solve_ivp(
         lambda _t, y: full.rates(tuple(y)),
         (0.0, 1e9),
-        [begin.spring, begin.log_rate, begin.friction],
+        [begin.spring_stress, begin.log_slip_rate, begin.friction],
         method="Radau",
         rtol=1e-12,
         atol=1e-14,
         events=stops,
     )
-    norm = scene.inertial_time * math.exp(top.log_rate)
+    norm = scene.inertial_time * math.exp(top.log_slip_rate)
     return top, scene.stiffness / scene.a * norm**2, theirs.y_events[0][0][:2]
 
 
 def test_slip_is_fastest_where_the_full_equations_say():
     """Without the growth of what mass takes, spring stress there would be off by 8.7e-6."""
-    top, _weight, (spring, log_rate) = peaks(2.0, Accuracy(1e-8))
-    assert top.log_rate == pytest.approx(log_rate, abs=2e-8)
-    assert top.spring == pytest.approx(spring, abs=1e-9)
+    top, _weight, (spring_stress, log_slip_rate) = peaks(2.0, Accuracy(1e-8))
+    assert top.log_slip_rate == pytest.approx(log_slip_rate, abs=2e-8)
+    assert top.spring_stress == pytest.approx(spring_stress, abs=1e-9)
 
 
 @pytest.mark.parametrize("displacement", [2.05, 2.08])
@@ -202,8 +202,8 @@ def test_error_where_slip_peaks_goes_with_the_third_power_of_the_weight(displace
         switch_weight = property(lambda _self: 1.0)
         switch_correction = property(lambda _self: math.inf)
 
-    top, weight, (_spring, log_rate) = peaks(displacement, Never(1e-10))
-    assert top.log_rate - log_rate == pytest.approx(-1.55 * weight**3, rel=0.05)
+    top, weight, (_spring, log_slip_rate) = peaks(displacement, Never(1e-10))
+    assert top.log_slip_rate - log_slip_rate == pytest.approx(-1.55 * weight**3, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -223,13 +223,13 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     psis = (-scene.a * math.log(weight), *[1e-3] * (scene.states - 1))
     state, step = np.array([2e-3, *psis]), 1e-4
     rates = np.array(equations.rates(tuple(state)))
-    ahead, behind = (equations.at(tuple(state + s * rates)).log_rate for s in (step, -step))
+    ahead, behind = (equations.at(tuple(state + s * rates)).log_slip_rate for s in (step, -step))
     point = equations.at(tuple(state))
     assert abs(point.growth) > 0.1
     # differences err by the square of the step
     assert point.growth == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5)
     # without the growth of what mass takes
-    assert abs(point.growth - (point.spring - point.friction) / (scene.a * 1e-3)) > 1e-9
+    assert abs(point.growth - (point.spring_stress - point.friction) / (scene.a * 1e-3)) > 1e-9
 
 
 @given(st.floats(-1e12, 1e12))
@@ -243,13 +243,13 @@ def test_no_slant_is_too_steep():
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("log_rate", [-12.0, 1.0, 9.0])
-def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log_rate):
+@pytest.mark.parametrize("log_slip_rate", [-12.0, 1.0, 9.0])
+def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log_slip_rate):
     """One unit of ln V is a sixth of the way that slip of D_c is; without mass and at constant
     normal stress, dx/ds is the growth of ln V.
     """
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
-    state = (0.01, 0.01 - scene.a * log_rate)
+    state = (0.01, 0.01 - scene.a * log_slip_rate)
     by = by_displacement(scene)
     growth = by.at(state).growth
     along = between_ruptures(scene, clock=False).rates(state)
@@ -281,7 +281,7 @@ def test_a_rupture_is_that_of_inertial_time(law, effects):
     ran = solve_ivp(
         lambda _tau, y: eps * np.array(theirs.both(0.0, y, 0.0)[0]),
         (0.0, stretch[-1].time / eps),
-        [first.spring, first.state, first.log_rate],
+        [first.spring_stress, first.state, first.log_slip_rate],
         method="Radau",
         rtol=1e-10,
         atol=1e-13,
@@ -290,8 +290,8 @@ def test_a_rupture_is_that_of_inertial_time(law, effects):
     # Radau at 1e-10 over a thousand steps; ln V at arrest falls so fast that a time off by 1e-8
     # shows
     assert ran.success
-    assert end.f == pytest.approx(last.spring, abs=3e-9)
-    assert end.x == pytest.approx(last.log_rate, abs=1e-8 * stretch[-1].time * abs(end.growth))
+    assert end.f == pytest.approx(last.spring_stress, abs=3e-9)
+    assert end.x == pytest.approx(last.log_slip_rate, abs=1e-8 * stretch[-1].time * abs(end.growth))
     psi = end.theta + theirs.alpha * math.log(end.s)
     assert psi == pytest.approx(last.psi, abs=1e-6 * scene.a)
 
@@ -307,7 +307,7 @@ def test_inertia_is_integrated_only_where_it_acts():
     regimes = []
 
     def until(event):
-        regimes.append((event.regime, event.point.log_rate + math.log(fast.inertial_time)))
+        regimes.append((event.regime, event.point.log_slip_rate + math.log(fast.inertial_time)))
         return len(regimes) > 1500
 
     follow(fast, 1e-7, until)
@@ -324,9 +324,9 @@ def test_psi_is_continuous_across_a_displacement_step(displacement):
     scene = Scene(displacement_step=displacement)
     first = next(course.follow(scene, Accuracy(), Meter(10**4))).point
     assert first.psi == 0.0
-    assert first.spring == pytest.approx(scene.stiffness * displacement, rel=1e-15)
-    ratio = 1.0 + cot_phi(scene) * first.spring
-    state = first.imbalance - scene.b * first.log_rate
+    assert first.spring_stress == pytest.approx(scene.stiffness * displacement, rel=1e-15)
+    ratio = 1.0 + cot_phi(scene) * first.spring_stress
+    state = first.imbalance - scene.b * first.log_slip_rate
     assert state == pytest.approx(-scene.alpha * math.log(ratio), abs=1e-15)
 
 
@@ -335,12 +335,12 @@ def test_mass_follows_a_displacement_step_within_the_inertial_time():
     follows.
     """
     scene = Scene(normal_stress="constant", displacement_step=20.0, inertia=True)
-    fast = scene.inertial_time * math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
+    fast = scene.inertial_time * math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
     assert fast > 1.0
     begun = next(course.follow(scene, Accuracy(), Meter(10**5)))
     assert begun.regime == "inertial"
-    assert (begun.point.log_rate, begun.point.friction) == (0.0, 0.0)
-    assert begun.point.spring == scene.spring_stress_step
+    assert (begun.point.log_slip_rate, begun.point.friction) == (0.0, 0.0)
+    assert begun.point.spring_stress == scene.spring_stress_step
 
 
 def test_work_budget_ends_a_motion():
@@ -379,7 +379,7 @@ def test_a_slider_that_locks_is_named():
         load_velocity_ratio=0.3,
     )
     with pytest.raises(Halt, match="normal stress grew") as halted:
-        follow(scene, 1e-6, lambda event: event.point.log_rate > 30.0)
+        follow(scene, 1e-6, lambda event: event.point.log_slip_rate > 30.0)
     assert halted.value.status is Status.LOCKED
 
 

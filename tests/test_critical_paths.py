@@ -27,8 +27,8 @@ def test_where_normal_stress_all_but_follows_shear_stress_there_is_a_critical_pa
     take ten times the work for a hundred times the error.
     """
     scene = Scene(phi=math.degrees(math.atan(0.76)) + 0.01)
-    spring, _psi = touching_point(scene.with_(load_velocity_ratio=1.005))
-    assert spring < -0.9 * scene.mu_star
+    spring_stress, _psi = touching_point(scene.with_(load_velocity_ratio=1.005))
+    assert spring_stress < -0.9 * scene.mu_star
     found = CriticalStep()(scene, Accuracy())
     assert found.status is Status.OK
     assert found.rhs_evaluations < 60_000
@@ -48,13 +48,15 @@ def test_where_orbits_grow_the_second_peak_decides(damping):
     critical = found.values["critical_velocity_ratio"]
     (touching,) = RateSteps(scene, 1).sizes_on_path([1e-9], Meter(100_000))
     assert critical < (1.0 - 5e-4) * math.exp(touching)
-    norm = rise("log_rate", scene.log_norm_rate, ends=True)
+    norm = rise("log_slip_rate", scene.log_norm_rate, ends=True)
     for step, reaches in ((critical * (1.0 - 1e-5), False), (critical * (1.0 + 1e-5), True)):
         peaks = []
         stepped = scene.with_(load_velocity_ratio=step)
-        for event in follow(stepped, Accuracy(1e-9), Meter(100_000), (maximum("log_rate"), norm)):
+        for event in follow(
+            stepped, Accuracy(1e-9), Meter(100_000), (maximum("log_slip_rate"), norm)
+        ):
             if event.kind in (Kind.MAXIMUM, Kind.RISE):
-                peaks.append((event.kind, event.point.log_rate))
+                peaks.append((event.kind, event.point.log_slip_rate))
             if len(peaks) == 4:
                 break
         assert peaks[0][0] is Kind.MAXIMUM
@@ -92,13 +94,13 @@ def test_a_fall_of_normal_stress_leaves_sigma_3_positive():
 
 def reaches_the_norm(scene: Scene, peaks: int) -> bool:
     """Whether one of so many first peaks does, followed forward."""
-    beyond = rise("log_rate", scene.log_norm_rate, ends=True)
+    beyond = rise("log_slip_rate", scene.log_norm_rate, ends=True)
     meter, count = Meter(200_000, engine=COMPILED), 0
     with contextlib.suppress(Halt):  # slip that dies out under a held load point
-        watches = (maximum("log_rate"), beyond)
+        watches = (maximum("log_slip_rate"), beyond)
         for event in follow(scene, Accuracy(1e-10, engine=COMPILED), meter, watches):
             # a step may pass the norm and come back
-            if event.kind is Kind.RISE or event.point.log_rate >= scene.log_norm_rate:
+            if event.kind is Kind.RISE or event.point.log_slip_rate >= scene.log_norm_rate:
                 return True
             count += event.kind is Kind.MAXIMUM
             if count == peaks:

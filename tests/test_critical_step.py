@@ -25,7 +25,7 @@ from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold, on_slow_manifold
 from rsfstudy.motion.roots import root_of
-from rsfstudy.slider.equations import between_ruptures, log_rate_at
+from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
 from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
@@ -420,7 +420,7 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     """
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
-    jump = log_rate_at(scene, scene.stiffness * value, 0.0)
+    jump = log_slip_rate_at(scene, scene.stiffness * value, 0.0)
     assert jump == pytest.approx(scene.log_norm_rate, rel=1e-8)
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
@@ -499,7 +499,7 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     assert start is not None
     system = between_ruptures(scene, clock=False)
     point = system.at(start)
-    assert point.log_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
+    assert point.log_slip_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
 
 

@@ -140,9 +140,9 @@ def test_cycles_close_in_every_unknown(words):
     if words == "dilatant":
         begin = np.append(begin, (0.0, 0.0))
     (cycle,) = by.events(begin, 1)
-    assert cycle.begin.log_rate == cycle.end.log_rate == scene.log_load_rate
+    assert cycle.begin.log_slip_rate == cycle.end.log_slip_rate == scene.log_load_rate
     assert section(cycle.end) == pytest.approx(section(cycle.begin), abs=1e-6 * scene.a)
-    assert cycle.begin.spring - cycle.begin.friction > 1e-5
+    assert cycle.begin.spring_stress - cycle.begin.friction > 1e-5
 
 
 def test_what_is_known_far_worse_than_asked_is_not_ok(monkeypatch):

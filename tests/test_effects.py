@@ -15,7 +15,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
     between_ruptures,
     in_rupture,
-    log_rate_at,
+    log_slip_rate_at,
     relation_of,
     rigid,
 )
@@ -64,7 +64,7 @@ def eq_13(scene: Scene, displacement: float) -> float:
 @given(st.floats(-3.0, 5.0), st.floats(0.0, 1.0), st.floats(45.0, 85.0))
 def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
     scene = Scene(alpha=alpha, phi=phi, displacement_step=displacement)
-    ours = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
+    ours = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
     assert ours == pytest.approx(eq_13(scene, displacement), rel=1e-12)
 
 

@@ -39,7 +39,7 @@ def test_a_margin_is_left_where_a_motion_goes_on():
 def test_a_runaway_is_followed_to_its_end(engine):
     """Without mass, slip rate grows without bound within one step: every level before is told."""
     scene = Scene(stiffness_ratio=0.5, displacement_step=3.0)
-    levels = [rise("log_rate", to) for to in (50.0, 150.0, 250.0)]
+    levels = [rise("log_slip_rate", to) for to in (50.0, 150.0, 250.0)]
     met, meter = [], Meter(100_000, engine=engine)
 
     def follow_on() -> None:
@@ -105,7 +105,7 @@ def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
 
     # stress falls and strength rises with x, where normal stress is left
     expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
-    assert starting(scene).log_rate == pytest.approx(expected, abs=1e-9)
+    assert starting(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)
 
 
 def test_formulas_speak_of_no_other_normal_stress():

@@ -57,10 +57,10 @@ MASSIVE = [
 ]
 
 
-def scene_of(fields: dict, ratio: float, log_rate: float = 0.0) -> Scene:
+def scene_of(fields: dict, ratio: float, log_slip_rate: float = 0.0) -> Scene:
     """A scene whose stiffness is so many times critical at the rate of its load point."""
-    scene = Scene(**{"load_velocity_ratio": math.exp(log_rate), "stiffness": 0.01, **fields})
-    return scene.with_(stiffness=ratio * stability.critical_stiffness(scene, log_rate))
+    scene = Scene(**{"load_velocity_ratio": math.exp(log_slip_rate), "stiffness": 0.01, **fields})
+    return scene.with_(stiffness=ratio * stability.critical_stiffness(scene, log_slip_rate))
 
 
 def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
@@ -74,14 +74,14 @@ def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("fields", SCENES, ids=str)
-@pytest.mark.parametrize(("ratio", "log_rate"), [(0.8, -3.0), (1.2, 0.0), (0.9, 2.0)])
-def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_rate):
+@pytest.mark.parametrize(("ratio", "log_slip_rate"), [(0.8, -3.0), (1.2, 0.0), (0.9, 2.0)])
+def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_slip_rate):
     """Their clock is slip and load point displacement: twice as fast as slip."""
-    scene = scene_of(fields, ratio, log_rate)
-    found = steady.steady_sliding(scene, log_rate)
-    equations, at = by_displacement(scene), (found.spring, *found.psis)
+    scene = scene_of(fields, ratio, log_slip_rate)
+    found = steady.steady_sliding(scene, log_slip_rate)
+    equations, at = by_displacement(scene), (found.spring_stress, *found.psis)
     assert np.abs(equations.rates(at)).max() < 1e-13
-    ours, theirs = 0.5 * stability.growth_rates(scene, log_rate), eigenvalues(equations, at)
+    ours, theirs = 0.5 * stability.growth_rates(scene, log_slip_rate), eigenvalues(equations, at)
     assert len(ours) == 1 + scene.states
     # pore pressure may drain, and one of two states evolve, many times as fast as others:
     # differences have the digits of the fastest
@@ -94,7 +94,7 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     """In inertial time: w times as much."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
     found = steady.steady_sliding(scene, 0.0)
-    at = (found.spring, 0.0, found.friction, *found.psis[1:])
+    at = (found.spring_stress, 0.0, found.friction, *found.psis[1:])
     ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
     theirs = eigenvalues(by_inertial_time(scene), at)
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
@@ -113,19 +113,24 @@ def test_critical_stiffness_is_where_growth_begins(fields):
     law=st.sampled_from(sorted(laws.PARTS)),
     alpha=st.none() | st.floats(0.0, 1.0),
     phi=st.floats(50.0, 85.0),
-    log_rate=st.floats(-3.0, 3.0),
+    log_slip_rate=st.floats(-3.0, 3.0),
     log_norm=st.none() | st.floats(-6.0, 0.3),
     log_damping=st.none() | st.floats(-25.0, 0.0),
     dilatancy=st.none() | st.floats(0.0, 0.01),
 )
 def test_the_measure_finds_the_threshold_of_growth(
-    law, alpha, phi, log_rate, log_norm, log_damping, dilatancy
+    law, alpha, phi, log_slip_rate, log_norm, log_damping, dilatancy
 ):
     """By differences of the assembled equations, which have nothing of the formulas."""
     stress = CONSTANT if alpha is None else {"alpha": alpha, "phi": phi}
-    fields = {"law": law, "load_velocity_ratio": math.exp(log_rate), "stiffness": 0.01, **stress}
+    fields = {
+        "law": law,
+        "load_velocity_ratio": math.exp(log_slip_rate),
+        "stiffness": 0.01,
+        **stress,
+    }
     if log_norm is not None:
-        period = 2.0 * math.pi * 10.0**log_norm / (math.exp(log_rate) * 1.17e-8)
+        period = 2.0 * math.pi * 10.0**log_norm / (math.exp(log_slip_rate) * 1.17e-8)
         fields |= {"inertia": True, "period": period}
     elif log_damping is not None:
         fields["radiation_damping"] = math.exp(log_damping)
@@ -142,7 +147,7 @@ def test_the_measure_finds_the_threshold_of_growth(
         told = outcome.values
         # what damping takes is the difference of two numbers of the size of the undamped one; and
         # close to where no stiffness is stable the threshold is ill-conditioned by its own rise
-        undamped = stability.critical_stiffness(Scene(**fields), log_rate, quasi_static=True)
+        undamped = stability.critical_stiffness(Scene(**fields), log_slip_rate, quasi_static=True)
         slack = 1e-6 * max(undamped, told["critical_stiffness"])
         slack *= 1.0 + max(0.0, told["rise_by_dynamics"])
         found = told["critical_stiffness_from_growth"]
@@ -156,7 +161,7 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
     equations = between_ruptures(scene, clock=False)
     at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.states])
     rates, step = np.array(equations.rates(tuple(at))), 1e-5
-    ahead, behind = (equations.at(tuple(at + s * rates)).log_rate for s in (step, -step))
+    ahead, behind = (equations.at(tuple(at + s * rates)).log_slip_rate for s in (step, -step))
     # differences err by the square of the step, and by rounding over it
     told = equations.at(tuple(at)).growth
     assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-9)
@@ -191,9 +196,11 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     rates = stability.growth_rates(scene, 0.0)
     turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
     peaks = []
-    for event in follow(scene, Accuracy(1e-9), Meter(10**6), [maximum("log_rate")], clock=True):
+    for event in follow(
+        scene, Accuracy(1e-9), Meter(10**6), [maximum("log_slip_rate")], clock=True
+    ):
         if event.kind is Kind.MAXIMUM:
-            peaks.append((event.time, event.point.log_rate))
+            peaks.append((event.time, event.point.log_slip_rate))
         if len(peaks) == 8:
             break
     (begin, first), (end, last) = peaks[5], peaks[7]

@@ -176,8 +176,8 @@ def test_the_whole_history_is_one_motion(outside):
     assert (np.diff(motion.time) > 0.0).all()
     assert motion.time.values[-1] == pytest.approx(1500.0, rel=1e-12)
     load = np.maximum(motion.time - 1000.0, 0.0)
-    spring = scene.mu_star + scene.stiffness * (load - motion.slip)
-    np.testing.assert_allclose(motion.shear_stress, spring, atol=1e-12)
+    spring_stress = scene.mu_star + scene.stiffness * (load - motion.slip)
+    np.testing.assert_allclose(motion.shear_stress, spring_stress, atol=1e-12)
 
 
 def test_the_symmetric_law(outside):
@@ -435,7 +435,7 @@ def test_classes_that_fill_no_slot(body, complaint):
 
 
 def test_members_may_bear_their_former_names():
-    part = made(name="formerly", resting=staticmethod(lambda log_rate, shift, p: (shift,)))
+    part = made(name="formerly", resting=staticmethod(lambda log_slip_rate, shift, p: (shift,)))
     assert part.steady_states is part.resting
 
 

@@ -72,16 +72,16 @@ def closed_form(a: float, b: float, weakening: float, drainage: float) -> float:
     st.floats(-5.0, 5.0),
     st.sampled_from(LAWS),
 )
-def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, log_rate, law):
+def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, log_slip_rate, law):
     """With E up to nine tenths of b - a at V_*, at any slip rate: c falls with it."""
     b, drainage = a * b_over_a, 10.0**log_drainage
     scene = dilatant(
         part * (b - a) / 0.76, drainage, law=law, a=a, b_over_a=b_over_a, stiffness=0.1, **CONSTANT
     )
-    weakening = (0.76 + (a - b) * log_rate) * scene.dilatancy
+    weakening = (0.76 + (a - b) * log_slip_rate) * scene.dilatancy
     assume(weakening < 0.95 * (b - a))
-    exact = closed_form(a, b, weakening, drainage * math.exp(-log_rate))
-    ours = stability.critical_stiffness(scene, log_rate)
+    exact = closed_form(a, b, weakening, drainage * math.exp(-log_slip_rate))
+    ours = stability.critical_stiffness(scene, log_slip_rate)
     # slopes of the law are differences of order eight, and roots of polynomials lose digits where
     # drainage is many times faster or slower than slip: up to c = 1.5e6 here
     assert ours == pytest.approx(exact, rel=1e-9)
@@ -169,7 +169,9 @@ def test_the_state_of_the_law_evolves_by_the_law_where_mass_acts(stress):
 def test_without_drainage_pressure_is_lost_to_porosity(fields):
     """P = -(phi - phi_0)/beta: no fluid comes or goes, in any regime."""
     scene, far = dilatant(0.01, 1e-30, load_velocity_ratio=10.0, **fields), 0.0
-    for event in follow(scene, Accuracy(1e-9), Meter(20_000), [maximum("log_rate")], until=40.0):
+    for event in follow(
+        scene, Accuracy(1e-9), Meter(20_000), [maximum("log_slip_rate")], until=40.0
+    ):
         porosity, pressure = event.point.psis[1:]
         far = max(far, porosity)
         # the two are integrated separately, to 7e-11 of a or of themselves a step
@@ -313,13 +315,13 @@ def test_a_scene_with_a_fluid_is_a_scene():
     assert scene.effects == ("inclined_driving", "linker_dieterich", "dilatancy", "inertia")
 
 
-def tight(log_rate, states, share, p):
-    opening = share * (p[FLUID] * log_rate - states[0])
+def tight(log_slip_rate, states, share, p):
+    opening = share * (p[FLUID] * log_slip_rate - states[0])
     return opening, -opening
 
 
-def filled(log_rate, p):
-    return p[FLUID] * log_rate, -p[FLUID] * log_rate
+def filled(log_slip_rate, p):
+    return p[FLUID] * log_slip_rate, -p[FLUID] * log_slip_rate
 
 
 @dataclass(frozen=True, kw_only=True)

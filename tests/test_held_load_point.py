@@ -42,12 +42,15 @@ LATE = [
 def reaches_the_norm(scene: Scene) -> bool:
     """Whether the motion does, followed without any of what ends it early."""
     norm = scene.log_norm_rate
-    watches = (rise("log_rate", norm, ends=True), fall("spring", -scene.mu_star, ends=True))
+    watches = (
+        rise("log_slip_rate", norm, ends=True),
+        fall("spring_stress", -scene.mu_star, ends=True),
+    )
     # slip that dies out, or that decays for ever
     with contextlib.suppress(Halt):
         meter = Meter(20_000, engine=COMPILED)
         for event in follow(scene, Accuracy(1e-8, engine=COMPILED), meter, watches):
-            if event.kind is Kind.RISE or event.point.log_rate >= norm:
+            if event.kind is Kind.RISE or event.point.log_slip_rate >= norm:
                 return True
     return False
 
@@ -125,20 +128,23 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
             scene,
             Accuracy(1e-6, engine=COMPILED),
             Meter(20_000, engine=COMPILED),
-            (maximum("log_rate"), *(fall("log_rate", -float(x), ends=x == 4) for x in range(5))),
+            (
+                maximum("log_slip_rate"),
+                *(fall("log_slip_rate", -float(x), ends=x == 4) for x in range(5)),
+            ),
         )
     ]
     assert len(points) > 4
     bound = scene.parts.fluid.highest_pressure
     for now, point in enumerate(points):
         to_come = points[now:]
-        highest = max(later.log_rate for later in to_come)
+        highest = max(later.log_slip_rate for later in to_come)
         told = bound(highest, point.psis[1:])
         assert max(later.psis[-1] for later in to_come) <= told * (1.0 + 1e-6)
     # slip rate falls slowly against drainage at last: pressure is then in balance
     last = points[-1]
     if drainage > 10.0:
-        assert bound(last.log_rate, last.psis[1:]) == pytest.approx(last.psis[-1], rel=0.05)
+        assert bound(last.log_slip_rate, last.psis[1:]) == pytest.approx(last.psis[-1], rel=0.05)
 
 
 def test_states_that_weaken_as_slip_rate_falls_prove_nothing():
@@ -150,7 +156,7 @@ def test_states_that_weaken_as_slip_rate_falls_prove_nothing():
         scene = Scene(law="two_slip_states", **CONSTANT, b1_over_a=2.8, b2_over_a=second,
                       length_ratio=0.15, stiffness_ratio=1.5, displacement_step=0.05,
                       load_velocity_ratio=0.0)  # fmt: skip
-        watches = tuple(fall("log_rate", x, ends=x == -20.0) for x in (-5.0, -20.0))
+        watches = tuple(fall("log_slip_rate", x, ends=x == -20.0) for x in (-5.0, -20.0))
         meter = Meter(20_000, engine=COMPILED)
         events = list(follow(scene, Accuracy(1e-6, engine=COMPILED), meter, watches))
         ends[second] = [held._stays_below_norm(scene, event.point) for event in events[1:]]

@@ -286,4 +286,4 @@ def test_other_steppers_follow_it_too(method):
     methods = {} if own else {"quasi_static": method}
     meter = Meter(10**6, engine=accuracy.engine, methods=methods)
     *_earlier, end = follow(scene, accuracy, meter, until=20.0)
-    assert scene.mu_star + end.point.spring == pytest.approx(known, abs=1e-7)
+    assert scene.mu_star + end.point.spring_stress == pytest.approx(known, abs=1e-7)

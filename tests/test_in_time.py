@@ -151,12 +151,12 @@ def events_of(which: Scene) -> tuple[tuple, ...]:
     load = which.load_velocity_ratio
     above, below = math.log(load) + 0.1, math.log(load) - 0.1
     return (
-        (maximum("log_rate"), lambda now: now.growth, -1.0),
-        (minimum("log_rate"), lambda now: now.growth, 1.0),
-        (maximum("spring"), lambda now: load - now.v, -1.0),
-        (minimum("spring"), lambda now: load - now.v, 1.0),
-        (rise("log_rate", above), lambda now: now.x - above, 1.0),
-        (fall("log_rate", below), lambda now: now.x - below, -1.0),
+        (maximum("log_slip_rate"), lambda now: now.growth, -1.0),
+        (minimum("log_slip_rate"), lambda now: now.growth, 1.0),
+        (maximum("spring_stress"), lambda now: load - now.v, -1.0),
+        (minimum("spring_stress"), lambda now: load - now.v, 1.0),
+        (rise("log_slip_rate", above), lambda now: now.x - above, 1.0),
+        (fall("log_slip_rate", below), lambda now: now.x - below, -1.0),
     )
 
 
@@ -189,7 +189,7 @@ def test_events_are_those_of_time(name, engine):
         for event, (time, now) in zip(events, known[watch], strict=True):
             point = event.point
             assert event.time == pytest.approx(time, rel=0.0, abs=allowed), watch
-            assert point.log_rate == pytest.approx(now.x, rel=0.0, abs=allowed), watch
-            ours = point.spring, point.friction, point.normal_stress, point.state
+            assert point.log_slip_rate == pytest.approx(now.x, rel=0.0, abs=allowed), watch
+            ours = point.spring_stress, point.friction, point.normal_stress, point.state
             within = allowed * which.a
             assert ours == pytest.approx((now.f, now.g, now.s, now.theta), rel=0, abs=within), watch

@@ -22,20 +22,20 @@ CUT_OFFS = ("composite", "cut_off")
 # ---- critical stiffness --------------------------------------------------------------------------
 
 
-def composite(scene: Scene, log_rate: float) -> float:
+def composite(scene: Scene, log_slip_rate: float) -> float:
     """(1 + w)(b - a) + b w V/V_c, w exp(w) = exp(-V/V_c)."""
-    relative = math.exp(log_rate) / scene.cutoff_velocity_ratio
+    relative = math.exp(log_slip_rate) / scene.cutoff_velocity_ratio
     w = lambert_w(math.exp(-relative))
     return (1.0 + w) * (scene.b - scene.a) + scene.b * w * relative
 
 
-def cut_off(scene: Scene, log_rate: float) -> float:
+def cut_off(scene: Scene, log_slip_rate: float) -> float:
     """b/(1 + V/V_c) - a."""
-    return scene.b / (1.0 + math.exp(log_rate) / scene.cutoff_velocity_ratio) - scene.a
+    return scene.b / (1.0 + math.exp(log_slip_rate) / scene.cutoff_velocity_ratio) - scene.a
 
 
 @given(st.floats(-12, 12), st.floats(-4, 12), st.floats(1.05, 4.0))
-def test_critical_stiffness_of_cut_offs(log_rate, log_cutoff, b_over_a):
+def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
     """Slopes of the law are differences of order eight; those of exp(-V/V_c), whose ninth
     derivative reaches 1e4, are exact to 1e-9 or so.
     """
@@ -43,8 +43,8 @@ def test_critical_stiffness_of_cut_offs(log_rate, log_cutoff, b_over_a):
         cutoff = math.exp(log_cutoff)
         scene = Scene(law=law, cutoff_velocity_ratio=cutoff, b_over_a=b_over_a, stiffness=1.0,
                       **CONSTANT)  # fmt: skip
-        ours = stability.critical_stiffness(scene, log_rate)
-        exact = max(formula(scene, log_rate), 0.0)
+        ours = stability.critical_stiffness(scene, log_slip_rate)
+        exact = max(formula(scene, log_slip_rate), 0.0)
         assert ours == pytest.approx(exact, abs=1e-8 * scene.b)
 
 

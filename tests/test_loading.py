@@ -65,32 +65,32 @@ def test_a_cut_changes_nothing(fields, cut):
         **fields,
     )
     two = scene((1.0, 0.1, cut), **fields)
-    watches = (maximum("log_rate"), fall("log_rate", 0.0), rise("log_rate", 0.0))
+    watches = (maximum("log_slip_rate"), fall("log_slip_rate", 0.0), rise("log_slip_rate", 0.0))
     whole = [e for e in told(one, *watches, until=40.0) if e.watch is not None]
     parts = [e for e in told(two, *watches, until=40.0) if e.watch is not None]
     assert [e.watch for e in parts] == [e.watch for e in whole]
     for event, again in zip(whole, parts, strict=True):
         assert again.time == pytest.approx(event.time, rel=2e-6)
         assert again.slip == pytest.approx(event.slip, rel=2e-6)
-        assert again.point.spring == pytest.approx(event.point.spring, abs=2e-6)
+        assert again.point.spring_stress == pytest.approx(event.point.spring_stress, abs=2e-6)
 
 
 def test_a_cut_in_the_second_half_of_a_rupture_keeps_its_momentum():
     """Stress has dropped, and the slider is still fast."""
     fields = {"stiffness_ratio": 0.5, "inertia": True}
-    whole = told(scene((1.0, 0.1, 20.0), **fields), minimum("spring"), until=19.0)
-    arrest = next(e for e in whole if e.kind is Kind.MINIMUM and e.point.spring < -0.4)
-    falling = fall("spring", 0.9 * arrest.point.spring)
+    whole = told(scene((1.0, 0.1, 20.0), **fields), minimum("spring_stress"), until=19.0)
+    arrest = next(e for e in whole if e.kind is Kind.MINIMUM and e.point.spring_stress < -0.4)
+    falling = fall("spring_stress", 0.9 * arrest.point.spring_stress)
     fast = next(
         e
         for e in told(scene((1.0, 0.1, 20.0), **fields), falling, until=19.0)
         if e.watch is falling
     )
     assert fast.regime == IN_RUPTURE
-    cut = told(scene((1.0, 0.1, fast.time), **fields), minimum("spring"), until=19.0)
-    again = next(e for e in cut if e.kind is Kind.MINIMUM and e.point.spring < -0.4)
+    cut = told(scene((1.0, 0.1, fast.time), **fields), minimum("spring_stress"), until=19.0)
+    again = next(e for e in cut if e.kind is Kind.MINIMUM and e.point.spring_stress < -0.4)
     assert again.slip == pytest.approx(arrest.slip, rel=1e-5)
-    assert again.point.spring == pytest.approx(arrest.point.spring, rel=1e-5)
+    assert again.point.spring_stress == pytest.approx(arrest.point.spring_stress, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -121,33 +121,34 @@ def test_jumps_between_segments_are_told():
     """
     jump = told(
         scene((1.0, 0.0, 5.0), (1.0, 1.2), stiffness_ratio=4.0),
-        rise("log_rate", 4.0),
-        fall("log_rate", 4.0),
-        maximum("log_rate"),
+        rise("log_slip_rate", 4.0),
+        fall("log_slip_rate", 4.0),
+        maximum("log_slip_rate"),
         until=8.0,
     )
     kinds = [event.kind for event in jump]
     assert kinds[:4] == [Kind.START, Kind.SEGMENT, Kind.RISE, Kind.FALL]
     assert [event.time for event in jump[1:3]] == [5.0, 5.0]
     assert kinds.count(Kind.END) == 1
-    held = told(scene((10.0, 0.0, 0.05), (0.0, 0.0)), maximum("spring"), until=1.0)
+    held = told(scene((10.0, 0.0, 0.05), (0.0, 0.0)), maximum("spring_stress"), until=1.0)
     (highest,) = (event for event in held if event.kind is Kind.MAXIMUM)
     assert highest.time == pytest.approx(0.05)
-    assert highest.point.spring == max(event.point.spring for event in held)
+    assert highest.point.spring_stress == max(event.point.spring_stress for event in held)
 
 
 def test_what_ends_a_motion_ends_it_between_regimes_too():
     """From rupture to slow slip the rate falls past the level at once."""
     of = scene((1.0, 0.1, 1e3), stiffness_ratio=0.5, inertia=True)
-    *_before, last = told(of, fall("log_rate", 8.0, ends=True), until=500.0)
+    *_before, last = told(of, fall("log_slip_rate", 8.0, ends=True), until=500.0)
     assert (last.kind, last.regime) == (Kind.FALL, "slow_manifold")
-    assert last.point.log_rate <= 8.0
+    assert last.point.log_slip_rate <= 8.0
 
 
 def test_events_come_in_order_and_take_turns():
     of = scene((2.0, 0.2, 30.0), (5.0, -0.1), inertia=True)
     watches = (
-        maximum("log_rate"), minimum("log_rate"), rise("log_rate", 2.0), fall("log_rate", 2.0),
+        maximum("log_slip_rate"), minimum("log_slip_rate"),
+        rise("log_slip_rate", 2.0), fall("log_slip_rate", 2.0),
         settling(1e-9),
     )  # fmt: skip
     events = told(of, *watches, until=60.0)
@@ -175,7 +176,9 @@ def test_whether_a_step_triggers_is_asked_of_one_step():
 
 
 def test_time_without_a_clock_is_not_known():
-    motion = follow(Scene(load_velocity_ratio=1.5), Accuracy(), Meter(10**4), [maximum("log_rate")])
+    motion = follow(
+        Scene(load_velocity_ratio=1.5), Accuracy(), Meter(10**4), [maximum("log_slip_rate")]
+    )
     event = next(event for event in motion if event.watch is not None)
     assert math.isnan(event.time)
     assert math.isnan(event.slip)

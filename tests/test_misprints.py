@@ -12,7 +12,7 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.slider.equations import evolution_of, log_rate_at, relation_of
+from rsfstudy.slider.equations import evolution_of, log_slip_rate_at, relation_of
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
@@ -66,7 +66,7 @@ def test_eq_13():
     state = -scene.alpha * math.log1p(cot_phi(scene) * jump)
     held = (1.0 - cot_phi(scene) * (scene.mu_star + state)) * jump - state
     corrected = held / scene.a / (1.0 + cot_phi(scene) * jump)
-    assert corrected == pytest.approx(log_rate_at(scene, jump, 0.0), rel=1e-12)
+    assert corrected == pytest.approx(log_slip_rate_at(scene, jump, 0.0), rel=1e-12)
     assert math.exp(corrected) == pytest.approx(2.6975, abs=5e-5)
     printed = (1.0 - cot_phi(scene) * (scene.mu_star + state) * jump - state) / scene.a
     assert abs(printed / (1.0 + cot_phi(scene) * jump) - corrected) > 1.0

@@ -21,7 +21,7 @@ from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import closed_forms, stability, steady
-from rsfstudy.slider.equations import log_rate_at
+from rsfstudy.slider.equations import log_slip_rate_at
 from rsfstudy.status import Status
 
 STEP, VALUE = "normal_stress_step", "critical_normal_stress_step"
@@ -69,7 +69,7 @@ def test_what_is_left_where_the_law_never_lets_go():
     scene = Scene(law="slowness", **IMPOSED, stiffness_ratio=3.0, instability_norm=0.01)
     value, _error, outcome = found(scene)
     stepped = scene.with_(normal_stress_step=value)
-    assert log_rate_at(stepped, 0.0, 0.0) == pytest.approx(scene.log_norm_rate, rel=1e-8)
+    assert log_slip_rate_at(stepped, 0.0, 0.0) == pytest.approx(scene.log_norm_rate, rel=1e-8)
     assert "jump" in outcome.message
     assert outcome.values["slip_rate_after_step"] == pytest.approx(
         math.exp(scene.log_norm_rate), rel=1e-6

@@ -41,16 +41,16 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
         load_velocity_ratio=1.0,
     )
     point, ratio = starting(scene), 1.0 + step
-    assert point.spring == 0.0
+    assert point.spring_stress == 0.0
     assert point.normal_stress == ratio
     assert point.state == pytest.approx(-alpha * math.log(ratio), abs=1e-15)
     if inertia:
-        assert point.log_rate == 0.0
+        assert point.log_slip_rate == 0.0
         stress = ratio * (scene.mu_star - alpha * math.log(ratio)) - scene.mu_star
         assert point.friction == pytest.approx(stress, abs=1e-14)
     else:
         excess = scene.mu_star / ratio - scene.mu_star + alpha * math.log(ratio)
-        assert point.log_rate == pytest.approx(excess / scene.a, abs=1e-12)
+        assert point.log_slip_rate == pytest.approx(excess / scene.a, abs=1e-12)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -116,9 +116,9 @@ def test_a_cut_after_a_step_changes_nothing(case, inertia):
     first = {"velocity": 2.0, "normal_stress": 1.02, "duration": 2.5}
     twice = protocol([first, {"velocity": 2.0, "duration": 3.5}])
     whole, cut = (_at(scene.with_(loading=kind), 6.0) for kind in (once, twice))
-    assert whole.spring == pytest.approx(cut.spring, abs=1e-6)
+    assert whole.spring_stress == pytest.approx(cut.spring_stress, abs=1e-6)
     assert whole.normal_stress == pytest.approx(cut.normal_stress, rel=1e-6)
-    assert whole.log_rate == pytest.approx(cut.log_rate, abs=1e-6)
+    assert whole.log_slip_rate == pytest.approx(cut.log_slip_rate, abs=1e-6)
 
 
 def _at(scene: Scene, time: float) -> Point:

@@ -99,7 +99,7 @@ def test_it_fades_in():
     still = Scene(**CASES["imposed"], stiffness_ratio=2.0, load_velocity_ratio=2.0)
     small = still.with_(oscillation_amplitude=1e-7, oscillation_period=8.0)
     at = [_end(which) for which in (still, small, small.with_(oscillation_amplitude=2e-7))]
-    springs = np.array([event.point.spring for event in at])
+    springs = np.array([event.point.spring_stress for event in at])
     assert 0.0 < abs(springs[1] - springs[0]) < 1e-6
     assert springs[2] - springs[0] == pytest.approx(2.0 * (springs[1] - springs[0]), rel=1e-3)
 

@@ -110,9 +110,11 @@ def test_slopes_of_a_law_at_steady_sliding():
     """Of order eight: 1e-14 where the law is smooth over a twentieth of ln V."""
     for law in ("slip", "slowness", "perrin_rice_zheng"):
         scene = Scene(law=law)
-        for log_rate in (-5.0, 0.0, 3.0):
-            assert evolution_of(scene)(log_rate, -scene.b * log_rate) == pytest.approx(0, abs=1e-15)
-            slopes = stability.slopes_of_law(scene, steady.steady_sliding(scene, log_rate))
+        for log_slip_rate in (-5.0, 0.0, 3.0):
+            assert evolution_of(scene)(log_slip_rate, -scene.b * log_slip_rate) == pytest.approx(
+                0, abs=1e-15
+            )
+            slopes = stability.slopes_of_law(scene, steady.steady_sliding(scene, log_slip_rate))
             assert np.ravel(slopes[0]) == pytest.approx(-scene.b, rel=1e-12)
             assert np.ravel(slopes[1]) == pytest.approx(1.0, rel=1e-12)
             assert np.ravel(slopes[2]) == pytest.approx(-1.0, rel=1e-12)

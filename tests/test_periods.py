@@ -110,7 +110,7 @@ def test_periods(ratio, period):
     assert np.ptp(found.values["shear_stress"]) >= 0.99 * found.values["static_stress_drop"]
     # slip over the period is that of the load point; over an event, less what the spring keeps
     slips = [
-        cycle.interval - (cycle.end.spring - cycle.begin.spring) / scene.stiffness
+        cycle.interval - (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
         for cycle in orbit.events
     ]
     assert found.values["slip_per_event"] == pytest.approx(slips[0], rel=1e-6)

@@ -82,7 +82,7 @@ def test_a_very_long_hold_ends_when_it_should(engine):
         scene,
         Accuracy(engine=engine),
         Meter(10**5, engine=engine),
-        [maximum("spring")],
+        [maximum("spring_stress")],
         until=1e10 + 40.0,
     )
     events = list(asked)

@@ -21,23 +21,25 @@ IMPEDANCE = Scene().stiffness * Scene().inertial_time
 
 
 @given(
-    spring=st.floats(-0.7, 1.0),
+    spring_stress=st.floats(-0.7, 1.0),
     psi=st.floats(-1.0, 1.0),
     log_damping=st.floats(-30.0, 2.0),
     alpha=st.floats(0.0, 1.0),
     constant=st.booleans(),
 )
-@example(spring=1.0, psi=0.0, log_damping=0.0, alpha=0.0, constant=False)
-def test_friction_and_radiation_balance_the_spring(spring, psi, log_damping, alpha, constant):
+@example(spring_stress=1.0, psi=0.0, log_damping=0.0, alpha=0.0, constant=False)
+def test_friction_and_radiation_balance_the_spring(
+    spring_stress, psi, log_damping, alpha, constant
+):
     damping = math.exp(log_damping)
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
     scene, strength = scene.with_(radiation_damping=damping), relation_of(scene)
-    point = between_ruptures(scene, clock=False).at((spring, psi))
-    x, friction = point.log_rate, point.friction
+    point = between_ruptures(scene, clock=False).at((spring_stress, psi))
+    x, friction = point.log_slip_rate, point.friction
     # rounding of the stresses, and of x times the slope of radiation in x
     radiated = damping * math.expm1(x)
-    scale = 1.0 + abs(spring) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
-    assert spring - radiated == pytest.approx(friction, abs=1e-14 * scale)
+    scale = 1.0 + abs(spring_stress) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
+    assert spring_stress - radiated == pytest.approx(friction, abs=1e-14 * scale)
     assert strength(friction)[0] == pytest.approx(scene.a * x + psi, abs=1e-13 * scale)
 
 

@@ -42,7 +42,7 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
         accuracy = Accuracy(rtol, engine=engine)
         *_, end = follow(scene, accuracy, meter, clock=True, until=over * 30.5)
         assert end.time == over * 30.5
-        return end.point.log_rate, end.point.spring / scene.a
+        return end.point.log_slip_rate, end.point.spring_stress / scene.a
 
     exact = at_end(1e-11, COMPILED)
     # three times the accuracy asked for: local errors add up
@@ -65,7 +65,7 @@ def test_a_short_ramp_is_a_step(slider):
 
 def _end(scene: Scene) -> float:
     *_earlier, end = follow(scene, Accuracy(1e-9), Meter(10**6), until=1.0)
-    return end.point.spring
+    return end.point.spring_stress
 
 
 def test_once_over_it_leaves_no_unknown():
@@ -121,7 +121,7 @@ def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change)
     for stairs in (64, 128):
         which = scene.with_(velocity_ramp_stairs=stairs)
         *_earlier, end = follow(which, Accuracy(1e-9), Meter(10**6), until=5.0)
-        off.append(end.point.spring - known)
+        off.append(end.point.spring_stress - known)
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
     assert abs(off[1]) < 1e-4 * scene.a
 

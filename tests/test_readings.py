@@ -253,7 +253,7 @@ def test_the_change_of_what_is_read_is_its_derivative(equations):
         def reads(clock, at=at):
             point = at(clock)
             inside = point.psis[-1] if "pore_pressure" in equations.unknowns else 0.0
-            return (equations.p[2] + point.spring) / (point.normal_stress + inside)
+            return (equations.p[2] + point.spring_stress) / (point.normal_stress + inside)
 
         assert at(begin).reading == pytest.approx(reads(begin), rel=1e-13)
         near, far = (reads(middle + n * reach) - reads(middle - n * reach) for n in (1, 2))

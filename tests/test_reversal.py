@@ -158,8 +158,8 @@ def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
     watches = [minimum(of, ends=True), maximum(of, ends=True)]
     *_before, turn = follow(scene, Accuracy(1e-6), Meter(10**5), watches, until=100.0)
     assert turn.kind is Kind.MINIMUM
-    assert turn.point.log_rate == pytest.approx(0.0, abs=1e-6)
-    assert turn.point.spring < -2.0 * scene.mu_star
+    assert turn.point.log_slip_rate == pytest.approx(0.0, abs=1e-6)
+    assert turn.point.spring_stress < -2.0 * scene.mu_star
 
 
 def test_friction_of_forward_slip_is_no_part_of_reversal():

@@ -21,75 +21,80 @@ LAWS = st.sampled_from(PLAIN)
 RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
 
 
-def eq_7(scene: Scene, log_rate: float) -> float:
+def eq_7(scene: Scene, log_slip_rate: float) -> float:
     """``(b - a) sigma_ss / [1 - cot(phi) (mu_ss - alpha)]``, with sigma_ss in closed form."""
     cot = cot_phi(scene)
-    mu_ss = scene.mu_star - (scene.b - scene.a) * log_rate
+    mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot < 0.99)
     sigma_ss = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
     return (scene.b - scene.a) * sigma_ss / (1.0 - cot * (mu_ss - (scene.alpha or 0.0)))
 
 
 @given(RATES, ANGLES, ALPHAS, LAWS)
-def test_critical_stiffness_is_eq_7_and_eq_8(log_rate, phi, alpha, law):
+def test_critical_stiffness_is_eq_7_and_eq_8(log_slip_rate, phi, alpha, law):
     scene = Scene(law=law, phi=phi, alpha=alpha)
-    closed = eq_7(scene, log_rate)
+    closed = eq_7(scene, log_slip_rate)
     explicit = closed_forms.critical_stiffness(
-        log_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
+        log_slip_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
     )
     assert explicit == pytest.approx(closed, rel=1e-12)
     # digits are lost where normal stress grows or vanishes, and in the arguments of the law
-    ours = stability.critical_stiffness(scene, log_rate)
-    assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_rate)))
+    ours = stability.critical_stiffness(scene, log_slip_rate)
+    assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_slip_rate)))
 
 
 @pytest.mark.parametrize("law", PLAIN)
 def test_constant_normal_stress_has_b_minus_a(law):
     scene = Scene(law=law, normal_stress="constant")
-    for log_rate in (-20.0, 0.0, 5.0):
-        critical = stability.critical_stiffness(scene, log_rate)
+    for log_slip_rate in (-20.0, 0.0, 5.0):
+        critical = stability.critical_stiffness(scene, log_slip_rate)
         assert critical == pytest.approx(scene.b - scene.a, rel=1e-12)
 
 
 @given(st.floats(-6, -0.2), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
-def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_rate, phi, alpha, law):
+def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_slip_rate, phi, alpha, law):
     """E M p**3 + (D M + a sigma) p**2 + [E K - (b-a) sigma] p + D K = 0 with M = K w**2 has purely
     imaginary roots at K = K_cr/(1 - q), q = K_cr D w**2/(a sigma).
     """
-    rate = math.exp(log_rate)
+    rate = math.exp(log_slip_rate)
     period = 2.0 * math.pi * 10.0**log_norm / (rate * 1.17e-8)
     scene = Scene(law=law, phi=phi, alpha=alpha, inertia=True, period=period)
-    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
+    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_slip_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
-    q = eq_7(scene, log_rate) * (1.0 - mu_ss * cot) * 10.0 ** (2.0 * log_norm) / (scene.a * sigma)
-    ours = stability.critical_stiffness(scene, log_rate)
+    q = (
+        eq_7(scene, log_slip_rate)
+        * (1.0 - mu_ss * cot)
+        * 10.0 ** (2.0 * log_norm)
+        / (scene.a * sigma)
+    )
+    ours = stability.critical_stiffness(scene, log_slip_rate)
     if q < 0.99:
-        assert ours == pytest.approx(eq_7(scene, log_rate) / (1.0 - q), rel=1e-11 / (1.0 - q))
+        assert ours == pytest.approx(eq_7(scene, log_slip_rate) / (1.0 - q), rel=1e-11 / (1.0 - q))
     elif q > 1.01:
         assert ours == math.inf
 
 
 @given(st.floats(-25, -4), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
-def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_rate, phi, alpha, law):
+def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_slip_rate, phi, alpha, law):
     """(a sigma + eta V E) p**2 + [E K + eta V D - (b-a) sigma] p + D K = 0 is neutral at K = K_cr -
     eta V D/E.
     """
     damping = math.exp(log_damping)
     scene = Scene(law=law, phi=phi, alpha=alpha, radiation_damping=damping)
-    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
+    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_slip_rate
     share = (1.0 - mu_ss * cot) / (1.0 - mu_ss * cot + alpha * cot)
-    undamped = eq_7(scene, log_rate)
-    damped = undamped - damping * math.exp(log_rate) * share
-    ours = stability.critical_stiffness(scene, log_rate)
+    undamped = eq_7(scene, log_slip_rate)
+    damped = undamped - damping * math.exp(log_slip_rate) * share
+    ours = stability.critical_stiffness(scene, log_slip_rate)
     assert ours == pytest.approx(max(damped, 0.0), abs=1e-11 * undamped)
 
 
 @given(RATES, ANGLES)
-def test_steady_stresses_satisfy_the_inclined_geometry(log_rate, phi):
+def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
     scene = Scene(phi=phi)
-    mu_ss = scene.mu_star - (scene.b - scene.a) * log_rate
+    mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot_phi(scene) < 0.99)
-    found = steady.steady_sliding(scene, log_rate)
+    found = steady.steady_sliding(scene, log_slip_rate)
     ratio = normal_stress_at(scene, found.friction)
     assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.friction, rel=1e-13)
     assert scene.mu_star + found.friction == pytest.approx(mu_ss * ratio, rel=1e-11)

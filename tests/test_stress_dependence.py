@@ -98,20 +98,20 @@ def test_three_effects_of_stress_add_up(g):
 def test_critical_stiffness_is_that_over_one_plus_c(law, c):
     """At constant normal stress; steady friction is as it was."""
     scene = Scene(law=law, **CONSTANT)
-    for log_rate in (-5.0, 0.0, 2.0):
-        ours = stability.critical_stiffness(scene.with_(stress_dependence=c), log_rate)
-        usual = stability.critical_stiffness(scene, log_rate)
+    for log_slip_rate in (-5.0, 0.0, 2.0):
+        ours = stability.critical_stiffness(scene.with_(stress_dependence=c), log_slip_rate)
+        usual = stability.critical_stiffness(scene, log_slip_rate)
         assert ours == pytest.approx(usual / (1.0 + c), rel=1e-11)
 
 
 @given(C, st.floats(50, 85), st.floats(0, 1), st.floats(-5, 5), st.sampled_from(PLAIN))
-def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_rate, law):
+def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_slip_rate, law):
     """(b - a) sigma_ss/[1 + c - cot(phi) (mu_ss - alpha)], of which c = 0 is eq. 7."""
     scene = Scene(law=law, stress_dependence=c, phi=phi, alpha=alpha)
-    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_rate
+    cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_slip_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
     exact = (scene.b - scene.a) * sigma / (1.0 + c - cot * (mu_ss - alpha))
-    assert stability.critical_stiffness(scene, log_rate) == pytest.approx(exact, rel=1e-11)
+    assert stability.critical_stiffness(scene, log_slip_rate) == pytest.approx(exact, rel=1e-11)
 
 
 def equivalent(scene: Scene) -> Scene:

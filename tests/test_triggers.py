@@ -48,16 +48,18 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
     accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), Meter(10**6, engine=COMPILED)
     levels = levels_of_rise(scene)
     told = [False]
-    for event in follow(scene, accuracy, meter, [maximum("log_rate"), settling(1e-3), *levels]):
+    for event in follow(
+        scene, accuracy, meter, [maximum("log_slip_rate"), settling(1e-3), *levels]
+    ):
         if event.watch in levels and not told[-1]:
             told.append(rises_to_load_point(scene, event.point))
         assert not (event.kind is Kind.MAXIMUM and told[-1])
-        assert event.point.log_rate <= scene.log_load_rate or not told[-1]
+        assert event.point.log_slip_rate <= scene.log_load_rate or not told[-1]
         if event.kind is Kind.SETTLED:
             break
     assert told[-1]
     # and most of the way is left then
-    assert event.point.log_rate > scene.log_load_rate - 0.1
+    assert event.point.log_slip_rate > scene.log_load_rate - 0.1
 
 
 def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
@@ -69,7 +71,7 @@ def test_oscillations_do_not_rise_to_the_load_point():
     """Near critical stiffness they overshoot it."""
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
     start = next(follow(scene, Accuracy(1e-6), Meter(10**5)))
-    assert start.point.log_rate < scene.log_load_rate
+    assert start.point.log_slip_rate < scene.log_load_rate
     assert not rises_to_load_point(scene, start.point)
 
 

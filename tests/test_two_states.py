@@ -112,14 +112,14 @@ class TwoStatesApart(TwoSlipStates):
     name = "two_states_apart"
 
     @staticmethod
-    def evolutions(log_rate, psis, shift, share, p):
+    def evolutions(log_slip_rate, psis, shift, share, p):
         return TwoSlipStates.evolutions(
-            log_rate, (psis[0] - APART, psis[1] + APART), shift, share, p
+            log_slip_rate, (psis[0] - APART, psis[1] + APART), shift, share, p
         )
 
     @staticmethod
-    def steady_states(log_rate, shift, p):
-        one, other = TwoSlipStates.steady_states(log_rate, shift, p)
+    def steady_states(log_slip_rate, shift, p):
+        one, other = TwoSlipStates.steady_states(log_slip_rate, shift, p)
         return one + APART, other - APART
 
 
@@ -264,18 +264,18 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
 # ---- three states --------------------------------------------------------------------------------
 
 
-def evolutions(log_rate, psis, shift, share, p):
+def evolutions(log_slip_rate, psis, shift, share, p):
     """Three states, each with its share of b; the second and third over lengths of their own."""
     b = p[LAW]
     return (
-        -share * (psis[0] - 0.5 * shift + 0.5 * b * log_rate),
-        -share * p[LAW + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_rate),
-        -share * p[LAW + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_rate),
+        -share * (psis[0] - 0.5 * shift + 0.5 * b * log_slip_rate),
+        -share * p[LAW + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_slip_rate),
+        -share * p[LAW + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_slip_rate),
     )
 
 
-def steady_states(log_rate, shift, p):
-    at = shift - p[LAW] * log_rate
+def steady_states(log_slip_rate, shift, p):
+    at = shift - p[LAW] * log_slip_rate
     return 0.5 * at, 0.2 * at, 0.3 * at
 
 

@@ -78,7 +78,7 @@ class Approach:
                     text = f"no cycle repeats within {events} events; {more_events(events)}"
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
-                    self._left_at_leap = abs(cycle.end.spring - cycle.begin.spring)
+                    self._left_at_leap = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
                     start = self._by.point(section(cycle.begin) + self._ahead)
                     break
 
@@ -137,7 +137,9 @@ class Approach:
         by numerical errors, because on a plane no motion passes another, so that cycles approach
         their limit from one side.
         """
-        before, last = (cycle.end.spring - cycle.begin.spring for cycle in self.seen[-2:])
+        before, last = (
+            cycle.end.spring_stress - cycle.begin.spring_stress for cycle in self.seen[-2:]
+        )
         near = CLOSED * self._accuracy.rtol * self._scene.a * self.seen[-1].swing
         return before * last <= 0.0 and abs(last) <= near
 
@@ -147,7 +149,7 @@ class Approach:
         last leap came no closer, because leaps may go round in a circle.
         """
         cycle = self.seen[-1]
-        left = abs(cycle.end.spring - cycle.begin.spring)
+        left = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
         if not 10.0 * self._noise <= left < 0.5 * self._left_at_leap:
             return False
         if not _SLOW_APPROACH < self._return < _DIVERGES:

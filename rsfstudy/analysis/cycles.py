@@ -17,7 +17,16 @@ import numpy as np
 from rsfstudy.analysis.swing import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise, settling
+from rsfstudy.motion.events import (
+    Event,
+    EventSpecification,
+    Kind,
+    fall,
+    maximum,
+    minimum,
+    rise,
+    settling,
+)
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording, row, up_to
 from rsfstudy.slider.equations import IN_RUPTURE
@@ -27,7 +36,7 @@ from rsfstudy.slider.scene import Scene
 LN10 = math.log(10.0)
 #: How many headline numbers a cycle has.
 NUMBERS = 5
-_LOG_RATE, _SPRING = attrgetter("log_rate"), attrgetter("spring")
+_LOG_RATE, _SPRING = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
 #: it.
@@ -77,7 +86,7 @@ class Cycle(NamedTuple):
         """The headline numbers, in the order of their names; stress drops are from where the event
         begins, because the next may begin elsewhere.
         """
-        highest = self.begin.spring
+        highest = self.begin.spring_stress
         return np.array(
             [
                 self.interval,
@@ -130,7 +139,9 @@ def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) ->
     """Record of cycles that follow each other; their ends, where nothing was."""
     begin, end = seen[0].begin, seen[-1].end
     passed = math.fsum(cycle.interval for cycle in seen)
-    slip = scene.load_velocity * passed - (end.spring - begin.spring) / scene.stiffness
+    slip = (
+        scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
+    )
     ends = Recording()
     ends.add([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)])
     if recording is None:
@@ -140,13 +151,13 @@ def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) ->
 
 
 @lru_cache(maxsize=256)
-def _asked(load: float) -> tuple[Watch, ...]:
+def _asked(load: float) -> tuple[EventSpecification, ...]:
     """Event specifications by which cycles of a motion are seen, at ln(V_0/V_*)."""
     return (
-        maximum("log_rate", waits=True),
-        minimum("log_rate", waits=True),
-        rise("log_rate", load),
-        fall("log_rate", load, waits=True),
+        maximum("log_slip_rate", waits=True),
+        minimum("log_slip_rate", waits=True),
+        rise("log_slip_rate", load),
+        fall("log_slip_rate", load, waits=True),
         settling(_AT_REST),
     )
 
@@ -188,12 +199,12 @@ class _Watch:
         fastest, rested = max(points, key=_LOG_RATE), min(points, key=_LOG_RATE)
         return Cycle(
             interval=end.time - self._begun,
-            highest=end.point.spring,
+            highest=end.point.spring_stress,
             lowest=min(map(_SPRING, points)),
-            at_peak=fastest.spring,
+            at_peak=fastest.spring_stress,
             sliding=fastest.coefficient,
-            slowest=rested.log_rate,
-            fastest=fastest.log_rate,
+            slowest=rested.log_slip_rate,
+            fastest=fastest.log_slip_rate,
             landed=self._landed() or rested,
             rested=rested,
             begin=begin,

@@ -10,7 +10,7 @@ from rsfstudy.analysis.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
 from rsfstudy.analysis.touching import displacement_on_path
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
-from rsfstudy.slider.equations import log_rate_at
+from rsfstudy.slider.equations import log_slip_rate_at
 from rsfstudy.slider.scene import Scene
 
 #: Spring stress over sigma_* that no step goes beyond.
@@ -58,8 +58,8 @@ class DisplacementSteps(Steps):
         """
 
         def after(step: float) -> float:
-            log_rate = log_rate_at(self.scene, self.scene.stiffness * step, 0.0)
-            return math.exp(log_rate) if log_rate < _LARGEST_LOGARITHM else math.inf
+            log_slip_rate = log_slip_rate_at(self.scene, self.scene.stiffness * step, 0.0)
+            return math.exp(log_slip_rate) if log_slip_rate < _LARGEST_LOGARITHM else math.inf
 
         weakening = self.scene.parts.law.b_over_a - 1.0
         closed_form = after(self.sign / weakening) if weakening > 0.0 else math.nan

@@ -12,7 +12,7 @@ import math
 
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
+from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.slider.equations import IN_RUPTURE, evolutions_of, relation_of, steady_states_of
@@ -44,7 +44,7 @@ def excess_of_peak(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
             if event.kind is Kind.RISE:
                 return event.point.growth**2
             if event.kind in (Kind.START, Kind.MAXIMUM):
-                highest = max(highest, event.point.log_rate)
+                highest = max(highest, event.point.log_slip_rate)
             over = highest >= norm and (event.kind is Kind.MAXIMUM or not heavy)
             if over or _was_last(scene, event):
                 break
@@ -54,16 +54,16 @@ def excess_of_peak(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
     return highest - norm
 
 
-def _watches(scene: Scene, norm: float, *, heavy: bool) -> list[Watch]:
+def _watches(scene: Scene, norm: float, *, heavy: bool) -> list[EventSpecification]:
     """Peaks, the norm, the end of shear stress, and levels of ln V ever farther below the norm."""
-    watches = [maximum("log_rate")]
+    watches = [maximum("log_slip_rate")]
     if not heavy:
-        watches.append(rise("log_rate", norm))
+        watches.append(rise("log_slip_rate", norm))
     if scene.states > 1:
-        watches.append(fall("spring", -scene.mu_star))
+        watches.append(fall("spring_stress", -scene.mu_star))
         below = _APART
         while norm - below > SLOWEST:
-            watches.append(fall("log_rate", norm - below))
+            watches.append(fall("log_slip_rate", norm - below))
             below += max(_APART, _PART * below)
     return watches
 
@@ -75,7 +75,7 @@ def _was_last(scene: Scene, event: Event) -> bool:
         return slows or event.kind is Kind.MAXIMUM
     if event.regime == IN_RUPTURE or not (slows or event.kind is Kind.FALL):
         return False
-    return scene.mu_star + event.point.spring <= 0.0 or _stays_below_norm(scene, event.point)
+    return scene.mu_star + event.point.spring_stress <= 0.0 or _stays_below_norm(scene, event.point)
 
 
 def _stays_below_norm(scene: Scene, point: Point) -> bool:
@@ -88,15 +88,15 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
     """
     _value, slope, shift, shift_slope = relation_of(scene, point.psis)(point.friction)
     states, evolve = range(scene.parts.law.states), evolutions_of(scene)
-    strengthening = evolve(point.log_rate, point.psis, shift)
+    strengthening = evolve(point.log_slip_rate, point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
     raised, least_shift = _raised_by_pressure(scene, point)
-    if point.log_rate + raised >= scene.log_norm_rate:
+    if point.log_slip_rate + raised >= scene.log_norm_rate:
         return False
     fallen = scene.stiffness * slope * (1.0 - _OUTWEIGHED)
     for distance in _FALLS:
-        x = point.log_rate - distance
+        x = point.log_slip_rate - distance
         rest = steady_states_of(scene, x, shift)
         later = steady_states_of(scene, x - fallen / scene.a, shift - scene.stiffness * shift_slope)
         weakening = evolve(x + raised, rest, least_shift)
@@ -117,7 +117,7 @@ def _raised_by_pressure(scene: Scene, point: Point) -> tuple[float, float]:
         return 0.0, shift
     own = psis[-len(fluid.unknowns) :]
     for bound in _BOUNDS:
-        pressure = fluid.highest_pressure(point.log_rate + bound, own)
+        pressure = fluid.highest_pressure(point.log_slip_rate + bound, own)
         if math.isinf(pressure):
             break
         weaker, _slope, shift, _ = relation_of(scene, (*psis[:-1], pressure))(point.friction)

@@ -72,7 +72,7 @@ class NormalStressSteps(ShotSteps):
 
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rate just after the critical step."""
-        rate = math.nan if math.isnan(size) else math.exp(self._log_rate_after(size))
+        rate = math.nan if math.isnan(size) else math.exp(self._log_slip_rate_after(size))
         return dict(zip(self.beside, (rate,), strict=True))
 
     def _guess(self) -> float:
@@ -109,7 +109,7 @@ class NormalStressSteps(ShotSteps):
         level = scene.log_norm_rate + (RISE_OF_MASS if scene.has_mass else 0.0)
 
         def excess(size: float) -> float:
-            return self._log_rate_after(size) - level
+            return self._log_slip_rate_after(size) - level
 
         if excess(0.0) >= 0.0:
             return 0.0
@@ -140,8 +140,8 @@ class NormalStressSteps(ShotSteps):
         load = scene.log_load_rate
         return load == -math.inf or steady.steady_sliding(scene, load) is not None
 
-    def _log_rate_after(self, size: float) -> float:
+    def _log_slip_rate_after(self, size: float) -> float:
         """ln(V/V_*) just after a step, without mass."""
         scene = self.scene_at(size).without_mass()
         steady_states = steady_states_of(scene, 0.0, 0.0)
-        return on_slow_manifold(scene, scene.spring_stress_step, steady_states).log_rate
+        return on_slow_manifold(scene, scene.spring_stress_step, steady_states).log_slip_rate

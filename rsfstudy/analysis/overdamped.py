@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rsfstudy.motion.events import Watch, rise
+from rsfstudy.motion.events import EventSpecification, rise
 from rsfstudy.slider.equations import evolution_of, relation_of, steady_states_of
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
@@ -32,7 +32,7 @@ _BEHIND, _INWARDS, _NEAREST, _APART, _STEP = 2.0, 0.25, 1e-4, 0.25, 1e-5
 _SLOW = 0.02
 
 
-def levels_of_rise(scene: Scene) -> list[Watch]:
+def levels_of_rise(scene: Scene) -> list[EventSpecification]:
     """Event specifications that are needed to ask `rises_to_load_point`: nothing where the motion
     is not slow there, or there are several states or mass, of which it knows nothing.
     """
@@ -41,7 +41,7 @@ def levels_of_rise(scene: Scene) -> list[Watch]:
         return []
     if not scene.stiffness < _SLOW * (scene.a + scene.dynamics.damping(load)):
         return []
-    return [rise("log_rate", load - below) for below in _ASKED]
+    return [rise("log_slip_rate", load - below) for below in _ASKED]
 
 
 def rises_to_load_point(scene: Scene, point: Point) -> bool:
@@ -49,15 +49,15 @@ def rises_to_load_point(scene: Scene, point: Point) -> bool:
     the way tell.
     """
     change, load = _changes(scene), scene.log_load_rate
-    distance = load - point.log_rate
+    distance = load - point.log_slip_rate
 
     def farthest(x: float) -> float:
         return _BEHIND * change(x, 0.0)[1]
 
-    lag = point.state - steady_states_of(scene, point.log_rate, 0.0)[0]
+    lag = point.state - steady_states_of(scene, point.log_slip_rate, 0.0)[0]
     # it lags on the side of b
     side = math.copysign(1.0, scene.b)
-    if not 0.0 <= side * lag <= side * farthest(point.log_rate):
+    if not 0.0 <= side * lag <= side * farthest(point.log_slip_rate):
         return False
     several = max(2, round(np.log(distance / _NEAREST) / _APART))
     for x in (load - np.geomspace(distance, _NEAREST, several)).tolist():

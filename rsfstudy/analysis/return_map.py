@@ -117,7 +117,7 @@ class Orbit:
 
 def section(point: Point) -> np.ndarray:
     """Spring stress and states: all there is to say where V rises through V_0."""
-    return np.array((point.spring, *point.psis))
+    return np.array((point.spring_stress, *point.psis))
 
 
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
@@ -157,8 +157,8 @@ class ReturnMap:
         Halt
             Where spring stress leaves no friction of forward slip.
         """
-        spring, *psis = at.tolist()
-        point = on_slow_manifold(self.scene, spring, tuple(psis))
+        spring_stress, *psis = at.tolist()
+        point = on_slow_manifold(self.scene, spring_stress, tuple(psis))
         check_start(self.scene, point)
         return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
 
@@ -166,9 +166,9 @@ class ReturnMap:
         """True if mass acts beyond what the slow manifold holds of it."""
         if not self.scene.has_mass:
             return False
-        inertial_stress = point.spring - point.friction
+        inertial_stress = point.spring_stress - point.friction
         given = limits(self.scene, self.accuracy)
-        return weight_of_mass(point.log_rate, inertial_stress, given) >= 1.0
+        return weight_of_mass(point.log_slip_rate, inertial_stress, given) >= 1.0
 
     def events(
         self, start: np.ndarray, count: int, recording: Recording | None = None
@@ -215,8 +215,8 @@ class ReturnMap:
         the section and the numbers of an event, as long as mass hardly acts: the time it takes.
         """
         scene, states = self.scene, len(point.psis)
-        spring = point.friction + scene.dynamics.radiated(scene.log_load_rate)
-        rates = without_mass(scene, clock=True).rates((spring, *point.psis, 0.0))
+        spring_stress = point.friction + scene.dynamics.radiated(scene.log_load_rate)
+        rates = without_mass(scene, clock=True).rates((spring_stress, *point.psis, 0.0))
         way, changes = np.array((0.0, *rates[1:-1])), np.zeros(1 + states + NUMBERS)
         changes[1 + states] = -rates[-1]
         return way, changes

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsfstudy.analysis.swing import settles
 from rsfstudy.motion.meter import Meter
-from rsfstudy.slider.equations import log_rate_at
+from rsfstudy.slider.equations import log_slip_rate_at
 from rsfstudy.slider.scene import Scene
 
 #: Smallest step the search tries, and the part of the largest that it is at most.
@@ -121,5 +121,5 @@ def falls_behind(scene: Scene) -> tuple[float, float]:
     """Slip by which a slider with mass falls behind one without after a step, and the slip rate it
     rises to: less than (K/a) w**2 of slip, w being the norm just after the step.
     """
-    rate = math.exp(log_rate_at(scene, scene.spring_stress_step, 0.0))
+    rate = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate

@@ -37,7 +37,7 @@ _HIGHER = 1.0
 #: Part of the farthest distance from steady sliding at which a motion has come to it.
 _CLOSE = 1e-3
 
-_TOP = maximum("log_rate")
+_TOP = maximum("log_slip_rate")
 
 
 @dataclass(frozen=True)
@@ -175,14 +175,18 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     instead of around an orbit that may lead down to 1e-40 V_* and lose all digits on the way.
     """
     begin = starting(scene)
-    equations, start = without_mass(scene, clock=False), (begin.spring, begin.psi)
+    equations, start = without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
     rising, norm = equations.at(start).growth > 0.0, scene.log_norm_rate
-    watches = (_TOP, minimum("log_rate"), rise("log_rate", norm))
+    watches = (_TOP, minimum("log_slip_rate"), rise("log_slip_rate", norm))
     for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):
         if event.kind is Kind.RISE:
             return norm + _HIGHER
-        if event.watch is not None or event.point.log_rate >= norm or event.point.growth == 0.0:
-            return event.point.log_rate
+        if (
+            event.watch is not None
+            or event.point.log_slip_rate >= norm
+            or event.point.growth == 0.0
+        ):
+            return event.point.log_slip_rate
     raise AssertionError("a motion never ends by itself")
 
 
@@ -205,13 +209,13 @@ def _grows_to_the_norm(
         return False
     leap = _LEAP
     while True:
-        spring, *psis = (
+        spring_stress, *psis = (
             rest + leap * (current - rest)
             for rest, current in zip(
-                (steady.spring, *steady.psis), (at.spring, *at.psis), strict=True
+                (steady.spring_stress, *steady.psis), (at.spring_stress, *at.psis), strict=True
             )
         )
-        beyond = on_slow_manifold(scene, spring, tuple(psis))
+        beyond = on_slow_manifold(scene, spring_stress, tuple(psis))
         orbit = _orbit(scene, steady, beyond, accuracy, meter)
         if orbit.reached and len(orbit.peaks) == 1 and leap > _SHORTEST_LEAP:
             leap = math.sqrt(leap)
@@ -228,14 +232,14 @@ def _orbit(
     follow.
     """
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    watches = [_TOP] if heavy else [_TOP, rise("log_rate", norm)]
+    watches = [_TOP] if heavy else [_TOP, rise("log_slip_rate", norm)]
     levels = levels_of_rise(scene) if steady.stable else []
     watches += [settling(_CLOSE), *levels] if steady.stable else []
     planar, repeating = scene.states == 1, _Repeating(scene, steady, accuracy)
     peaks: list[float] = []
     at_start = -math.inf
     for event in follow(scene, accuracy, meter, watches, start=start):
-        top = event.point.log_rate
+        top = event.point.log_slip_rate
         if event.kind is Kind.START:
             if start is None and event.point.growth <= 0.0:
                 # no peak of an orbit to compare others with
@@ -279,9 +283,11 @@ class _Repeating:
 
     def has(self, peak: Point) -> bool:
         """True if it has at this peak."""
-        current = (peak.spring, *peak.psis)
+        current = (peak.spring_stress, *peak.psis)
         change = max(abs(x - y) for x, y in zip(current, self._before, strict=True))
-        linear = peak.log_rate - self._steady.log_rate < _LINEAR and not self._steady.stable
+        linear = (
+            peak.log_slip_rate - self._steady.log_slip_rate < _LINEAR and not self._steady.stable
+        )
         self._same = self._same + 1 if change < self._slack and not linear else 0
         self._before = current
         return self._same == _IN_A_ROW
@@ -292,7 +298,7 @@ def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) 
     be measured, growth has the sign that linear theory gives it.
     """
     slack = 100.0 * accuracy.solver
-    linear = peaks[-1] - steady.log_rate < _LINEAR and not steady.stable
+    linear = peaks[-1] - steady.log_slip_rate < _LINEAR and not steady.stable
     return peaks[-1] - peaks[-2] <= (-slack if linear else slack)
 
 

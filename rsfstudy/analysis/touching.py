@@ -17,7 +17,7 @@ from functools import cache
 
 from rsfstudy.motion.course import along
 from rsfstudy.motion.engines import SCIPY, of_floats
-from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, rise
+from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.regimes import on_slow_manifold
 from rsfstudy.motion.roots import root_of
@@ -109,8 +109,8 @@ def start_of_path(
     Point or None
         None where the path touches the norm from above or never comes by.
     """
-    above = rise("log_rate", scene.log_norm_rate + _ABOVE, ends=True, waits=True)
-    lost = fall("log_rate", _SLOWEST, ends=True, waits=True)
+    above = rise("log_slip_rate", scene.log_norm_rate + _ABOVE, ends=True, waits=True)
+    lost = fall("log_slip_rate", _SLOWEST, ends=True, waits=True)
     watches = (above, lost, rise(*crossing), fall(*crossing))
     for event in _path(scene, tolerance, meter, watches, backward=True):
         if event.watch in watches[2:] and accepts(event.point):
@@ -119,7 +119,12 @@ def start_of_path(
 
 
 def _path(
-    scene: Scene, tolerance: float, meter: Meter, watches: Sequence[Watch], *, backward: bool
+    scene: Scene,
+    tolerance: float,
+    meter: Meter,
+    watches: Sequence[EventSpecification],
+    *,
+    backward: bool,
 ) -> Iterator[Event]:
     """The path from where it touches the norm, as far as there is one; by a method of order eight,
     which gets no more than what is left.
@@ -153,7 +158,7 @@ def rate_step_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | No
         scene,
         tolerance,
         meter,
-        ("log_rate", begin.log_rate),
+        ("log_slip_rate", begin.log_slip_rate),
         lambda point: point.growth * begin.growth > 0.0,
     )
     return None if start is None else start.psi / scene.a
@@ -167,14 +172,20 @@ def cycle_misfit(scene: Scene, tolerance: float, meter: Meter) -> float | None:
     """
     for event in _coming_back(scene, tolerance, meter):
         if event.kind is Kind.MAXIMUM:
-            return event.point.log_rate - scene.log_norm_rate
+            return event.point.log_slip_rate - scene.log_norm_rate
     return None
 
 
-def _coming_back(scene: Scene, tolerance: float, meter: Meter, *watches: Watch) -> Iterator[Event]:
+def _coming_back(
+    scene: Scene, tolerance: float, meter: Meter, *watches: EventSpecification
+) -> Iterator[Event]:
     """Events, peaks among them, of the motion that has touched the norm and fallen below V_0."""
     fallen = False
-    asked = *watches, maximum("log_rate"), fall("log_rate", scene.log_load_rate, waits=True)
+    asked = (
+        *watches,
+        maximum("log_slip_rate"),
+        fall("log_slip_rate", scene.log_load_rate, waits=True),
+    )
     for event in _path(scene, tolerance, meter, asked, backward=False):
         if fallen:
             yield event
@@ -187,11 +198,11 @@ def goes_beyond(scene: Scene, tolerance: float, meter: Meter) -> bool:
     """
     if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
         return False
-    beyond = rise("log_rate", scene.log_norm_rate + _ABOVE)
+    beyond = rise("log_slip_rate", scene.log_norm_rate + _ABOVE)
     for event in _coming_back(scene, tolerance, meter, beyond):
         if event.kind in (Kind.RISE, Kind.MAXIMUM):
             # a step may pass the norm and come back
-            return event.kind is Kind.RISE or event.point.log_rate > scene.log_norm_rate
+            return event.kind is Kind.RISE or event.point.log_slip_rate > scene.log_norm_rate
     return False
 
 
@@ -202,6 +213,6 @@ def displacement_on_path(scene: Scene, tolerance: float, meter: Meter, sign: int
     Psi = 0 is its start.
     """
     start = start_of_path(
-        scene, tolerance, meter, ("psi", 0.0), lambda point: sign * point.spring > 0.0
+        scene, tolerance, meter, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
     )
-    return None if start is None else start.spring / scene.stiffness
+    return None if start is None else start.spring_stress / scene.stiffness

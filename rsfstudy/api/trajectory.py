@@ -135,12 +135,12 @@ def simulate(
     meter = Meter(budget, engine=accuracy.engine)
     recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
-    watches = [rise("log_rate", limit)] if limit < math.inf else []
+    watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
     until = began + duration if at is None else float(at[-1])
     moving = follow(scene, accuracy, meter, watches, recording=recording, until=until, since=since)
     try:
         for last in moving:
-            if math.isnan(passed) and (last.watch or last.point.log_rate >= limit):
+            if math.isnan(passed) and (last.watch or last.point.log_slip_rate >= limit):
                 passed = last.time
     except Halt as halt:
         status, message = halt.status, str(halt)

@@ -213,7 +213,7 @@ def _relaxation(scene: Scene, record: _Record) -> float:
 
 def _read(scene: Scene, record: _Record, peak: Event) -> dict[str, float]:
     before = record.begin.point.reading
-    longer = (peak.point.spring - record.reload.point.spring) / scene.stiffness
+    longer = (peak.point.spring_stress - record.reload.point.spring_stress) / scene.stiffness
     return {
         "healing": peak.point.reading - before,
         "relaxation": _relaxation(scene, record),

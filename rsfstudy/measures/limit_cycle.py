@@ -176,7 +176,7 @@ class LimitCycle(Recorded):
         values = dict(zip(_HEADLINES, one.numbers.tolist(), strict=True))
         values |= {f"{n}_error": e for n, e in zip(_HEADLINES, errors.tolist(), strict=True)}
         cycle = one.events[0]
-        carried = (cycle.end.spring - cycle.begin.spring) / scene.stiffness
+        carried = (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
         values |= _properties(scene, cycle)
@@ -270,7 +270,7 @@ def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
 
 def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
     """d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*); NaN where there is no such theta."""
-    slowed = cycle.rested.log_rate - cycle.landed.log_rate
+    slowed = cycle.rested.log_slip_rate - cycle.landed.log_slip_rate
     law = scene.parts.law
     if law.states > 1 or not law.logarithmic or not abs(slowed) > 1.0:
         return math.nan

@@ -158,21 +158,26 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
     """Stiffness at which perturbations of steady sliding neither grow nor decay; NaN where they do
     not grow below it and decay above.
     """
-    with_mass = scene.dynamics.norm(scene, steady.log_rate) > _MASS_SHOWS
+    with_mass = scene.dynamics.norm(scene, steady.log_slip_rate) > _MASS_SHOWS
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
             equations = by_inertial_time(changed)
-            state = (steady.spring, steady.log_rate, steady.spring, *steady.psis[1:])
+            state = (
+                steady.spring_stress,
+                steady.log_slip_rate,
+                steady.spring_stress,
+                *steady.psis[1:],
+            )
         else:
             equations = by_displacement(changed)
-            state = (steady.spring, *steady.psis)
+            state = (steady.spring_stress, *steady.psis)
         meter.charge(equations.regime, 2 * len(state))
         return growth(jacobian(equations, state))
 
     # softer than at the root before it, several states may be stable again
-    before = [k for k in critical_stiffnesses(scene, steady.log_rate) if k < near]
+    before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < near]
     softer = max(0.5 * near, math.sqrt(near * before[-1]) if before else 0.0)
     if not growth_at(softer) > 0.0 > growth_at(2.0 * near):
         return math.nan

@@ -106,7 +106,7 @@ class _Record(NamedTuple):
     """
 
     events: Sequence[Event]
-    spring: np.ndarray
+    spring_stress: np.ndarray
     imposed: np.ndarray
     trend: float
     periods: int
@@ -114,13 +114,15 @@ class _Record(NamedTuple):
     @property
     def drift(self) -> float:
         """Response that the trend would have made, over the response."""
-        amplitude = 2.0 * abs(np.fft.rfft(self.spring)[self.periods]) / len(self.spring)
+        amplitude = (
+            2.0 * abs(np.fft.rfft(self.spring_stress)[self.periods]) / len(self.spring_stress)
+        )
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
         """Spring stress at other periods than that of forcing, over that at it."""
-        harmonics = np.fft.rfft(self.spring)
+        harmonics = np.fft.rfft(self.spring_stress)
         at = harmonics[self.periods]
         return np.asarray(np.delete(harmonics, [0, self.periods]) / at)
 
@@ -142,15 +144,17 @@ class _Record(NamedTuple):
         return self._from_every(1)
 
     def _from_every(self, stride: int) -> complex:
-        spring, imposed = (np.fft.rfft(x[::stride]) for x in (self.spring, self.imposed))
-        return complex(spring[self.periods] / imposed[self.periods])
+        spring_stress, imposed = (
+            np.fft.rfft(x[::stride]) for x in (self.spring_stress, self.imposed)
+        )
+        return complex(spring_stress[self.periods] / imposed[self.periods])
 
     def is_as(self, other: _Record) -> bool:
         """True if spring stress is the same: in the median, for where it jumps an instant may come
         before or after.
         """
-        apart = np.abs(self.spring - other.spring)
-        return bool(np.median(apart) < _SAME * np.ptp(self.spring))
+        apart = np.abs(self.spring_stress - other.spring_stress)
+        return bool(np.median(apart) < _SAME * np.ptp(self.spring_stress))
 
     @property
     def unresolved(self) -> float:
@@ -160,7 +164,7 @@ class _Record(NamedTuple):
         it is smooth: from a quarter, half and all of them. Two to a period resolve nothing.
         """
         change = abs(self._from_every(2) / self.response - 1.0)
-        several, rest = divmod(len(self.spring) // self.periods, 4)
+        several, rest = divmod(len(self.spring_stress) // self.periods, 4)
         if rest or several < 4:
             return change
         before = abs((self._from_every(4) - self._from_every(2)) / self.response)
@@ -252,7 +256,7 @@ class NormalStressResponse(Recorded):
             return Outcome(Status.NOT_PERIODIC, {**by_theory, "settled": 0.0}, why)
         way = _Way(period * repeats, repeats, fold / repeats)
         first, last = self._resolved(scene, start, way, accuracy, meter)
-        finer, instants = accuracy.refined(), len(last.spring)
+        finer, instants = accuracy.refined(), len(last.spring_stress)
         start, same = self._repeats(scene, waits, finer, meter)
         _first, again = self._follow(scene, start, way, instants, finer, meter)
         moved = abs(last.response / first.response - 1.0)
@@ -276,11 +280,13 @@ class NormalStressResponse(Recorded):
             seen = self._record(scene, point, way, _LOOKED_AT * _INSTANTS, accuracy, meter)
             point = seen.events[-1].point
             # with its trend: of a response of three periods that is a part of it
-            springs = [event.point.spring for event in seen.events[:-1]]
-            spring = np.reshape(springs, (_LOOKED_AT, _INSTANTS))
+            springs = [event.point.spring_stress for event in seen.events[:-1]]
+            spring_stress = np.reshape(springs, (_LOOKED_AT, _INSTANTS))
             for count in range(1, _LONGEST + 1):
-                apart = np.abs(spring[_LONGEST:] - spring[_LONGEST - count : -count]).max()
-                if apart < _SAME * np.ptp(spring):
+                apart = np.abs(
+                    spring_stress[_LONGEST:] - spring_stress[_LONGEST - count : -count]
+                ).max()
+                if apart < _SAME * np.ptp(spring_stress):
                     return point, count
         return point, 0
 
@@ -331,10 +337,12 @@ class NormalStressResponse(Recorded):
             time, slip = time + end.time, slip + end.slip
             events.append(end._replace(time=time, slip=slip))
             start = end.point
-        springs, reliefs = zip(*((e.point.spring, e.point.psis[-1]) for e in events), strict=True)
+        springs, reliefs = zip(
+            *((e.point.spring_stress, e.point.psis[-1]) for e in events), strict=True
+        )
         trend = springs[-1] - springs[0]
-        spring = np.array(springs[:-1]) - trend * np.arange(instants) / instants
-        return _Record(events, spring, -np.array(reliefs[:-1]), trend, way.periods)
+        spring_stress = np.array(springs[:-1]) - trend * np.arange(instants) / instants
+        return _Record(events, spring_stress, -np.array(reliefs[:-1]), trend, way.periods)
 
 
 def _degrees(response: complex) -> float:
@@ -376,7 +384,7 @@ def _errors(
     over_imposed = 1.0 / asked[0].oscillation_amplitude
     over_spring = over_imposed / values["gain"]
     # errors of the instants add up as noise does: over the period they cancel for the most part
-    left = math.sqrt(2.0 / len(record.spring))
+    left = math.sqrt(2.0 / len(record.spring_stress))
     by_friction = {
         "gain": left * over_imposed,
         "phase_lead": math.degrees(left * over_spring),
@@ -396,5 +404,5 @@ def _shown(scene: Scene, events: Sequence[Event]) -> dict[str, np.ndarray]:
         "slip": np.array([event.slip for event in events]),
         "friction_coefficient": np.array([e.point.reading for e in events]),
         "normal_stress_ratio": np.array([event.point.normal_stress for event in events]),
-        "log10_slip_rate": np.array([e.point.log_rate for e in events]) / math.log(10.0),
+        "log10_slip_rate": np.array([e.point.log_slip_rate for e in events]) / math.log(10.0),
     }

@@ -222,10 +222,10 @@ class NormalStressTransient(Recorded):
                 if 0.0 < wait <= self.record - elapsed:
                     *_earlier, end = follow(stepped, accuracy, meter, start=start, until=wait)
                     elapsed, slipped, start = elapsed + end.time, slipped + end.slip, end.point
-                log_rate = max(end.point.log_rate, _SLOWEST)
-                wait = (slip - slipped) / math.exp(log_rate)
+                log_slip_rate = max(end.point.log_slip_rate, _SLOWEST)
+                wait = (slip - slipped) / math.exp(log_slip_rate)
             # spring stress rises by K (V_0/V - 1) per unit slip
-            pulled = scene.stiffness * math.expm1(-log_rate) / stress
+            pulled = scene.stiffness * math.expm1(-log_slip_rate) / stress
             found[slip] = end.point.reading + pulled * (slip - slipped)
         return found
 
@@ -301,4 +301,4 @@ class NormalStressTransient(Recorded):
 def _direct(scene: Scene, record: _Record) -> float:
     """Change of friction at once, less the direct effect of slip rate."""
     point = record.begin.point
-    return point.coefficient - scene.mu_star - scene.a * point.log_rate
+    return point.coefficient - scene.mu_star - scene.a * point.log_slip_rate

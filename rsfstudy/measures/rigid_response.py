@@ -111,15 +111,15 @@ class RigidResponse(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Integrate the one unknown over slip, twice at different tolerances for the error."""
-        log_rate = scene.log_load_rate
-        if log_rate == 0.0:
+        log_slip_rate = scene.log_load_rate
+        if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
-        if log_rate == -math.inf:
+        if log_slip_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held: nothing slips")
-        sliding = steady_sliding(scene, log_rate)
+        sliding = steady_sliding(scene, log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
-        start, steady = friction_after_step(scene, log_rate), sliding.friction
+        start, steady = friction_after_step(scene, log_slip_rate), sliding.friction
         if abs(start - steady) < _EVOLVES * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
@@ -136,7 +136,7 @@ class RigidResponse(Measure):
                 "evolution_distance": distance,
                 "evolution_distance_error": error_of(distance, again, by_friction, scene, accuracy),
                 "direct_stress_change": start,
-                **_asymmetry(scene, log_rate),
+                **_asymmetry(scene, log_slip_rate),
                 "steady_stress_change": steady,
                 "stress_left_at_unit_slip": left - steady,
                 "closed_form_misfit": _closed_form_misfit(scene, steady, slip, rows[:, 0]),
@@ -188,16 +188,16 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
     return float(np.abs(stress - exact).max())
 
 
-def _asymmetry(scene: Scene, log_rate: float) -> dict[str, float]:
+def _asymmetry(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     """Relative excess of the change by a step over that by its inverse: at once, and over its
     evolution to the new steady state.
 
     Empty where the inverse step has no steady state to go to.
     """
-    steady, inverse_steady = (steady_sliding(scene, x) for x in (log_rate, -log_rate))
+    steady, inverse_steady = (steady_sliding(scene, x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:
         return {}
-    direct, inverse = (friction_after_step(scene, x) for x in (log_rate, -log_rate))
+    direct, inverse = (friction_after_step(scene, x) for x in (log_slip_rate, -log_slip_rate))
     evolves = direct - steady.friction
     inverse_evolves = inverse - inverse_steady.friction
     return {
@@ -206,7 +206,7 @@ def _asymmetry(scene: Scene, log_rate: float) -> dict[str, float]:
     }
 
 
-def friction_after_step(scene: Scene, log_rate: float) -> float:
+def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
     """Deviation of frictional stress just after a step to ln(V/V_*), the state freed of normal
     stress unchanged.
 
@@ -216,8 +216,8 @@ def friction_after_step(scene: Scene, log_rate: float) -> float:
         With `normal_stress_lost` where no stress above the fault's opening is that weak, and
         `locked` where none is that strong.
     """
-    friction = stress_after_jump(scene, scene.a * log_rate)
-    if friction is None and log_rate < 0.0:
+    friction = stress_after_jump(scene, scene.a * log_slip_rate)
+    if friction is None and log_slip_rate < 0.0:
         raise Halt(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
     if friction is None:
         raise Halt(Status.LOCKED, "no stress is strong enough for the direct effect")

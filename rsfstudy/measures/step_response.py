@@ -90,8 +90,8 @@ class StepResponse(Recorded):
         peaks, rows = self._follow(scene, accuracy, meter)
         again, _rows = self._follow(scene, accuracy.refined(), meter)
         heights = peaks - scene.log_load_rate / LN10
-        log_rates = np.full(self.peaks, np.nan)
-        log_rates[: len(peaks)] = peaks
+        log_slip_rates = np.full(self.peaks, np.nan)
+        log_slip_rates[: len(peaks)] = peaks
         return Outcome(
             Status.OK,
             {
@@ -101,7 +101,7 @@ class StepResponse(Recorded):
                 )
                 + _left_out(scene, accuracy),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
-                "peak_log10_slip_rate": log_rates,
+                "peak_log10_slip_rate": log_slip_rates,
                 **along_path(rows, self.phases),
             },
         )
@@ -111,10 +111,10 @@ class StepResponse(Recorded):
     ) -> tuple[np.ndarray, np.ndarray]:
         """The peaks of log10(V/V_*), and what is recorded on the way."""
         peaks: list[float] = []
-        recording, asked = Recording(), (maximum("log_rate"), settling(_OVER))
+        recording, asked = Recording(), (maximum("log_slip_rate"), settling(_OVER))
         for event in follow(scene, accuracy, meter, asked, clock=True, recording=recording):
             if event.kind is Kind.MAXIMUM or _tops_at_start(scene, event):
-                peaks.append(event.point.log_rate / LN10)
+                peaks.append(event.point.log_slip_rate / LN10)
             if event.kind is Kind.SETTLED and not peaks:
                 text = "slip rate has no maximum: it changes steadily to that of the load point"
                 raise Halt(Status.NOT_APPLICABLE, text)

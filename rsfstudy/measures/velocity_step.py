@@ -15,7 +15,7 @@ from rsfstudy.measures._records import Recorded, errors_of, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, Watch, fall, maximum, minimum, rise
+from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, minimum, rise
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.readings import friction_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
@@ -283,7 +283,7 @@ def _by_friction(step: _Step, values: Mapping[str, float]) -> dict[str, float]:
     return dict.fromkeys(values, 1.0) | effects | {n: over_friction * values[n] for n in distances}
 
 
-def _turn(scene: Scene, step: _Step) -> Watch:
+def _turn(scene: Scene, step: _Step) -> EventSpecification:
     of, _above = watched(scene)
     return maximum(of) if step.ratio > 0.0 else minimum(of)
 

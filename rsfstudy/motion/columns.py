@@ -89,9 +89,9 @@ def point_into(point_of: Function, unknowns: Function, numbers: Function, states
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_RATE] = math.nan
         point = point_of(unknowns(y), unknowns(rates), numbers(p))
-        result[LOG_RATE] = point.log_rate
+        result[LOG_RATE] = point.log_slip_rate
         result[GROWTH] = point.growth
-        result[SPRING] = point.spring
+        result[SPRING] = point.spring_stress
         result[FRICTION] = point.friction
         result[PSI] = point.psi
         result[STATE] = point.state
@@ -114,8 +114,8 @@ def balance_into(balance_of: Function, psis_of: Function, numbers: Function) -> 
 
     def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[0] = result[1] = math.nan
-        log_rate, friction, _shift = balance_of(y[0], psis_of(y), numbers(p))
-        result[0] = log_rate
+        log_slip_rate, friction, _shift = balance_of(y[0], psis_of(y), numbers(p))
+        result[0] = log_slip_rate
         result[1] = friction
 
     return fill_balance

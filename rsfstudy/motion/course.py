@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, Kind, Watch
+from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import jumped, starting
@@ -24,7 +24,7 @@ def follow(
     scene: Scene,
     accuracy: Accuracy,
     meter: Meter,
-    watches: Sequence[Watch] = (),
+    watches: Sequence[EventSpecification] = (),
     *,
     start: Point | None = None,
     clock: bool = False,
@@ -40,7 +40,7 @@ def follow(
     accuracy : Accuracy
     meter : Meter
         Charged with the work, by regime.
-    watches : sequence of Watch
+    watches : sequence of EventSpecification
         What to be told of.
     start : Point, optional
         Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
@@ -86,7 +86,7 @@ def follow(
             meter,
             start,
             asked,
-            origin=(time, slip, start.spring),
+            origin=(time, slip, start.spring_stress),
             table=table,
             told=told,
             clock=clock,
@@ -145,7 +145,10 @@ def _up_to(table: np.ndarray, until: float) -> np.ndarray:
 
 
 def _begun(
-    event: Event, before: tuple[Point, Numbers], acting: Scene, watches: Sequence[Watch]
+    event: Event,
+    before: tuple[Point, Numbers],
+    acting: Scene,
+    watches: Sequence[EventSpecification],
 ) -> Iterator[Event]:
     """Events where a later segment begins: that it does, and what happens there, after a point with
     the numbers of the segment before.
@@ -156,5 +159,5 @@ def _begun(
         yield event._replace(kind=watch.kind, watch=watch, point=point)
 
 
-def _without_settling(watches: Sequence[Watch]) -> list[Watch]:
+def _without_settling(watches: Sequence[EventSpecification]) -> list[EventSpecification]:
     return [watch for watch in watches if watch.kind is not Kind.SETTLED]

@@ -140,13 +140,15 @@ def report_end(motion, space, events, code):
     add_event(motion, events, float(code), motion.end, passed, space.after, space.p)
 
 
-def slipped(motion, clock, passed, spring, p):
+def slipped(motion, clock, passed, spring_stress, p):
     """Slip since the start: the clock of a rigid slider; else from the spring, ``f = f_0 + K (V_0 t
     - slip)``.
     """
     if motion.slip_is_clock:
         return clock
-    return motion.slip + (p[LOAD_VELOCITY] * passed - (spring - motion.spring) / p[STIFFNESS])
+    return motion.slip + (
+        p[LOAD_VELOCITY] * passed - (spring_stress - motion.spring_stress) / p[STIFFNESS]
+    )
 
 
 def report_beginning(motion, space, last, events):

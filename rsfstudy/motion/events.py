@@ -10,12 +10,12 @@ Who measures a motion asks to be told of
                                 where that goes on changing normal stress)
 
 and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`, and the
-friction coefficient that is read, ``reading`` (see `readings`); extrema are told of ``log_rate``,
-``spring`` and ``reading``. Beside what was asked for, a motion tells its start, every
-change of regime, every segment of its loading that begins, its end in time, and the end of the step
-with which all has been recorded that was asked for. What happens from
-one regime or segment to the next is told where that begins. A motion that cannot go on ends with
-`Halt`, which says why.
+friction coefficient that is read, ``reading`` (see `readings`); extrema are told of
+``log_slip_rate``, ``spring_stress`` and ``reading``. Beside what was asked for, a motion tells its
+start, every change of regime, every segment of its loading that begins, its end in time, and the
+end of the step with which all has been recorded that was asked for. What happens from one regime or
+segment to the next is told where that begins. A motion that cannot go on ends with `Halt`, which
+says why.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Kind(StrEnum):
     END = "end"
 
 
-class Watch(NamedTuple):
+class EventSpecification(NamedTuple):
     """Event specification; whether the motion ends there; and whether whoever asks can wait for it,
     and for the beginning, until something else has happened: an engine may then tell several events
     at once.
@@ -54,31 +54,31 @@ class Watch(NamedTuple):
     waits: bool = False
 
 
-def maximum(of: str, *, ends: bool = False, waits: bool = False) -> Watch:
-    """A maximum of ``log_rate``, ``spring`` or ``reading``."""
-    return Watch(Kind.MAXIMUM, of, ends=ends, waits=waits)
+def maximum(of: str, *, ends: bool = False, waits: bool = False) -> EventSpecification:
+    """A maximum of ``log_slip_rate``, ``spring_stress`` or ``reading``."""
+    return EventSpecification(Kind.MAXIMUM, of, ends=ends, waits=waits)
 
 
-def minimum(of: str, *, ends: bool = False, waits: bool = False) -> Watch:
-    """A minimum of ``log_rate``, ``spring`` or ``reading``."""
-    return Watch(Kind.MINIMUM, of, ends=ends, waits=waits)
+def minimum(of: str, *, ends: bool = False, waits: bool = False) -> EventSpecification:
+    """A minimum of ``log_slip_rate``, ``spring_stress`` or ``reading``."""
+    return EventSpecification(Kind.MINIMUM, of, ends=ends, waits=waits)
 
 
-def rise(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Watch:
+def rise(of: str, to: float, *, ends: bool = False, waits: bool = False) -> EventSpecification:
     """A quantity on its way up, at a level."""
-    return Watch(Kind.RISE, of, to, ends, waits)
+    return EventSpecification(Kind.RISE, of, to, ends, waits)
 
 
-def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Watch:
+def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> EventSpecification:
     """A quantity on its way down, at a level."""
-    return Watch(Kind.FALL, of, to, ends, waits)
+    return EventSpecification(Kind.FALL, of, to, ends, waits)
 
 
-def settling(part: float, *, ends: bool = False) -> Watch:
+def settling(part: float, *, ends: bool = False) -> EventSpecification:
     """Close to steady sliding: within a part of the largest distance so far, in ln V or in the
     state over b.
     """
-    return Watch(Kind.SETTLED, level=part, ends=ends)
+    return EventSpecification(Kind.SETTLED, level=part, ends=ends)
 
 
 class Event(NamedTuple):
@@ -103,7 +103,7 @@ class Event(NamedTuple):
     """
 
     kind: Kind
-    watch: Watch | None
+    watch: EventSpecification | None
     time: float
     slip: float
     point: Point

@@ -63,45 +63,45 @@ def limits(scene: Scene, accuracy: Accuracy) -> Limits:
     )
 
 
-def norm_at(log_rate: float, given: Limits) -> float:
+def norm_at(log_slip_rate: float, given: Limits) -> float:
     """w = V T/(2 pi D_c)."""
-    return given.inertial_time * math.exp(min(log_rate, LARGEST_LOG_SLIP_RATE))
+    return given.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
 
 
-def weight_of_mass(log_rate: float, missing: float, given: Limits) -> float:
+def weight_of_mass(log_slip_rate: float, missing: float, given: Limits) -> float:
     """Weight of mass where friction differs from spring stress by what is `missing`: 1 where
     the slow manifold has to be left.
     """
     correction = abs(missing) / given.a / given.correction
-    return max(norm_at(log_rate, given) / given.norm, correction)
+    return max(norm_at(log_slip_rate, given) / given.norm, correction)
 
 
-def slip_of_rise(log_rate: float, after: float, given: Limits) -> float:
+def slip_of_rise(log_slip_rate: float, after: float, given: Limits) -> float:
     """Slip in D_c, times the change of ln V, while slip rate goes to its value `after` a step; left
     out, the state would miss the evolution of that slip.
     """
-    norm = max(norm_at(log_rate, given), norm_at(after, given))
-    return given.softness * norm**2 * abs(after - log_rate)
+    norm = max(norm_at(log_slip_rate, given), norm_at(after, given))
+    return given.softness * norm**2 * abs(after - log_slip_rate)
 
 
-def begins_slow(log_rate: float, below: float, missing: float, given: Limits) -> bool:
+def begins_slow(log_slip_rate: float, below: float, missing: float, given: Limits) -> bool:
     """True if a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
     `below`, and friction differs from spring stress by what is `missing` there.
     """
-    rate = norm_at(log_rate, given) / given.norm
+    rate = norm_at(log_slip_rate, given) / given.norm
     slow = max(weight_of_mass(below, missing, given), rate) < 1.0
-    return slow and slip_of_rise(log_rate, below, given) <= given.remaining_slip
+    return slow and slip_of_rise(log_slip_rate, below, given) <= given.remaining_slip
 
 
-def may_return(log_rate: float, given: Limits) -> bool:
+def may_return(log_slip_rate: float, given: Limits) -> bool:
     """True if ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
     straight back in its turn.
     """
-    return norm_at(log_rate, given) < 0.5 * given.norm
+    return norm_at(log_slip_rate, given) < 0.5 * given.norm
 
 
 def has_returned(
-    log_rate: float, growth: float, below: float, missing: float, given: Limits
+    log_slip_rate: float, growth: float, below: float, missing: float, given: Limits
 ) -> bool:
     """True if the full equations have done their work at ln(V/V_*) and its growth, where the slow
     manifold has ln(V/V_*) `below`, and friction differs from spring stress by what is `missing`.
@@ -115,17 +115,19 @@ def has_returned(
     fall to one that rises: its trough is above where that is now, by several times the change of
     ln V by which that trails, which is what is missing over a.
     """
-    norm = max(norm_at(log_rate, given), norm_at(below, given))
+    norm = max(norm_at(log_slip_rate, given), norm_at(below, given))
     has_peak = missing < 0.0 and given.softness * norm**2 > given.remaining_slip
     has_trough = missing > 0.1 * given.remaining_slip * given.a
-    if (growth > 0.0 and (log_rate > below + 1.0 or has_peak)) or (growth < 0.0 and has_trough):
+    if (growth > 0.0 and (log_slip_rate > below + 1.0 or has_peak)) or (
+        growth < 0.0 and has_trough
+    ):
         return False
-    remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_rate - below))
+    remaining = 0.5 * given.softness * norm**2 * min(1.0, abs(log_slip_rate - below))
     settled = max(norm / given.norm, weight_of_mass(below, missing, given)) < 0.5
     return settled and remaining < given.remaining_slip
 
 
-def termination_of(log_rate: float, normal_stress: float, load_velocity: float) -> int:
+def termination_of(log_slip_rate: float, normal_stress: float, load_velocity: float) -> int:
     """Termination status of a motion: `GOES_ON`, unless normal stress vanishes, normal stress or
     slip rate grow without bound, or slip stops.
 
@@ -135,17 +137,17 @@ def termination_of(log_rate: float, normal_stress: float, load_velocity: float) 
         return IS_LOST
     if normal_stress >= LOCKED:
         return IS_LOCKED
-    if log_rate <= SLOWEST and load_velocity == 0.0:
+    if log_slip_rate <= SLOWEST and load_velocity == 0.0:
         return HAS_STOPPED
-    if log_rate >= UNBOUNDED:
+    if log_slip_rate >= UNBOUNDED:
         return IS_UNBOUNDED
     return GOES_ON
 
 
-def margin(log_rate: float, normal_stress: float, load_velocity: float) -> float:
+def margin(log_slip_rate: float, normal_stress: float, load_velocity: float) -> float:
     """Margin of ln V and of the logarithm of normal stress to where a motion ends: positive where
     it goes on.
     """
     stress = math.log(max(normal_stress, LEAST_STRESS))
-    left = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_rate)
-    return min(left, log_rate - SLOWEST) if load_velocity == 0.0 else left
+    left = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_slip_rate)
+    return min(left, log_slip_rate - SLOWEST) if load_velocity == 0.0 else left

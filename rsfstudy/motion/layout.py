@@ -13,7 +13,7 @@ MOTION = np.dtype(
         ("lasts", "f8"),  # time at which to end
         ("time", "f8"),  # time, slip and spring stress at the start
         ("slip", "f8"),
-        ("spring", "f8"),
+        ("spring_stress", "f8"),
         ("budget", "i8"),  # right-hand sides that it may spend
         ("records", "i8"),  # when the slider is recorded
         ("kinks", "i8"),  # kinks of the loading that are ahead, and the last of them that are told
@@ -56,7 +56,7 @@ MOTION = np.dtype(
     ]
 )
 #: The same as bytes: fields of records take much longer to write and to read.
-CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring", "budget", "records", "kinks", "told"
+CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring_stress", "budget", "records", "kinks", "told"
 CALLED_WITH, SAYS = struct.Struct("=4d4q"), struct.Struct("=6q")
 #: Rows of the table of functions; and how many equations have there, of which the last may be
 #: missing (see `columns.Filling`).

@@ -175,7 +175,7 @@ def turn(motion, space, last, kinks, rows):
     n, p, relief = len(kinks) - motion.kinks, space.p, PSIS + motion.states - 1 - motion.behind
     copy(space.after, last, PSIS + motion.states)
     motion.slip = slipped(motion, motion.end, motion.lasts, last[SPRING], p)
-    motion.spring, motion.time, motion.started = last[SPRING], kinks[n, BEGINS], 0.0
+    motion.spring_stress, motion.time, motion.started = last[SPRING], kinks[n, BEGINS], 0.0
     motion.lasts = kinks[n, ENDS_AT] - kinks[n, BEGINS]
     motion.begins, motion.kinks = KINK, motion.kinks - 1
     if motion.records == WITHIN_STEPS:  # to the last digit, too

@@ -29,7 +29,8 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
     """
     size = scene.a * scene.parts.law.size_over_a
     return max(
-        abs(point.log_rate - math.log(abs(load_velocity))), point.distance_from_steady_state / size
+        abs(point.log_slip_rate - math.log(abs(load_velocity))),
+        point.distance_from_steady_state / size,
     )
 
 
@@ -41,7 +42,7 @@ def watched(scene: Scene) -> tuple[str, float]:
     parts = scene.parts
     stressed = parts.normal_stress.normal_stress is not None or parts.loading.unknowns
     if not stressed and not parts.law.regularised:
-        return "spring", scene.mu_star
+        return "spring_stress", scene.mu_star
     return "reading", 0.0
 
 

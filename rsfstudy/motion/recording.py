@@ -108,9 +108,9 @@ def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...
     """Row that is recorded of a point: the quantities of `READ`, less scales and offsets, the
     regime, the place within a step, and the states.
     """
-    stresses = point.spring, point.friction, point.normal_stress
+    stresses = point.spring_stress, point.friction, point.normal_stress
     return (
-        *(time, slip, point.log_rate, *stresses, point.state, point.reading),
+        *(time, slip, point.log_slip_rate, *stresses, point.state, point.reading),
         *(regime, 0.0, *point.psis),
     )
 

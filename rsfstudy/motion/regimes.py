@@ -36,13 +36,13 @@ def starting(scene: Scene) -> Point:
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    psis, log_rate = steady_states_of(scene, 0.0, 0.0), 0.0
+    psis, log_slip_rate = steady_states_of(scene, 0.0, 0.0), 0.0
     if scene.begins_elsewhere:
-        psis, log_rate = _stated(scene, psis)
+        psis, log_slip_rate = _stated(scene, psis)
     psis = _with_beginning(scene, psis)
     stress = scene.parts.slider.initial_stress + scene.spring_stress_step
     stepped = on_slow_manifold(scene, stress, psis)
-    return at_rate(scene, stepped, log_rate) if scene.has_mass else stepped
+    return at_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
 
 
 def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:
@@ -67,7 +67,7 @@ def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
         return scene.initial_state - begun(psi).state
 
     psi = float(newton(missing, scene.initial_state, tol=1e-15))
-    return (psi, *steady_states[1:]), begun(psi).log_rate
+    return (psi, *steady_states[1:]), begun(psi).log_slip_rate
 
 
 def jumped(scene: Scene, point: Point) -> Point:
@@ -80,24 +80,26 @@ def jumped(scene: Scene, point: Point) -> Point:
         As `starting` does.
     """
     psis = _with_beginning(scene, point.psis)
-    after = point._replace(spring=point.spring + scene.spring_stress_step, psis=psis)
+    after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
-    return at_rate(scene, after, point.log_rate) if scene.has_mass else after
+    return at_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
 
 
-def at_rate(scene: Scene, point: Point, log_rate: float) -> Point:
+def at_rate(scene: Scene, point: Point, log_slip_rate: float) -> Point:
     """A point with another ln(V/V_*), and the frictional stress that goes with it."""
-    excess = scene.a * log_rate + point.psi
+    excess = scene.a * log_slip_rate + point.psi
     friction = steady.stress_after_jump(scene, excess, point.psis)
     if friction is None:
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
-    return point._replace(log_rate=log_rate, friction=friction)
+    return point._replace(log_slip_rate=log_slip_rate, friction=friction)
 
 
-def on_slow_manifold(scene: Scene, spring: float, psis: Numbers, engine: str = SCIPY) -> Point:
+def on_slow_manifold(
+    scene: Scene, spring_stress: float, psis: Numbers, engine: str = SCIPY
+) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
     slow = between_ruptures(scene, clock=False)
-    given = (spring, *psis), slow.p
+    given = (spring_stress, *psis), slow.p
     now: Point = of_floats(_point_of(slow.rate, slow.point), engine, *given)(*given)
     return now
 
@@ -136,15 +138,15 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     """
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step
-    spring = begins if start is None else start.spring
-    lost = spring <= scene.parts.normal_stress.weakest(scene)
-    if lost or (start and normal_stress_at(scene, spring, start.psis) <= handover.LOST):
+    spring_stress = begins if start is None else start.spring_stress
+    lost = spring_stress <= scene.parts.normal_stress.weakest(scene)
+    if lost or (start and normal_stress_at(scene, spring_stress, start.psis) <= handover.LOST):
         raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
-    if slider.mu_star + spring > 0.0:
+    if slider.mu_star + spring_stress > 0.0:
         return
     steps = start is None or scene.spring_stress_step
     now = "the step takes shear stress to" if steps else "shear stress has gone to"
-    text = f"{now} {slider.mu_star + spring:.3g} sigma_*"
+    text = f"{now} {slider.mu_star + spring_stress:.3g} sigma_*"
     if not scene.parts.law.regularised:
         raise Halt(Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True")
     if scene.load_velocity == 0.0:

@@ -15,7 +15,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.columns import filling
 from rsfstudy.motion.detection import BEFORE, NOWHERE, between
 from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
-from rsfstudy.motion.events import Event, Kind, Watch
+from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.handover import Limits, limits
 from rsfstudy.motion.loop import advance
 from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
@@ -131,7 +131,7 @@ def chain(
     accuracy: Accuracy,
     meter: Meter,
     start: Point,
-    watches: Sequence[Watch],
+    watches: Sequence[EventSpecification],
     *,
     origin: Numbers,
     table: np.ndarray,
@@ -158,7 +158,7 @@ def chain(
     first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
     if first is not None:  # in the loop stresses are without what the load point imposes
         start = _pushed(start, first - start.psis[-1])
-        origin = *origin[:2], start.spring
+        origin = *origin[:2], start.spring_stress
     begins, kinks = (np.empty(2 * plan.unknowns), _columns_of(start)), (table[1:], told)
     happens = _events(plan, (lasts, *origin), begins, meter, watches, recording, kinks, first)
     if first is None:
@@ -167,7 +167,7 @@ def chain(
 
 
 def _pushed(point: Point, by: float) -> Point:
-    return point._replace(spring=point.spring + by, friction=point.friction + by)
+    return point._replace(spring_stress=point.spring_stress + by, friction=point.friction + by)
 
 
 def along(
@@ -175,7 +175,7 @@ def along(
     state: Numbers,
     tolerance: float,
     meter: Meter,
-    watches: Sequence[Watch] = (),
+    watches: Sequence[EventSpecification] = (),
     *,
     backward: bool = False,
     recording: Recording | None = None,
@@ -247,7 +247,7 @@ def _events(
     times: tuple[float, ...],
     begins: tuple[np.ndarray, np.ndarray],
     meter: Meter,
-    watches: Sequence[Watch],
+    watches: Sequence[EventSpecification],
     recording: Recording | None,
     kinks: tuple[np.ndarray, int],
     imposed: float | None = None,
@@ -325,8 +325,12 @@ def _to_record(
 
 
 def happening(
-    before: Point, p_before: Numbers, after: Point, p_after: Numbers, watches: Sequence[Watch]
-) -> Iterator[tuple[Watch, Point]]:
+    before: Point,
+    p_before: Numbers,
+    after: Point,
+    p_after: Numbers,
+    watches: Sequence[EventSpecification],
+) -> Iterator[tuple[EventSpecification, Point]]:
     """Events that are watched for and happen where a motion jumps from a point to another, with the
     numbers of the scene at both; and at which of them.
     """
@@ -339,7 +343,9 @@ def happening(
 
 
 @lru_cache(maxsize=256)
-def _asked(watches: tuple[Watch, ...]) -> tuple[np.ndarray, list[tuple[Kind, Watch | None]]]:
+def _asked(
+    watches: tuple[EventSpecification, ...],
+) -> tuple[np.ndarray, list[tuple[Kind, EventSpecification | None]]]:
     """The table of what is watched for, and what codes of events mean."""
     meanings = [*((watch.kind, watch) for watch in watches), *_BESIDE]
     asked = np.zeros((len(watches), len(layout.WATCHED)))

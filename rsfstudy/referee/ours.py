@@ -70,13 +70,13 @@ def _series(problem: Problem, accuracy: Accuracy) -> Table:
 def _peaks(problem: Problem, accuracy: Accuracy) -> Table:
     rig, meter = problem.rig, Meter(accuracy.budget, engine=accuracy.engine)
     watched = follow(
-        problem.scene, accuracy, meter, [maximum("log_rate")], clock=True, since=problem.since
+        problem.scene, accuracy, meter, [maximum("log_slip_rate")], clock=True, since=problem.since
     )
     peaks = list(islice((e for e in watched if e.kind is Kind.MAXIMUM), problem.count))
     return {
         "event": np.arange(1.0, problem.count + 1.0),
         "time": np.array([e.time for e in peaks]) / rig.dimensionless("1 s"),
-        "slip_rate": rig.reference_velocity * np.exp([e.point.log_rate for e in peaks]),
+        "slip_rate": rig.reference_velocity * np.exp([e.point.log_slip_rate for e in peaks]),
     }
 
 

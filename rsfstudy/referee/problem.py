@@ -213,7 +213,7 @@ class Problem:
         return tuple(scale * length / self.rig.reference_velocity for length in lengths)
 
     @cached_property
-    def log_rate(self) -> float:
+    def log_slip_rate(self) -> float:
         """ln(V/V_star) at the beginning."""
         rate = _positive("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
@@ -225,7 +225,7 @@ class Problem:
         """
         if not self.initial:
             return None
-        scene, x, states = self.scene, self.log_rate, self._states()
+        scene, x, states = self.scene, self.log_slip_rate, self._states()
         acting, before = scene.chains[0][0], scene.under(Segment(1.0))
         friction = scene.a * x + sum(states)
         if scene.parts.law.regularised:

@@ -194,7 +194,7 @@ def _posed_otherwise(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if problem.initial:
         steady = [f"{theta!r} s" for theta in problem.theta_star]
         rate = problem.initial["slip_rate"]
-        factor = math.exp(-problem.log_rate)
+        factor = math.exp(-problem.log_slip_rate)
         at_rate = [f"{factor * theta!r} s" for theta in problem.theta_star]
         for words, thetas in (("D_c/V_*", steady), (f"D_c/V(0) with V(0) = {rate}", at_rate)):
             other = {**problem.initial, "theta": thetas}

@@ -36,13 +36,13 @@ class ClosedForm:
 
 
 def critical_stiffness(
-    log_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
+    log_slip_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
 ) -> float:
     """Critical stiffness ``k_cr D_c/sigma_*`` as an explicit function of V, without mass: ``(b - a)
     sigma_* (1 - mu_* cot(phi)) / {D_c (1 - mu_ss cot(phi)) [1 - (mu_ss - alpha) cot(phi)]}`` with
     ``mu_ss = mu_* - (b - a) ln(V/V_*)`` (He et al. 1998).
     """
-    mu_ss = mu_star - (b - a) * log_rate
+    mu_ss = mu_star - (b - a) * log_slip_rate
     above = (b - a) * (1.0 - mu_star * cot_phi)
     return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
 

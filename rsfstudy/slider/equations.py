@@ -27,9 +27,9 @@ LONGEST_STEP = 1e9
 LONGEST_STRIDE, FEW = 3.0, 10.0
 
 
-def stride(log_rate: float, normal_stress: float, log_load_rate: float) -> float:
+def stride(log_slip_rate: float, normal_stress: float, log_load_rate: float) -> float:
     """Longest step of a form whose clock is length along the path."""
-    stationary = max(1.0, (log_load_rate - log_rate) / FEW)
+    stationary = max(1.0, (log_load_rate - log_slip_rate) / FEW)
     return min(LONGEST_STRIDE * stationary * max(1.0, normal_stress), LONGEST_STEP)
 
 
@@ -100,7 +100,7 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
     forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
-    unknowns: tuple[str, ...] = ("spring", *_states(scene))
+    unknowns: tuple[str, ...] = ("spring_stress", *_states(scene))
     scales, form = (scene.a,) * len(unknowns), forms.between_ruptures
     return _along_path(
         scene, dynamics.regime, form, unknowns, scales, clock=clock, balance=forms.balance
@@ -138,7 +138,7 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
     a, others = scene.a, _states(scene)[1:]
-    unknowns = ("spring", "log_rate", "friction", *others)
+    unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
     scales = (a, 1.0, a, *[a] * len(others))
     return _along_path(scene, IN_RUPTURE, _full(scene), unknowns, scales, clock=clock)
 
@@ -163,10 +163,10 @@ def by_inertial_time(scene: Scene) -> Equations:
     return in_rupture(scene)._replace(rate=_full(scene).against_clock)
 
 
-def rigid(scene: Scene, log_rate: float) -> Equations:
+def rigid(scene: Scene, log_slip_rate: float) -> Equations:
     """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
     forms, unknowns = scene.functions, ("friction", *_states(scene)[1:])
-    scales, p = (scene.a,) * len(unknowns), (*scene.numbers, log_rate)
+    scales, p = (scene.a,) * len(unknowns), (*scene.numbers, log_slip_rate)
     return Equations(RIGID, unknowns, scales, forms.rigid_rate, forms.rigid_point, p, scene.states)
 
 
@@ -195,21 +195,21 @@ def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float
     return 1.0 + float(stress[0])
 
 
-def log_rate_at(scene: Scene, spring: float, psi: float) -> float:
+def log_slip_rate_at(scene: Scene, spring_stress: float, psi: float) -> float:
     """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
     there is no pore pressure.
     """
     massless = scene.dynamics if scene.dynamics.rupture_rate is None else QuasiStatic()
     psis = (psi, *(0.0,) * (scene.states - 1))
-    return float(functions(scene, massless).balance(spring, psis, scene.numbers)[0])
+    return float(functions(scene, massless).balance(spring_stress, psis, scene.numbers)[0])
 
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
 
-    def at(log_rate: float, state: float) -> float:
-        return float(evolutions(log_rate, (state,), 0.0, 1.0, p)[0])
+    def at(log_slip_rate: float, state: float) -> float:
+        return float(evolutions(log_slip_rate, (state,), 0.0, 1.0, p)[0])
 
     return at
 
@@ -218,16 +218,16 @@ def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
 
-    def at(log_rate: float, psis: Numbers, shift: float) -> Numbers:
-        changes: Numbers = evolutions(log_rate, psis, shift, 1.0, p)
+    def at(log_slip_rate: float, psis: Numbers, shift: float) -> Numbers:
+        changes: Numbers = evolutions(log_slip_rate, psis, shift, 1.0, p)
         return changes
 
     return at
 
 
-def steady_states_of(scene: Scene, log_rate: float, shift: float) -> Numbers:
+def steady_states_of(scene: Scene, log_slip_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
     psis: Numbers = scene.functions.friction.steady_states(
-        log_rate, shift, scene.numbers_of_friction
+        log_slip_rate, shift, scene.numbers_of_friction
     )
     return psis

@@ -66,10 +66,10 @@ class Friction(NamedTuple):
     outer_pressure : callable
         ``(psis) -> P`` outside the fault.
     evolutions : callable
-        ``(log_rate, psis, shift, fraction, p)``: changes of all states per unit slip in D_c, times
-        a fraction.
+        ``(log_slip_rate, psis, shift, fraction, p)``: changes of all states per unit slip in D_c,
+        times a fraction.
     steady_states : callable
-        ``(log_rate, shift, p)``: all states in steady sliding.
+        ``(log_slip_rate, shift, p)``: all states in steady sliding.
     state_sum : callable
         ``(psis) -> Psi``, the sum of the states of the law.
     contribution : callable
@@ -78,7 +78,7 @@ class Friction(NamedTuple):
     by_pressure : callable
         ``(g, psis, p)``: derivatives of strength and of shift with respect to P.
     states_at : callable
-        ``(strength, log_rate, others, p)``: all states; the first is what the others leave of it.
+        ``(strength, log_slip_rate, others, p)``: all states; the first is what the others leave.
     imposed : callable
         ``(psis, p) -> K D`` that is no part of g, and
     imposed_change : callable

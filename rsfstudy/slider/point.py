@@ -10,11 +10,11 @@ class Point(NamedTuple):
 
     Attributes
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     growth : float
         Its derivative with respect to the clock of the equations, length along the path.
-    spring, friction : float
+    spring_stress, friction : float
         Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
     psi : float
         The sum of the states of the law, freed of stress.
@@ -37,9 +37,9 @@ class Point(NamedTuple):
         States freed of stress, and those of a fluid.
     """
 
-    log_rate: float
+    log_slip_rate: float
     growth: float
-    spring: float
+    spring_stress: float
     friction: float
     psi: float
     state: float

@@ -54,14 +54,14 @@ Polynomial = list[float]
 Matrix = list[list[float]]
 
 
-def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = False) -> float:
+def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool = False) -> float:
     """Critical stiffness ``k_cr D_c/sigma_*`` of steady sliding at ln(V/V_*).
 
     Parameters
     ----------
     scene : Scene
         Its own stiffness does not matter.
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     quasi_static : bool
         Leave mass and radiation out.
@@ -78,7 +78,7 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
     mass: ``(b - a) sigma_ss / (D_c [1 - cot(phi) (mu_ss - alpha)])``.
     """
     scene = scene.unforced
-    steady = steady_sliding(scene, log_rate)
+    steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         return math.nan
     around = _around(scene, steady, quasi_static=quasi_static)
@@ -90,12 +90,12 @@ def critical_stiffness(scene: Scene, log_rate: float, *, quasi_static: bool = Fa
     return math.inf if _grows(around, 2.0 * critical or scene.a) else critical
 
 
-def critical_stiffnesses(scene: Scene, log_rate: float) -> list[float]:
+def critical_stiffnesses(scene: Scene, log_slip_rate: float) -> list[float]:
     """Every stiffness at which small changes of steady sliding come to grow or to decay, or more of
     them grow, from the smallest up: several states may have more than one.
     """
     scene = scene.unforced
-    steady = steady_sliding(scene, log_rate)
+    steady = steady_sliding(scene, log_slip_rate)
     return [] if steady is None else _crossings(_around(scene, steady), _ROUNDING * scene.a)
 
 
@@ -109,8 +109,8 @@ class _Around(NamedTuple):
 
 
 def _around(scene: Scene, steady: Steady, *, quasi_static: bool = False) -> _Around:
-    damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_rate)
-    norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_rate)
+    damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_slip_rate)
+    norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_slip_rate)
     return _Around(*response(scene, steady), damping, norm)
 
 
@@ -133,8 +133,8 @@ def _crossings(around: _Around, least: float) -> list[float]:
 
 def _rates(around: _Around, stiffness: float) -> np.ndarray:
     """Growth rates p at a stiffness, the fastest first."""
-    spring = [stiffness, around.damping, stiffness * around.norm**2]
-    polynomial = _sum(_product(spring, around.below), [0.0, *around.above])
+    spring_stress = [stiffness, around.damping, stiffness * around.norm**2]
+    polynomial = _sum(_product(spring_stress, around.below), [0.0, *around.above])
     light = 0.0 < abs(polynomial[-1]) < _LIGHT * abs(polynomial[-2]) and around.norm > 0.0
     roots = _with_one_far_off(polynomial) if light else np.roots(polynomial[::-1])
     return np.asarray(roots[np.argsort(-roots.real)])
@@ -196,7 +196,7 @@ def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float
     """
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
     shift = relation_of(scene)(steady.friction)[2]
-    at, columns = [steady.log_rate, shift, *steady.psis], []
+    at, columns = [steady.log_slip_rate, shift, *steady.psis], []
     for place, (value, scale) in enumerate(zip(at, _scales(scene, steady, shift), strict=True)):
         step = _STEP * scale
         slopes = [0.0] * len(steady.psis)
@@ -220,7 +220,7 @@ def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
     of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
     if len(steady.psis) == 1:
         return [1.0, of_shift, size]
-    slow, fast = (steady_states_of(scene, steady.log_rate + x, shift) for x in (-1.0, 1.0))
+    slow, fast = (steady_states_of(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0))
     moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
     return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
 
@@ -241,7 +241,7 @@ def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
     return coefficients, terms[1:]
 
 
-def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
+def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
     """Growth rates p, per slip in D_c, of small changes of steady sliding at the stiffness of the
     scene; complex, the fastest first. They go as exp(p V t/D_c).
 
@@ -251,10 +251,10 @@ def growth_rates(scene: Scene, log_rate: float) -> np.ndarray:
         Where there is no steady sliding.
     """
     scene = scene.unforced
-    return _rates(_around(scene, _sliding(scene, log_rate)), scene.stiffness)
+    return _rates(_around(scene, _sliding(scene, log_slip_rate)), scene.stiffness)
 
 
-def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -> complex:
+def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: float) -> complex:
     """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
     scene whose loading goes on changing that.
 
@@ -265,7 +265,7 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
     Parameters
     ----------
     scene : Scene
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     frequency : float
         omega D_c/V_*.
@@ -276,7 +276,7 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
         Where there is no steady sliding.
     """
     still = scene.unforced
-    steady = _sliding(still, log_rate)
+    steady = _sliding(still, log_slip_rate)
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
@@ -286,20 +286,20 @@ def response_to_normal_stress(scene: Scene, log_rate: float, frequency: float) -
     for power, matrix in enumerate(adjugate):
         forced[power] -= shifted * math.fsum(_dot(row, by_shift) for row in matrix)
     around, stiffness = _around(still, steady), scene.stiffness
-    spring = [stiffness, around.damping, stiffness * around.norm**2]
-    at = 1j * frequency * math.exp(-log_rate)
+    spring_stress = [stiffness, around.damping, stiffness * around.norm**2]
+    at = 1j * frequency * math.exp(-log_slip_rate)
     left, above, below, balance = (
         complex(np.polyval(polynomial[::-1], at))
-        for polynomial in (forced, around.above, around.below, spring)
+        for polynomial in (forced, around.above, around.below, spring_stress)
     )
     return stiffness * left / (balance * below + at * above)
 
 
-def _sliding(scene: Scene, log_rate: float) -> Steady:
+def _sliding(scene: Scene, log_slip_rate: float) -> Steady:
     """Steady sliding, which there must be."""
-    steady = steady_sliding(scene, log_rate)
+    steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
-        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_rate:g}")
+        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_slip_rate:g}")
     return steady
 
 

@@ -16,27 +16,27 @@ def only(evolution: Function) -> Function:
     """``dPsi/d(delta)`` times a fraction, of a law of one state."""
 
     def evolutions(
-        log_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
-        return (fraction * evolution(log_rate, psis[0] - shift, p),)
+        return (fraction * evolution(log_slip_rate, psis[0] - shift, p),)
 
     return evolutions
 
 
-def usual_steady_state(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def usual_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Psi in steady sliding by most laws, where Theta = -b ln(V/V_*)."""
-    return (shift - p[B] * log_rate,)
+    return (shift - p[B] * log_slip_rate,)
 
 
 def with_auxiliary(evolutions: Function, auxiliary: Function, of_law: int) -> Function:
     """Changes of the states of the law, and of those that end in P behind them."""
 
     def all_evolutions(
-        log_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
         return (
-            *evolutions(log_rate, psis[:of_law], shift, fraction, p),
-            *auxiliary(log_rate, psis[of_law:], fraction, p),
+            *evolutions(log_slip_rate, psis[:of_law], shift, fraction, p),
+            *auxiliary(log_slip_rate, psis[of_law:], fraction, p),
         )
 
     return all_evolutions
@@ -45,8 +45,8 @@ def with_auxiliary(evolutions: Function, auxiliary: Function, of_law: int) -> Fu
 def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Function:
     """All states in steady sliding: those of the law, and those that end in P."""
 
-    def all_steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
-        return (*steady_states(log_rate, shift, p), *auxiliary(log_rate, p))
+    def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+        return (*steady_states(log_slip_rate, shift, p), *auxiliary(log_slip_rate, p))
 
     return all_steady_states
 
@@ -132,19 +132,21 @@ def contribution_of(count: int, by_pressure: Function | None) -> Function:
 
 
 def states_at_of(count: int) -> Function:
-    """``(strength, log_rate, others, p)``: all states, of which so many are of the law, where
+    """``(strength, log_slip_rate, others, p)``: all states, of which so many are of the law, where
     friction has a strength: the first is what the others leave of it.
     """
     if count == 1:
 
-        def left(strength: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
-            return (strength - p[A] * log_rate, *others)
+        def left(strength: float, log_slip_rate: float, others: Numbers, p: Numbers) -> Numbers:
+            return (strength - p[A] * log_slip_rate, *others)
 
         return left
 
     sum_of_others = sum_of(count - 1)
 
-    def left_by_others(strength: float, log_rate: float, others: Numbers, p: Numbers) -> Numbers:
-        return (strength - p[A] * log_rate - sum_of_others(others), *others)
+    def left_by_others(
+        strength: float, log_slip_rate: float, others: Numbers, p: Numbers
+    ) -> Numbers:
+        return (strength - p[A] * log_slip_rate - sum_of_others(others), *others)
 
     return left_by_others

@@ -32,40 +32,42 @@ _SLOWEST = -1e6
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady sliding at ln(V/V_*) = `log_rate`.
+    """Steady sliding at ln(V/V_*) = `log_slip_rate`.
 
     Attributes
     ----------
-    log_rate : float
-    friction, spring : float
+    log_slip_rate : float
+    friction, spring_stress : float
         Deviations of frictional stress and of spring stress from tau_*, over sigma_*.
     psis : tuple of float
         States freed of stress.
     """
 
-    log_rate: float
+    log_slip_rate: float
     friction: float
-    spring: float
+    spring_stress: float
     psis: Numbers
 
 
 @once
-def steady_sliding(scene: Scene, log_rate: float) -> Steady | None:
+def steady_sliding(scene: Scene, log_slip_rate: float) -> Steady | None:
     """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
     strong.
     """
-    friction = stress_at(scene, steady_excess(scene, log_rate))
+    friction = stress_at(scene, steady_excess(scene, log_slip_rate))
     if friction is None:
         return None
-    spring = friction + scene.dynamics.radiated(log_rate)
+    spring_stress = friction + scene.dynamics.radiated(log_slip_rate)
     shift = relation_of(scene)(friction)[2]
-    return Steady(log_rate, friction, spring, steady_states_of(scene, log_rate, shift))
+    return Steady(
+        log_slip_rate, friction, spring_stress, steady_states_of(scene, log_slip_rate, shift)
+    )
 
 
-def steady_excess(scene: Scene, log_rate: float) -> float:
+def steady_excess(scene: Scene, log_slip_rate: float) -> float:
     """Steady friction coefficient at ln(V/V_*), less mu_*: (a - b) ln(V/V_*) by most laws."""
-    psi = scene.functions.friction.state_sum(steady_states_of(scene, log_rate, 0.0))
-    return float(scene.a * log_rate + psi)
+    psi = scene.functions.friction.state_sum(steady_states_of(scene, log_slip_rate, 0.0))
+    return float(scene.a * log_slip_rate + psi)
 
 
 def stress_at(scene: Scene, excess: float) -> float | None:

@@ -57,7 +57,7 @@ STEEP = 1e9
 Ratios = tuple[float, float, float]
 
 
-def velocity_ratios(log_rate: float, p: Numbers) -> Ratios:
+def velocity_ratios(log_slip_rate: float, p: Numbers) -> Ratios:
     """ln(V/V_*), V_0/V, and the fraction V/(V + V_0) that slip has in slip and load point
     displacement together.
 
@@ -65,7 +65,7 @@ def velocity_ratios(log_rate: float, p: Numbers) -> Ratios:
     unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
     factors would underflow and overflow.
     """
-    x = max(log_rate, p[LOG_LOAD_RATE] - STATIONARY)
+    x = max(log_slip_rate, p[LOG_LOAD_RATE] - STATIONARY)
     slower = math.exp(p[LOG_LOAD_RATE] - x)
     return x, slower, 1.0 / (1.0 + slower)
 
@@ -98,8 +98,8 @@ def against_displacement(made: Friction, balance: Function, *, reverses: bool) -
 
     def forward(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
         psis = state[1:end]
-        log_rate, _g, shift = balance(state[0], psis, p)
-        ratios = velocity_ratios(log_rate, p)
+        log_slip_rate, _g, shift = balance(state[0], psis, p)
+        ratios = velocity_ratios(log_slip_rate, p)
         x, slower, fraction = ratios
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         return loading, evolutions(x, psis, shift, fraction, p), ratios
@@ -189,7 +189,7 @@ def reading_of(made: Friction) -> Function:
     imposed, imposed_change = made.imposed, made.imposed_change
 
     def reading(
-        spring: float,
+        spring_stress: float,
         spring_change: float,
         g: float,
         g_change: float,
@@ -200,7 +200,7 @@ def reading_of(made: Friction) -> Function:
         excess, slope = stress(g, psis, p)
         pushed = imposed_change(changes)
         ratio, ratio_change = 1.0 + excess, slope * (g_change + pushed) - pressure(changes)
-        read = (p[MU_STAR] + spring + imposed(psis, p)) / ratio
+        read = (p[MU_STAR] + spring_stress + imposed(psis, p)) / ratio
         return read, (spring_change + pushed - read * ratio_change) / ratio
 
     return reading
@@ -215,7 +215,7 @@ def point_of(made: Friction) -> Function:
     def point_at(
         x: float,
         growth: float,
-        spring: float,
+        spring_stress: float,
         g: float,
         psis: Numbers,
         reading: tuple[float, float],
@@ -230,7 +230,7 @@ def point_of(made: Friction) -> Function:
         return Point(
             x,
             growth,
-            spring,
+            spring_stress,
             g,
             psi,
             psi - shift,
@@ -256,13 +256,13 @@ def point_between_ruptures(
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         unknowns, changes = state[:end], rates[1:end]
-        spring, psis = unknowns[0], unknowns[1:]
-        x, g, _shift = balance(spring, psis, p)
+        spring_stress, psis = unknowns[0], unknowns[1:]
+        x, g, _shift = balance(spring_stress, psis, p)
         x_change = growth(unknowns, rates[:end], x, g, p)
         slope = strength(g, psis, p)[1]
         g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
-        read = reading(spring, rates[0], g, g_change, psis, changes, p)
-        now: Point = point_at(x, x_change, spring, g, psis, read, p)
+        read = reading(spring_stress, rates[0], g, g_change, psis, changes, p)
+        now: Point = point_at(x, x_change, spring_stress, g, psis, read, p)
         return now
 
     return point
@@ -273,10 +273,10 @@ def point_in_rupture(made: Friction, reading: Function, point_at: Function) -> F
     strength, states_at, end = made.strength, made.states_at, 2 + made.states
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
-        spring, x, g, others = state[0], state[1], state[2], state[3:end]
+        spring_stress, x, g, others = state[0], state[1], state[2], state[3:end]
         psis = states_at(strength(g, others, p)[0], x, others, p)
-        read = reading(spring, rates[0], g, rates[2], psis, rates[:end], p)
-        now: Point = point_at(x, rates[1], spring, g, psis, read, p)
+        read = reading(spring_stress, rates[0], g, rates[2], psis, rates[:end], p)
+        now: Point = point_at(x, rates[1], spring_stress, g, psis, read, p)
         return now
 
     return point

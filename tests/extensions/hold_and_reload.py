@@ -45,10 +45,10 @@ class PeakAfterRest(Measure):
         return Outcome(Status.OK, values)
 
     def read(self, scene, accuracy, meter):
-        motion = follow(scene, accuracy, meter, [maximum("spring")])
+        motion = follow(scene, accuracy, meter, [maximum("spring_stress")])
         reload = next(event for event in motion if event.kind is Kind.SEGMENT)
         peak = next(event for event in motion if event.kind is Kind.MAXIMUM)
-        return reload.point.spring, peak.point.spring
+        return reload.point.spring_stress, peak.point.spring_stress
 
 
 study = Study(

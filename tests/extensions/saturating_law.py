@@ -13,9 +13,9 @@ from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import LAW
 
 
-def evolution(log_rate, state, p):
+def evolution(log_slip_rate, state, p):
     b, sharpness = p[LAW], p[LAW + 1]
-    ahead = state / b + log_rate
+    ahead = state / b + log_slip_rate
     if sharpness == 0.0:
         return -b * ahead
     return -b * math.tanh(sharpness * ahead) / sharpness

@@ -14,9 +14,9 @@ from rsfstudy.slider.places import LAW
 FARTHEST = 300.0
 
 
-def evolution(log_rate, state, p):
+def evolution(log_slip_rate, state, p):
     b = p[LAW]
-    return -0.5 * b * math.sinh(2.0 * max(-FARTHEST, min(state / b + log_rate, FARTHEST)))
+    return -0.5 * b * math.sinh(2.0 * max(-FARTHEST, min(state / b + log_slip_rate, FARTHEST)))
 
 
 @dataclass(frozen=True, kw_only=True)

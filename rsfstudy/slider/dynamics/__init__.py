@@ -37,15 +37,15 @@ class Dynamics(Part):
     def functions(cls) -> tuple[str, ...]:
         return ("slip_rate",)
 
-    def radiated(self, log_rate: float) -> float:
+    def radiated(self, log_slip_rate: float) -> float:
         """Part of the spring stress that waves carry away at ln(V/V_*), over sigma_*."""
         return 0.0
 
-    def damping(self, log_rate: float) -> float:
+    def damping(self, log_slip_rate: float) -> float:
         """Derivative of the radiated stress with respect to ln V."""
         return 0.0
 
-    def norm(self, scene: Scene, log_rate: float) -> float:
+    def norm(self, scene: Scene, log_slip_rate: float) -> float:
         """w = V T/(2 pi D_c) where mass acts, and 0 where there is none."""
         return 0.0
 

@@ -44,62 +44,64 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     strength, state_sum, evolutions = friction.strength, friction.state_sum, friction.evolutions
     contribution, ahead = friction.contribution, moved(friction.states)
 
-    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-        g = spring - resistance(spring, psis, p)
+    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+        g = spring_stress - resistance(spring_stress, psis, p)
         value, _slope, shift, _shift_slope = strength(g, psis, p)
         return (value - state_sum(psis)) / p[A], g, shift
 
-    def resistance(spring: float, psis: Numbers, p: Numbers) -> float:
+    def resistance(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """The stress that accelerates the mass, over sigma_*."""
-        x, growing, slope, weight = without_mass(spring, psis, p)
+        x, growing, slope, weight = without_mass(spring_stress, psis, p)
         first = resisted(weight, growing, p)
         if weight <= LIGHT:
             return first
         trails = slope * first / p[A]
         slowed, slower, fraction = velocity_ratios(x - trails, p)
-        shift = strength(spring - first, psis, p)[2]
+        shift = strength(spring_stress - first, psis, p)[2]
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         changes = evolutions(slowed, psis, shift, fraction, p)
-        growing = (slope * loading - contribution(changes, spring, psis, p)) / p[A]
+        growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / p[A]
         _x, growing_ahead, slope_ahead, weight_ahead = without_mass(
-            spring + AHEAD * loading, ahead(psis, changes, AHEAD), p
+            spring_stress + AHEAD * loading, ahead(psis, changes, AHEAD), p
         )
         trails_ahead = slope_ahead * resisted(weight_ahead, growing_ahead, p) / p[A]
         return resisted(weight_at(slowed, slower, p), growing - (trails_ahead - trails) / AHEAD, p)
 
-    def without_mass(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+    def without_mass(
+        spring_stress: float, psis: Numbers, p: Numbers
+    ) -> tuple[float, float, float, float]:
         """ln(V/V_*) and its growth, both quasi-static, the slope of strength, and the weight of
         mass there.
         """
         a = p[A]
-        value, slope, shift, _shift_slope = strength(spring, psis, p)
+        value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
         x = (value - state_sum(psis)) / a
         clamped, slower, fraction = velocity_ratios(x, p)
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         changes = evolutions(clamped, psis, shift, fraction, p)
-        growing = (slope * loading - contribution(changes, spring, psis, p)) / a
+        growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / a
         return x, growing, slope, weight_at(x, slower, p)
 
-    def trailing(spring: float, psis: Numbers, p: Numbers) -> float:
+    def trailing(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """ln V on the slow manifold less its quasi-static value; a difference of both would leave
         rounding errors that show in its growth.
         """
-        taken = resistance(spring, psis, p)
-        slope: float = strength(spring - 0.5 * taken, psis, p)[1]
+        taken = resistance(spring_stress, psis, p)
+        slope: float = strength(spring_stress - 0.5 * taken, psis, p)[1]
         return -slope * taken / p[A]
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         """The quasi-static one along the motion, and the change of what ln V differs by from its
         quasi-static value: without that, slip would be fastest ``(K/a) w**2`` D_c too early.
         """
-        spring, psis = state[0], state[1:]
-        slope = strength(spring, psis, p)[1]
-        change: float = slope * rates[0] - contribution(rates[1:], spring, psis, p)
+        spring_stress, psis = state[0], state[1:]
+        slope = strength(spring_stress, psis, p)[1]
+        change: float = slope * rates[0] - contribution(rates[1:], spring_stress, psis, p)
         quasi_static = change / p[A]
         if weight_at(x, velocity_ratios(x, p)[1], p) <= LIGHTER:
             return quasi_static
-        then = trailing(spring + AHEAD * rates[0], ahead(psis, rates[1:], AHEAD), p)
-        return quasi_static + (then - trailing(spring, psis, p)) / AHEAD
+        then = trailing(spring_stress + AHEAD * rates[0], ahead(psis, rates[1:], AHEAD), p)
+        return quasi_static + (then - trailing(spring_stress, psis, p)) / AHEAD
 
     return balance, growth
 
@@ -137,13 +139,13 @@ def rupture_rate(friction: Friction) -> Function:
     evolutions, contribution = friction.evolutions, friction.contribution
 
     def rates(state: Numbers, p: Numbers) -> Numbers:
-        spring, x, g, others = state[0], state[1], state[2], state[3:]
+        spring_stress, x, g, others = state[0], state[1], state[2], state[3:]
         a, stiffness = p[A], p[STIFFNESS]
         norm = math.exp(
             max(min(x + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE), -LARGEST_LOG_SLIP_RATE)
         )
         value, slope, shift, _shift_slope = strength(g, others, p)
-        faster = bounded((spring - g) / (stiffness * norm))
+        faster = bounded((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
         return (
             bounded(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
@@ -180,8 +182,8 @@ class Inertia(Dynamics):
         """T V_*/(2 pi D_c) and its logarithm."""
         return scene.inertial_time, math.log(scene.inertial_time)
 
-    def norm(self, scene: Scene, log_rate: float) -> float:
-        return scene.inertial_time * math.exp(log_rate)
+    def norm(self, scene: Scene, log_slip_rate: float) -> float:
+        return scene.inertial_time * math.exp(log_slip_rate)
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

@@ -17,9 +17,9 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     strength, state_sum = friction.strength, friction.state_sum
     contribution = friction.contribution
 
-    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-        value, _slope, shift, _shift_slope = strength(spring, psis, p)
-        return (value - state_sum(psis)) / p[A], spring, shift
+    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+        value, _slope, shift, _shift_slope = strength(spring_stress, psis, p)
+        return (value - state_sum(psis)) / p[A], spring_stress, shift
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         psis = state[1:]

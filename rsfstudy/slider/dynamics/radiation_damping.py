@@ -23,12 +23,12 @@ _BALANCED = 1e-6
 _FASTEST = 690.0
 
 
-def radiated(log_rate: float, damping: float) -> float:
+def radiated(log_slip_rate: float, damping: float) -> float:
     """Stress that waves carry away, over sigma_*: ``eta (V - V_*)``, so that it vanishes at V_*.
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     damping : float
         eta V_*/sigma_*; for an elastic half-space eta = G/(2 c_s).
@@ -37,7 +37,7 @@ def radiated(log_rate: float, damping: float) -> float:
     ----------
     Rice (1993), J. Geophys. Res. 98, 9885-9907.
     """
-    return damping * math.expm1(log_rate)
+    return damping * math.expm1(log_slip_rate)
 
 
 def slip_rate(friction: Friction) -> tuple[Function, Function]:
@@ -52,15 +52,18 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     strength, state_sum = friction.strength, friction.state_sum
     contribution = friction.contribution
 
-    def balance(spring: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
+    def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
         # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
-        low, high = -math.inf, min((strength(spring + damping, psis, p)[0] - psi) / a, _FASTEST)
+        low, high = (
+            -math.inf,
+            min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _FASTEST),
+        )
         # a good guess where radiation takes most of the stress
         x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
         before = math.inf
         for _ in range(_MOST_ITERATIONS):
-            g = spring - damping * math.expm1(x)
+            g = spring_stress - damping * math.expm1(x)
             value, slope, shift, _shift_slope = strength(g, psis, p)
             missing = value - psi - a * x
             if missing > 0.0:
@@ -79,7 +82,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
                 x = 0.5 * (max(low, high - 1e3) + high)
             else:
                 x += change
-        g = spring - damping * math.expm1(x)
+        g = spring_stress - damping * math.expm1(x)
         return x, g, strength(g, psis, p)[2]
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
@@ -118,8 +121,8 @@ class RadiationDamping(Dynamics):
         """eta V_*/sigma_*."""
         return (self.radiation_damping,)
 
-    def radiated(self, log_rate: float) -> float:
-        return radiated(log_rate, self.radiation_damping)
+    def radiated(self, log_slip_rate: float) -> float:
+        return radiated(log_slip_rate, self.radiation_damping)
 
-    def damping(self, log_rate: float) -> float:
-        return self.radiation_damping * math.exp(log_rate)
+    def damping(self, log_slip_rate: float) -> float:
+        return self.radiation_damping * math.exp(log_slip_rate)

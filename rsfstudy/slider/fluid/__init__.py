@@ -20,9 +20,9 @@ class Fluid(Part):
 
     A case with unknowns of its own says what they are, pore pressure P last, and states
 
-    - ``auxiliary_rates(log_rate, states, share, p)``: their changes per unit slip in D_c, times a
-      share;
-    - ``auxiliary_steady_states(log_rate, p)``: what they are in steady sliding, where P is 0.
+    - ``auxiliary_rates(log_slip_rate, states, share, p)``: their changes per unit slip in D_c,
+      times a share;
+    - ``auxiliary_steady_states(log_slip_rate, p)``: what they are in steady sliding, where P is 0.
     """
 
     conclusions = ("highest_pressure",)
@@ -31,13 +31,13 @@ class Fluid(Part):
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
 
-    def highest_pressure(self, log_rate: float, states: Numbers) -> float:
-        """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_rate`; infinite where
-        none is known.
+    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+        """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite
+        where none is known.
 
         Parameters
         ----------
-        log_rate : float
+        log_slip_rate : float
             ln(V/V_*).
         states : tuple of float
             The unknowns of the fluid now.

@@ -25,10 +25,10 @@ def with_surroundings(rates: Function) -> Function:
     ``dP/dt = c* (R - P) - (dphi/dt)/beta``; what it says of the changes holds for P itself.
     """
 
-    def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-        time = share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+        time = share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
         own = (*states[1:-1], states[-1] - states[0])
-        return (-p[RECHARGE] * time, *rates(log_rate, own, share, p))
+        return (-p[RECHARGE] * time, *rates(log_slip_rate, own, share, p))
 
     return auxiliary_rates
 
@@ -37,8 +37,8 @@ def with_surroundings(rates: Function) -> Function:
 def with_surroundings_at_rest(steady_states: Function) -> Function:
     """The same in steady sliding before the loading: pressures are counted from there."""
 
-    def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
-        return (0.0, *steady_states(log_rate, p))
+    def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
+        return (0.0, *steady_states(log_slip_rate, p))
 
     return auxiliary_steady_states
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Changes of porosity and of pore pressure per unit slip in D_c, times a share.
 
     ``D_c dphi/d(delta) = -(phi - phi_0 - eps ln(V/V_*))`` and ``dp/dt = c* (p_inf - p) -
@@ -26,7 +26,7 @@ def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) 
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     states : tuple of float
         Porosity (phi - phi_0)/(beta sigma_*), and pore pressure P.
@@ -40,14 +40,14 @@ def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) 
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     porosity, pressure = states
-    opening = share * (p[FLUID] * log_rate - porosity)
-    time = share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    opening = share * (p[FLUID] * log_slip_rate - porosity)
+    time = share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
-def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
     """Porosity of steady sliding, and no pore pressure: phi = phi_0 + eps ln(V/V_*)."""
-    return p[FLUID] * log_rate, 0.0
+    return p[FLUID] * log_slip_rate, 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,12 +101,12 @@ class Dilatant(Fluid):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
             raise self.invalid("drainage", rule, "Give stiffness itself, or raise drainage.")
 
-    def highest_pressure(self, log_rate: float, states: Numbers) -> float:
+    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Pores close by ``V (phi - phi_0 - eps ln(V/V_*))`` at most, which drainage holds at a
         pressure of that over c*.
         """
-        closing = max(states[0] - self.dilatancy * log_rate, self.dilatancy)
-        return max(states[1], math.exp(log_rate) * closing / self.drainage)
+        closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
+        return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)
 
     @property
     def effects(self) -> tuple[str, ...]:

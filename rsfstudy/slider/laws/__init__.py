@@ -46,13 +46,13 @@ def cutoff_velocity() -> Any:
 class LawOfStates(Part):
     """Base of all laws; one with a single b is derived from `Law`.
 
-    A law states ``evolution(log_rate, state, p)``: the change of its state variable per unit of
-    slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
-    states ``steady_states(log_rate, shift, p)``: the states Psi of steady sliding, of which stress
-    has taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
+    A law states ``evolution(log_slip_rate, state, p)``: the change of its state variable per unit
+    of slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
+    states ``steady_states(log_slip_rate, shift, p)``: the states Psi of steady sliding, of which
+    stress has taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
 
-    A law of several states says how many (``states = 3``), and states ``evolutions(log_rate, psis,
-    shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
+    A law of several states says how many (``states = 3``), and states ``evolutions(log_slip_rate,
+    psis, shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
     `steady_states`. Both say how much of the shift each state has; the parts add up to all of it.
     What the states together have for b it says as `b_over_a`, a field or a property;
     `two_slip_states` is an example.
@@ -141,11 +141,12 @@ class Law(LawOfStates):
 
     What one writes, a plain function of floats, kept as ``evolution = staticmethod(evolution)``::
 
-        evolution(log_rate, state, p) -> float
+        evolution(log_slip_rate, state, p) -> float
 
-    It returns dTheta per unit of slip in D_c, at constant normal stress. `log_rate` is ln(V/V_*)
-    and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`); numbers of the law's own
-    follow it. A law that has some adds fields, by `rsfstudy.slider.parts.number`, and::
+    It returns dTheta per unit of slip in D_c, at constant normal stress. `log_slip_rate` is
+    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`); numbers of
+    the law's own follow it. A law that has some adds fields, by `rsfstudy.slider.parts.number`,
+    and::
 
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 FIRST, SECOND, OF_FIRST, OF_SECOND, OVER = range(LAW, LAW + 5)
 
 
-def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """The states of steady sliding, ``Psi_i = c_i shift - b_i ln(V/V_*)``, c_i being the shares."""
     return (
-        p[OF_FIRST] * shift - p[FIRST] * log_rate,
-        p[OF_SECOND] * shift - p[SECOND] * log_rate,
+        p[OF_FIRST] * shift - p[FIRST] * log_slip_rate,
+        p[OF_SECOND] * shift - p[SECOND] * log_slip_rate,
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 STEPS = 4
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``dtheta/dt = exp(-V/V_c) - (theta V/D_c) ln(theta V/D_c)`` reads, with u = ln(theta V/D_c),
@@ -28,7 +28,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta.
@@ -45,19 +45,19 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Kato and Tullis (2001), Geophys. Res. Lett. 28, 1103-1106.
     """
     b = p[LAW]
-    ahead = state / b + log_rate + p[LAW + 2]
-    return b * (share_of_healing(log_rate, p[LAW + 1]) * math.exp(bounded(-ahead)) - ahead)
+    ahead = state / b + log_slip_rate + p[LAW + 2]
+    return b * (share_of_healing(log_slip_rate, p[LAW + 1]) * math.exp(bounded(-ahead)) - ahead)
 
 
-def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, where ``u exp(u) = exp(-V/V_c)``."""
-    ahead = lambert_w(share_of_healing(log_rate, p[LAW + 1]))
-    return (shift + p[LAW] * (ahead - p[LAW + 2] - log_rate),)
+    ahead = lambert_w(share_of_healing(log_slip_rate, p[LAW + 1]))
+    return (shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
-def share_of_healing(log_rate: float, log_cutoff: float) -> float:
+def share_of_healing(log_slip_rate: float, log_cutoff: float) -> float:
     """``exp(-V/V_c)``."""
-    return math.exp(-math.exp(bounded(log_rate - log_cutoff)))
+    return math.exp(-math.exp(bounded(log_slip_rate - log_cutoff)))
 
 
 def bounded(exponent: float) -> float:

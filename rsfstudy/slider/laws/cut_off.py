@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     Friction is ``mu_* + a ln(V/V_*) + b ln(1 + theta V_c/D_c)``, less its last term in steady
@@ -24,7 +24,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta.
@@ -41,23 +41,23 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Okubo (1989), J. Geophys. Res. 94, 12321-12335.
     """
     b = p[LAW]
-    behind = steady_over_b(log_rate, p[LAW + 1], p[LAW + 2]) - state / b
+    behind = steady_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
     return b * exp_less_one(min(behind, LARGEST_EXPONENT))
 
 
-def steady_states(log_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
-    return (shift + p[LAW] * steady_over_b(log_rate, p[LAW + 1], p[LAW + 2]),)
+    return (shift + p[LAW] * steady_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
 
 
-def steady_over_b(log_rate: float, healing: float, cut: float) -> float:
+def steady_over_b(log_slip_rate: float, healing: float, cut: float) -> float:
     """``ln(healing V_*/V + cut)``, which adds up to 0 at V_*: in each direction the form of which
     no digits are lost, and exponents that overflow are left out of it.
     """
-    if log_rate < 0.0:
-        exponent = min(-log_rate, LARGEST_EXPONENT)
-        return math.log1p(healing * math.expm1(exponent)) - log_rate - exponent
-    exponent = min(log_rate, LARGEST_EXPONENT)
+    if log_slip_rate < 0.0:
+        exponent = min(-log_slip_rate, LARGEST_EXPONENT)
+        return math.log1p(healing * math.expm1(exponent)) - log_slip_rate - exponent
+    exponent = min(log_slip_rate, LARGEST_EXPONENT)
     return math.log1p(cut * math.expm1(exponent)) - exponent
 
 

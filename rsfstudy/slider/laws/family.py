@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``D_c dTheta/d(delta) = b expm1[-eps (Theta/b + ln(V/V_*))]/eps``: the slowness law at eps = 1
@@ -22,7 +22,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta.
@@ -40,8 +40,10 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     """
     b, exponent = p[LAW], p[LAW + 1]
     if exponent == 0.0:
-        return -(state + b * log_rate)
-    return b * exp_less_one(min(-exponent * (state / b + log_rate), LARGEST_EXPONENT)) / exponent
+        return -(state + b * log_slip_rate)
+    return (
+        b * exp_less_one(min(-exponent * (state / b + log_slip_rate), LARGEST_EXPONENT)) / exponent
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

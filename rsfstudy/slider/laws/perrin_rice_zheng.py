@@ -14,7 +14,7 @@ from rsfstudy.slider.places import LAW
 FARTHEST_ABOVE = 300.0
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``dtheta/dt = 1 - [V theta/(2 D_c)]**2`` with ``Theta = b ln[theta V_*/(2 D_c)]``, which is 0 in
@@ -23,7 +23,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta.
@@ -40,7 +40,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Perrin, Rice and Zheng (1995), J. Mech. Phys. Solids 43, 1461-1495.
     """
     b = p[LAW]
-    return -b * math.sinh(max(-LARGEST_EXPONENT, min(state / b + log_rate, FARTHEST_ABOVE)))
+    return -b * math.sinh(max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, FARTHEST_ABOVE)))
 
 
 def relaxation(rate: float, slip: float) -> float:

@@ -10,14 +10,14 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import LAW
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``D_c dTheta/d(delta) = -(Theta + b ln(V/V_*))``
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta.
@@ -34,7 +34,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Ruina (1983), J. Geophys. Res. 88; Linker and Dieterich (1992), J. Geophys. Res. 97 (first term
     of their evolution law).
     """
-    return -(state + p[LAW] * log_rate)
+    return -(state + p[LAW] * log_slip_rate)
 
 
 def relaxation(rate: float, slip: float) -> float:

@@ -10,7 +10,7 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import LAW
 
 
-def evolution(log_rate: float, state: float, p: Numbers) -> float:
+def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """Evolution of the state variable per unit slip at constant normal stress.
 
     ``dtheta/dt = 1 - theta V/D_c`` with ``Theta = b ln(theta V_*/D_c)`` reads, per unit slip,
@@ -19,7 +19,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     state : float
         State variable Theta = b ln(theta/theta_*).
@@ -36,7 +36,7 @@ def evolution(log_rate: float, state: float, p: Numbers) -> float:
     Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
     """
     b = p[LAW]
-    return b * exp_less_one(min(-(state / b + log_rate), LARGEST_EXPONENT))
+    return b * exp_less_one(min(-(state / b + log_slip_rate), LARGEST_EXPONENT))
 
 
 def relaxation(rate: float, slip: float) -> float:

@@ -8,14 +8,16 @@ from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, S
 from rsfstudy.slider.parts import Numbers
 
 
-def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
+def evolutions(
+    log_slip_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+) -> Numbers:
     """Evolution of the two states per unit slip at constant normal stress, times a share.
 
     ``L_i dTheta_i/d(delta) = -(Theta_i + b_i ln(V/V_*))``
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     psis : tuple of float
         States freed of stress.
@@ -31,8 +33,8 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
     """
-    first = psis[0] - p[OF_FIRST] * shift + p[FIRST] * log_rate
-    second = psis[1] - p[OF_SECOND] * shift + p[SECOND] * log_rate
+    first = psis[0] - p[OF_FIRST] * shift + p[FIRST] * log_slip_rate
+    second = psis[1] - p[OF_SECOND] * shift + p[SECOND] * log_slip_rate
     return -share * first, -share * p[OVER] * second
 
 

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Numbers) -> Numbers:
+def evolutions(
+    log_slip_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+) -> Numbers:
     """Evolution of the two states per unit slip at constant normal stress, times a share.
 
     ``dtheta_i/dt = 1 - theta_i V/L_i`` with ``Theta_i = b_i ln(theta_i V_*/L_i)`` reads, per unit
@@ -22,7 +24,7 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     psis : tuple of float
         States freed of stress.
@@ -38,8 +40,8 @@ def evolutions(log_rate: float, psis: Numbers, shift: float, share: float, p: Nu
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
     """
-    first = (psis[0] - p[OF_FIRST] * shift) / p[FIRST] + log_rate
-    second = (psis[1] - p[OF_SECOND] * shift) / p[SECOND] + log_rate
+    first = (psis[0] - p[OF_FIRST] * shift) / p[FIRST] + log_slip_rate
+    second = (psis[1] - p[OF_SECOND] * shift) / p[SECOND] + log_slip_rate
     return (
         share * p[FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
         share * p[OVER] * p[SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),

@@ -62,7 +62,7 @@ def cycles() -> Any:
     )
 
 
-def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
     and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
 
@@ -71,7 +71,7 @@ def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) 
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     states : tuple of float
         y and P.
@@ -81,13 +81,13 @@ def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) 
         omega D_c/V_* at LOADING, and A behind it.
     """
     ahead, relief = states
-    turn = p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS))
+    turn = p[LOADING] * share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
 
 
-def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
     """No oscillation in steady sliding."""
     return 0.0, 0.0
 

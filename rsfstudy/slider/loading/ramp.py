@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import Scene
 
 
-def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
+def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Change of P per unit slip in D_c, times a share: at a steady rate in time, by which it goes
     to 0 from all that normal stress is yet to change by.
 
     Parameters
     ----------
-    log_rate : float
+    log_slip_rate : float
         ln(V/V_*).
     states : tuple of float
         P.
@@ -30,10 +30,10 @@ def auxiliary_rates(log_rate: float, states: Numbers, share: float, p: Numbers) 
     p : tuple of float
         Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
     """
-    return (-p[LOADING] * share * math.exp(min(-log_rate, LARGEST_SLOWNESS)),)
+    return (-p[LOADING] * share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS)),)
 
 
-def auxiliary_steady_states(log_rate: float, p: Numbers) -> Numbers:
+def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
     """Nothing is left to change in steady sliding."""
     return (0.0,)
 

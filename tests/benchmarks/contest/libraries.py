@@ -171,7 +171,7 @@ class Sundae:
     def run(self, problems: list[Problem], tolerance: float) -> Found:
         """One cycle of each problem."""
         return [
-            self._cycle(it.begin.spring, it.begin.psis[0], it.p, it.marks, tolerance)
+            self._cycle(it.begin.spring_stress, it.begin.psis[0], it.p, it.marks, tolerance)
             for it in problems
         ]
 

@@ -97,7 +97,7 @@ def problem(scene: Scene) -> Problem:
     mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_rate
     common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
     slow = between_ruptures(scene, clock=True)
-    passing = slow.rates((begin.spring, *begin.psis, 0.0))[-1]
+    passing = slow.rates((begin.spring_stress, *begin.psis, 0.0))[-1]
     return Problem(
         scene=scene,
         begin=begin,
@@ -119,9 +119,9 @@ def marked(it: Problem, rtol: float) -> Problem:
         if event.kind is Kind.REGIME:
             entering = event.regime == IN_RUPTURE
             passed["leave" if entering else "land"] = event.time
-            passed["landed"] = event.point.spring
+            passed["landed"] = event.point.spring_stress
         elif event.kind is Kind.FALL and event.time > 0.0:
-            passed["fall"], passed["lowest"] = event.time, event.point.spring
+            passed["fall"], passed["lowest"] = event.time, event.point.spring_stress
         elif event.kind is Kind.RISE and "fall" in passed:
             break
     loaded = scene.stiffness * scene.load_velocity * (passed["land"] - passed["fall"])
@@ -140,7 +140,7 @@ def marked(it: Problem, rtol: float) -> Problem:
 def paths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
     """How long the path is in each of the three stretches of a cycle."""
     lengths, regime, load = list[float](), "", scene.log_load_rate
-    watches = rise("log_rate", load), settling(2.0)
+    watches = rise("log_slip_rate", load), settling(2.0)
     for event in follow(scene, accuracy, meter("scipy"), watches, start=begin, clock=True):
         if event.regime != regime:
             regime = event.regime
@@ -275,7 +275,7 @@ def through(
 
 def arrays(problems: list[Problem]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Spring stress and state at the beginning, numbers and marks: problems in the last place."""
-    starts = np.array([(it.begin.spring, it.begin.psis[0]) for it in problems]).T
+    starts = np.array([(it.begin.spring_stress, it.begin.psis[0]) for it in problems]).T
     marks = [it.marks for it in problems]
     p = np.ascontiguousarray(np.array([it.p for it in problems]).T)
     return starts[0].copy(), starts[1].copy(), p, np.ascontiguousarray(np.array(marks).T)
