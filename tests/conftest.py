@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import importlib
 import math
 import os
 import sys
@@ -25,6 +26,9 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
+# a console keeps the width that it is made with
+os.environ.pop("COLUMNS", None)
+importlib.import_module("rsfstudy.cli.console")
 # a hundred processes that tests start would compile the package to bytecode, a second each
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

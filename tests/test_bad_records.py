@@ -102,8 +102,8 @@ def test_what_a_record_does_not_tell(
         found = fitted(record, free=FOUR, **options).isel(law=0)
     assert found.status.item() == Status.NOT_IDENTIFIED
     assert told in found.message.item()
-    # of the 5e7 that a fit may spend
-    assert found.rhs_evaluations.item() < 1e7
+    # of the 5e7 that a fit may spend; on a stiff spring a motion may take 150,000
+    assert found.rhs_evaluations.item() < 3e7
     # of what has no bounds no end is nearer than the standard error, though others are at bounds
     ends = np.array([found.mu_star_low.item(), found.mu_star_high.item()])
     assert not (np.abs(ends - found.mu_star.item()) < found.mu_star_stderr.item()).any()

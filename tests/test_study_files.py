@@ -69,7 +69,7 @@ def test_a_measure_of_the_file_reaches_the_workers(tmp_path, cluster):
         written(tmp_path, OWN_MEASURE), client=cluster, output=tmp_path, progress=False
     )
     assert (dataset.status == 0).all(), dataset.message.values
-    assert float(dataset.spring_stress[0]) == rsfstudy.Scene(phi=55).stiffness
+    assert float(dataset.spring[0]) == rsfstudy.Scene(phi=55).stiffness
     assert "study_file_mine" not in sys.modules
 
 

@@ -76,8 +76,8 @@ class Profile:
         """
         moved = coordinate - self.best[self.place]
         parabola = float(moved / self.spread) ** 2
-        if not parabola:
-            return 0.0
+        if not parabola or self.found.untold:  # what is not told leads nowhere
+            return parabola
         x = np.clip(self.best + moved * self.along, self.search.low, self.search.high)
         x[self.place] = coordinate
         nearly = self._to_first_order(x)

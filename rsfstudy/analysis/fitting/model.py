@@ -74,7 +74,7 @@ _SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: Right-hand sides of a motion, and of each piece of its loading, beyond which it fits no record:
 #: those that do take some thousands, and some twenty a piece. A spring that is stiff for its direct
 #: effect takes 2 k x/a, x being the displacement of the window: of twice that so many at most.
-_MOST, _MOST_EACH, _MOST_STIFF = 50_000, 60, 500_000
+_MOST, _MOST_EACH, _MOST_STIFF = 50_000, 60, 100_000
 
 
 def check_free(free: Sequence[str]) -> None:

@@ -216,8 +216,11 @@ class Search:
             return -noise.whitened(derivatives["last"]) / scale
 
         scale = 1.0
-        scale = math.sqrt(float(np.square(left(x)).mean())) or 1.0
         inner = np.clip(x, self.low + 1e-9, self.high - 1e-9)
+        scale = math.sqrt(float(np.square(left(inner)).mean())) or 1.0
+        if not math.isfinite(scale):  # next to what can be followed: there is no better neighbour
+            self.has_ended = True
+            return x, self._jacobian(x, QUICK)
         found = least_squares(
             left,
             inner,
@@ -265,7 +268,7 @@ class Search:
         variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
         band = np.sqrt(np.maximum(variances, 0.0))  # rounding, where a parameter is not told
         criterion = _criterion(innovations, noise, len(x))
-        steps = self._criterion_without_steps(jacobian) - criterion > _DECIDES
+        steps = self._criterion_without_steps(jacobian, noise) - criterion > _DECIDES
         return Fitted(
             values=values,
             free=self.free,
@@ -283,16 +286,14 @@ class Search:
             untold=self._untold(x, values, covariance, steps),
         )
 
-    def _criterion_without_steps(self, jacobian: np.ndarray) -> float:
-        """The criterion of trends alone (a = b = 0), with noise of their own."""
+    def _criterion_without_steps(self, jacobian: np.ndarray, noise: Noise) -> float:
+        """The criterion of trends alone (a = b = 0), with the noise of the fit: noise of their own
+        would take the response to a step for noise that can be predicted.
+        """
         linear = [self.model.is_linear(name) for name in self.free]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])
         if not any(name.startswith("mu_star") for name in self.free):
             columns = np.insert(columns, 0, 1.0, axis=1)
-        noise = noises.white(self.model.time)
-        for _ in range(2):
-            left = columns[:, -1] - columns[:, :-1] @ _solved(noise.whitened(columns))
-            noise = noises.fitted(self.name, self.model.time, left, columns[:, :-1])
         whitened = noise.whitened(columns)
         innovations = whitened[:, -1] - whitened[:, :-1] @ _solved(whitened)
         return _criterion(innovations, noise, columns.shape[1] - 1)
