@@ -164,7 +164,8 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (
-            "Say which is which: columns={'time': ('t', 's'), 'displacement': ('lp', 'um'), ...}."
+            "Say which is which: --columns 'time=t (s),displacement=lp (um),friction=mu', or "
+            "columns={'time': 't (s)', 'displacement': 'lp (um)', 'friction': 'mu'}."
         )
         rule = "does not name time and displacement"
         raise InvalidValue("header", header.strip()[:200], rule, remedy=remedy).at(
