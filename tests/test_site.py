@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from rsfstudy import reduce
 from rsfstudy.api.accessor import Accessor
 from rsfstudy.cli.command_line import cli
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.slider import registry
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES
 
@@ -107,6 +109,14 @@ def test_nothing_is_loaded_from_the_net(pages):
 
 def test_nothing_is_left_to_be_made(pages):
     assert not [file.name for file in pages if "<!-- made:" in file.read_text()]
+
+
+def test_examples_make_what_they_stand_beside():
+    made = runpy.run_path(str(ROOT / "studies" / "pages" / "_made.py"))
+    for slot in registry.SLOTS:
+        for name, part in slot.choices.items():
+            scene = eval(made["SCENES"][name], {"Scene": rsfstudy.Scene})
+            assert isinstance(getattr(scene.parts, slot.name), part)
 
 
 def test_no_symbol_is_taken_for_emphasis(pages):

@@ -29,6 +29,40 @@ from rsfstudy.slider.parts import Part, names_of
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES, quantity
 
+#: A scene of each choice of a slot.
+SCENES = {
+    "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
+    "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',
+    "family": 'Scene(law="family", law_exponent=0.5)',
+    "perrin_rice_zheng": 'Scene(law="perrin_rice_zheng", b_over_a=1.5)',
+    "slip": 'Scene(law="slip", b_over_a=1.5)',
+    "slowness": 'Scene(law="slowness", b_over_a=1.5, regularised=True)',
+    "two_slip_states": 'Scene(law="two_slip_states", b1_over_a=1, b2_over_a=0.5, length_ratio=10)',
+    "two_slowness_states": 'Scene(law="two_slowness_states", b2_over_a=0.5, length_ratio=10)',
+    "constant": 'Scene(normal_stress="constant")',
+    "imposed": 'Scene(normal_stress="imposed", alpha=0.25, normal_stress_step=0.1)',
+    "variable": 'Scene(normal_stress="variable", alpha=0.25, phi=55)',
+    "dilatant": 'Scene(fluid="dilatant", dilatancy=0.01, drainage=1)',
+    "drained": 'Scene(fluid="drained")',
+    "inertia": "Scene(inertia=True, stiffness_ratio=0.8)",
+    "quasi_static": "Scene(stiffness_ratio=1.2)",
+    "radiation_damping": "Scene(radiation_damping=1e-4, stiffness_ratio=0.8)",
+    "oscillation": "Scene(alpha=0.25, oscillation_amplitude=0.05, oscillation_period=10)",
+    "ramp": 'Scene(normal_stress="imposed", normal_stress_ramp=0.2, ramp_duration=5)',
+    "slide_hold_slide": "Scene(hold_time=100, stiffness_ratio=5)",
+    "step": "Scene(load_velocity_ratio=10)",
+    "velocity_oscillation": "Scene(velocity_oscillation=0.5, oscillation_period=10)",
+    "velocity_ramp": "Scene(velocity_ramp=9, velocity_ramp_duration=20)",
+    "velocity_steps": "Scene(velocity_steps=3, velocity_ratio=3, displacement_between_steps=20)",
+}
+
+#: Examples of measures and reductions that no named study states.
+CALLS = {
+    "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
+    "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',
+    "Range": 'Range(name="range_of_a", of="a", along="window")',
+}
+
 #: Where classes stand that parts, measures and studies of one's own are derived from or made of.
 CLASSES = {
     "Law": "rsfstudy.slider.laws",
@@ -160,10 +194,10 @@ def parts() -> str:
 def _slot(slot: registry.Slot) -> str:
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default else ""), summary(part),
-         equation(part), ", ".join(f"`{own}`" for own in names_of(part)))
+         equation(part), ", ".join(f"`{own}`" for own in names_of(part)), f"`{SCENES[name]}`")
         for name, part in slot.choices.items()
     )  # fmt: skip
-    made = table(("choice", "what it is", "equation", "its fields"), rows)
+    made = table(("choice", "what it is", "equation", "its fields", "example"), rows)
     called = "" if not slot.callers else " A field of the choice, stated, calls for it."
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
@@ -206,7 +240,7 @@ def kinds() -> dict[str, type[Measure]]:
 
 def _examples() -> dict[type[Measure], Measure]:
     """A measure of each kind: as it is without fields, or as a named study states it."""
-    stated = {type(m): m for m in (catalogue.load(name).measure for name in names.names())}
+    stated = {type(m): m for m in _measures()}
     for kind in kinds().values():
         if all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(kind)):
             stated[kind] = kind()
@@ -227,9 +261,28 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
     )
     headline = f"Headline: `{example.headline}`." if example else "Its numbers follow its fields."
     home = f"`from {kind.__module__} import {kind.__name__}`"
-    return "\n\n".join(
-        filter(None, (f"### {kind.__name__}", f"{summary(kind)} {headline} {home}", taken, given))
-    )
+    words = f"{summary(kind)} {headline} {home}{_called(kind, _measures())}"
+    return "\n\n".join(filter(None, (f"### {kind.__name__}", words, taken, given)))
+
+
+def _measures() -> list[Measure]:
+    """The measures of all named studies."""
+    return [catalogue.load(name).measure for name in names.names()]
+
+
+def _called(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
+    """An example, with what the first study states that leaves not all to defaults."""
+    found = [
+        ", ".join(
+            f"{one.name}={getattr(each, one.name)!r}"
+            for one in fields(kind)
+            if one.init and getattr(each, one.name) != one.default
+        )
+        for each in stated
+        if type(each) is kind
+    ]
+    call = f"{kind.__name__}({next(filter(None, found), '')})" if found else CALLS[kind.__name__]
+    return f" Example: `{call}`."
 
 
 def _taken(kind: type[Any]) -> Iterator[tuple[object, ...]]:
@@ -270,8 +323,9 @@ def reductions() -> str:
     own = (
         k for k in kinds if isinstance(k, type) and issubclass(k, Reduction) and k is not Reduction
     )
+    stated = [one for name in names.names() for one in catalogue.load(name).reductions]
     return "\n\n".join(
-        f"### {kind.__name__}\n\n{summary(kind)}\n\n"
+        f"### {kind.__name__}\n\n{summary(kind)}{_called(kind, stated)}\n\n"
         + table(("field", "default", "meaning"), _taken(kind))
         for kind in own
     )
