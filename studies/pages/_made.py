@@ -331,6 +331,19 @@ def reductions() -> str:
     )
 
 
+def claims() -> str:
+    """Every claim of the named studies."""
+    signs = {"equals": "", "below": "< ", "above": "> "}
+    rows = (
+        (f"`{name}`", claim.id, plain(claim.statement), plain(claim.source),
+         f"{signs[claim.relation]}{claim.published:.6g}", claim.tolerance, plain(claim.because))
+        for name in names.names()
+        for claim in catalogue.load(name).claims
+    )  # fmt: skip
+    headings = ("study", "id", "claim", "source", "published", "tolerance", "differs because")
+    return table(headings, rows)
+
+
 def statuses() -> str:
     """Every status of a cell."""
     return table(
@@ -411,6 +424,6 @@ def _rst(directive: str, *options: str) -> str:
 #: What makes the text of each name.
 MADE: dict[str, Callable[[], str]] = {
     one.__name__: one
-    for one in (scene_fields, parts, rig, every_measure, reductions, statuses, vocabulary,
+    for one in (scene_fields, parts, rig, every_measure, reductions, claims, statuses, vocabulary,
                 commands, python, accessor, classes)
 }  # fmt: skip
