@@ -20,6 +20,8 @@ import rsfstudy
 from rsfstudy import reduce
 from rsfstudy.api.accessor import Accessor
 from rsfstudy.cli.command_line import cli
+from rsfstudy.measures.elasticities import Elasticities
+from rsfstudy.measures.fit import Fit
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.slider import registry
 from rsfstudy.status import Status
@@ -111,12 +113,24 @@ def test_nothing_is_left_to_be_made(pages):
     assert not [file.name for file in pages if "<!-- made:" in file.read_text()]
 
 
-def test_examples_make_what_they_stand_beside():
-    made = runpy.run_path(str(ROOT / "studies" / "pages" / "_made.py"))
+@pytest.fixture
+def examples():
+    return runpy.run_path(str(ROOT / "studies" / "pages" / "_examples.py"))
+
+
+def test_examples_make_what_they_stand_beside(examples):
     for slot in registry.SLOTS:
         for name, part in slot.choices.items():
-            scene = eval(made["SCENES"][name], {"Scene": rsfstudy.Scene})
+            scene = eval(examples["SCENES"][name], {"Scene": rsfstudy.Scene})
             assert isinstance(getattr(scene.parts, slot.name), part)
+
+
+def test_examples_that_no_study_states_can_be_called(examples):
+    known = {"Elasticities": Elasticities, "Fit": Fit, "LimitCycle": LimitCycle}
+    record = rsfstudy.read_record(ROOT / "studies/pages/step.csv", normal_stress="20 MPa")
+    for name, call in examples["CALLS"].items():
+        made = eval(call, {**known, "Range": reduce.Range, "record": record})
+        assert type(made).__name__ == name
 
 
 def test_no_symbol_is_taken_for_emphasis(pages):

@@ -16,7 +16,8 @@ _WIDTH, _ID = 100, 12
 _PRINTED = ("id", "claim", "relation", "published", "ours", "tolerance", "verdict", "moved")
 
 
-def _published(claim: dict[Any, Any]) -> str:
+def published(claim: dict[Any, Any]) -> str:
+    """The published value of a claim, with the sign of a bound."""
     return f"{_SIGNS[claim['relation']]}{claim['published']:.6g}"
 
 
@@ -25,7 +26,7 @@ def _headed(claim: dict[Any, Any]) -> dict[str, str]:
     return {
         "id": textwrap.shorten(str(claim["id"]), _ID, placeholder="..."),
         "claim": " ".join(str(claim["claim"]).split()),
-        "published": _published(claim),
+        "published": published(claim),
         "ours": f"{claim['ours']:.6g}",
         "tolerance": f"{claim['tolerance']:.3g}",
         "verdict": f"{claim['verdict']}{', moved' * bool(claim['moved'])}",
@@ -74,7 +75,7 @@ def told(claim: dict[Any, Any]) -> dict[str, str]:
     return {
         "id": str(claim["id"]),
         "claim": f"{of}{claim['claim']}",
-        "published": _published(claim),
+        "published": published(claim),
         "ours": "-" if pd.isna(claim["ours"]) else f"{claim['ours']:.6g}",
         "tolerance, and why": reason,
         "verdict": claim["verdict"] + f", expected {claim['expected']}" * bool(claim["moved"]),

@@ -10,14 +10,18 @@ import pkgutil
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
+from functools import cache
 from typing import Any
 
 import click
+from _examples import CALLS, SCENES  # type: ignore[import-not-found]
 
 import rsfstudy
 from rsfstudy import measures, reduce
 from rsfstudy.cli.command_line import cli
 from rsfstudy.declare import catalogue, names
+from rsfstudy.declare.study import Study
+from rsfstudy.declare.verdicts import published
 from rsfstudy.measures import Measure
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.quantity import symbol as in_html
@@ -28,40 +32,6 @@ from rsfstudy.slider import registry
 from rsfstudy.slider.parts import Part, names_of
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES, quantity
-
-#: A scene of each choice of a slot.
-SCENES = {
-    "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
-    "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',
-    "family": 'Scene(law="family", law_exponent=0.5)',
-    "perrin_rice_zheng": 'Scene(law="perrin_rice_zheng", b_over_a=1.5)',
-    "slip": 'Scene(law="slip", b_over_a=1.5)',
-    "slowness": 'Scene(law="slowness", b_over_a=1.5, regularised=True)',
-    "two_slip_states": 'Scene(law="two_slip_states", b1_over_a=1, b2_over_a=0.5, length_ratio=10)',
-    "two_slowness_states": 'Scene(law="two_slowness_states", b2_over_a=0.5, length_ratio=10)',
-    "constant": 'Scene(normal_stress="constant")',
-    "imposed": 'Scene(normal_stress="imposed", alpha=0.25, normal_stress_step=0.1)',
-    "variable": 'Scene(normal_stress="variable", alpha=0.25, phi=55)',
-    "dilatant": 'Scene(fluid="dilatant", dilatancy=0.01, drainage=1)',
-    "drained": 'Scene(fluid="drained")',
-    "inertia": "Scene(inertia=True, stiffness_ratio=0.8)",
-    "quasi_static": "Scene(stiffness_ratio=1.2)",
-    "radiation_damping": "Scene(radiation_damping=1e-4, stiffness_ratio=0.8)",
-    "oscillation": "Scene(alpha=0.25, oscillation_amplitude=0.05, oscillation_period=10)",
-    "ramp": 'Scene(normal_stress="imposed", normal_stress_ramp=0.2, ramp_duration=5)',
-    "slide_hold_slide": "Scene(hold_time=100, stiffness_ratio=5)",
-    "step": "Scene(load_velocity_ratio=10)",
-    "velocity_oscillation": "Scene(velocity_oscillation=0.5, oscillation_period=10)",
-    "velocity_ramp": "Scene(velocity_ramp=9, velocity_ramp_duration=20)",
-    "velocity_steps": "Scene(velocity_steps=3, velocity_ratio=3, displacement_between_steps=20)",
-}
-
-#: Examples of measures and reductions that no named study states.
-CALLS = {
-    "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
-    "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',
-    "Range": 'Range(name="range_of_a", of="a", along="window")',
-}
 
 #: Where classes stand that parts, measures and studies of one's own are derived from or made of.
 CLASSES = {
@@ -240,7 +210,7 @@ def kinds() -> dict[str, type[Measure]]:
 
 def _examples() -> dict[type[Measure], Measure]:
     """A measure of each kind: as it is without fields, or as a named study states it."""
-    stated = {type(m): m for m in _measures()}
+    stated = {type(study.measure): study.measure for study in _studies().values()}
     for kind in kinds().values():
         if all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(kind)):
             stated[kind] = kind()
@@ -261,13 +231,15 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
     )
     headline = f"Headline: `{example.headline}`." if example else "Its numbers follow its fields."
     home = f"`from {kind.__module__} import {kind.__name__}`"
-    words = f"{summary(kind)} {headline} {home}{_called(kind, _measures())}"
+    stated = (study.measure for study in _studies().values())
+    words = f"{summary(kind)} {headline} {home}{_called(kind, stated)}"
     return "\n\n".join(filter(None, (f"### {kind.__name__}", words, taken, given)))
 
 
-def _measures() -> list[Measure]:
-    """The measures of all named studies."""
-    return [catalogue.load(name).measure for name in names.names()]
+@cache
+def _studies() -> dict[str, Study]:
+    """The named studies."""
+    return {name: catalogue.load(name) for name in names.names()}
 
 
 def _called(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
@@ -323,7 +295,7 @@ def reductions() -> str:
     own = (
         k for k in kinds if isinstance(k, type) and issubclass(k, Reduction) and k is not Reduction
     )
-    stated = [one for name in names.names() for one in catalogue.load(name).reductions]
+    stated = [one for study in _studies().values() for one in study.reductions]
     return "\n\n".join(
         f"### {kind.__name__}\n\n{summary(kind)}{_called(kind, stated)}\n\n"
         + table(("field", "default", "meaning"), _taken(kind))
@@ -333,12 +305,11 @@ def reductions() -> str:
 
 def claims() -> str:
     """Every claim of the named studies."""
-    signs = {"equals": "", "below": "< ", "above": "> "}
     rows = (
         (f"`{name}`", claim.id, plain(claim.statement), plain(claim.source),
-         f"{signs[claim.relation]}{claim.published:.6g}", claim.tolerance, plain(claim.because))
-        for name in names.names()
-        for claim in catalogue.load(name).claims
+         published(claim.describe()), claim.tolerance, plain(claim.because))
+        for name, study in _studies().items()
+        for claim in study.claims
     )  # fmt: skip
     headings = ("study", "id", "claim", "source", "published", "tolerance", "differs because")
     return table(headings, rows)
