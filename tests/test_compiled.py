@@ -447,13 +447,13 @@ def test_other_processes_find_equations_again(tmp_path):
     """Closures too, by which Numba's own cache would find none: it would write them anew."""
     asks = (
         "from rsfstudy import Scene\n"
-        "from rsfstudy.analysis.touching import touching_point\n"
+        "from rsfstudy.analysis.critical_path import CriticalPath\n"
         "from rsfstudy.motion.compiled.machine import addresses\n"
         "from rsfstudy.motion.engines import compiling\n"
         "from rsfstudy.slider.equations import between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
         "addresses(between_ruptures(scene, clock=False))\n"
-        "touching_point(scene, 'compiled')\n"
+        "CriticalPath.of(scene, 'compiled')\n"
         "print(compiling.programs)\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}

@@ -8,8 +8,8 @@ from conftest import cot_phi
 
 from rsfstudy import Scene
 from rsfstudy.analysis import shooting
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.rate_steps import RateSteps
-from rsfstudy.analysis.touching import touching_point
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -27,7 +27,7 @@ def test_where_normal_stress_all_but_follows_shear_stress_there_is_a_critical_pa
     take ten times the work for a hundred times the error.
     """
     scene = Scene(phi=math.degrees(math.atan(0.76)) + 0.01)
-    spring_stress, _psi = touching_point(scene.with_(load_velocity_ratio=1.005))
+    spring_stress, _psi = CriticalPath.of(scene.with_(load_velocity_ratio=1.005)).tangency
     assert spring_stress < -0.9 * scene.mu_star
     found = CriticalStep()(scene, Accuracy())
     assert found.status is Status.OK

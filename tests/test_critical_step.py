@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis import swing
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.rate_steps import RateSteps
-from rsfstudy.analysis.touching import touching_point
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
@@ -495,7 +495,7 @@ def test_no_critical_step_is_told_and_not_only_nan():
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
     """At the touching point ln V is at the norm and stationary, by the assembled equations."""
     scene = Scene(law=law, load_velocity_ratio=load)
-    start = touching_point(scene)
+    start = CriticalPath.of(scene).tangency
     assert start is not None
     system = between_ruptures(scene, clock=False)
     point = system.at(start)
@@ -511,7 +511,7 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
     """
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
-        plain, compiled = touching_point(scene), touching_point(scene, COMPILED)
+        plain, compiled = (CriticalPath.of(scene, engine).tangency for engine in (SCIPY, COMPILED))
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
         at = [on_slow_manifold(scene, 0.01, (-0.02,), engine) for engine in (SCIPY, COMPILED)]
         assert all(isinstance(point, Point) for point in at)

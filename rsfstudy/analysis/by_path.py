@@ -9,10 +9,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.shooting import LOOSE
 from rsfstudy.analysis.sought import Steps
 from rsfstudy.analysis.swing import stability_margin
-from rsfstudy.analysis.touching import goes_beyond
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.meter import TIGHTEST, Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold
@@ -43,9 +43,11 @@ def from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Bounda
     boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
     if boundary is None or not steps.smaller_ones_decay(boundary.size):
         return None
-    if goes_beyond(steps.scene_at(boundary.size), LOOSE, meter):
-        return None
-    return boundary
+    scene = steps.scene_at(boundary.size)
+    # by laws whose orbits close at critical stiffness no motion goes beyond where it comes back
+    if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
+        return boundary
+    return None if CriticalPath.of(scene, meter.engine).goes_beyond(LOOSE, meter) else boundary
 
 
 def from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:

@@ -6,8 +6,8 @@ import math
 import sys
 from collections.abc import Iterable, Iterator
 
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
-from rsfstudy.analysis.touching import displacement_on_path
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import log_slip_rate_at
@@ -67,14 +67,17 @@ class DisplacementSteps(Steps):
         return dict(zip(self.beside, (critical, closed_form), strict=True))
 
     def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
-        """One integration each: a displacement step starts wherever the critical path has Psi =
-        0.
+        """One integration each: a displacement step leaves Psi = 0 and moves the spring stress
+        alone, so that it starts wherever the critical path has Psi = 0.
         """
+        path, sign = CriticalPath.of(self.scene, meter.engine), self.sign
         for tolerance in tolerances:
-            step = displacement_on_path(self.scene, tolerance, meter, self.sign)
-            if step is None:
+            start = path.start(
+                tolerance, meter, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
+            )
+            if start is None:
                 return
-            yield abs(step)
+            yield abs(start.spring_stress / self.scene.stiffness)
 
     def _largest(self) -> float:
         """Up: the step that itself takes the slip rate to the norm, and somewhat farther with mass,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.shooting import LOOSE, ShotSteps
 from rsfstudy.analysis.swing import swing
 from rsfstudy.motion.accuracy import Accuracy
@@ -27,6 +29,10 @@ class RateSteps(ShotSteps):
 
     def scene_at(self, size: float) -> Scene:
         return self.scene.with_(load_velocity_ratio=self.value(size))
+
+    def paths(self, engine: str) -> Callable[[float], CriticalPath]:
+        path = CriticalPath.of(self.scene, engine)
+        return lambda size: path.under(self.value(size))
 
     def value(self, size: float) -> float:
         return math.exp(self.sign * size)

@@ -11,8 +11,8 @@ from typing import ClassVar
 
 from scipy.optimize import brentq
 
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.sought import Steps
-from rsfstudy.analysis.touching import cycle_misfit, rate_step_misfit
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider.scene import Scene
 
@@ -46,23 +46,28 @@ class ShotSteps(Steps):
         A loose root and its slope come first; from there the tighter tolerances take one to three
         paths each. With several states there are no such paths.
         """
-        loose = self._loose_root(meter) if self.scene.states == 1 else None
+        path_at = self.paths(meter.engine)
+        loose = self._loose_root(path_at, meter) if self.scene.states == 1 else None
         if loose is not None:
             yield from _refined(
                 *loose,
                 tolerances,
-                lambda size, tolerance: rate_step_misfit(self.scene_at(size), tolerance, meter),
+                lambda size, tolerance: path_at(size).misfit(tolerance, meter),
             )
+
+    def paths(self, engine: str) -> Callable[[float], CriticalPath]:
+        """Gives the critical path after a step of a size, which an engine follows."""
+        return lambda size: CriticalPath.of(self.scene_at(size), engine)
 
     def sizes_of_cycle(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Find the step whose limit cycle touches the norm, from one orbit each: the smallest after
         which that orbit stops shrinking.
         """
-        found = dict[float, float]()
+        found, path_at = dict[float, float](), self.paths(meter.engine)
 
         @cache
         def misfit(log_size: float, tolerance: float = LOOSE) -> float:
-            higher = cycle_misfit(self.scene_at(math.exp(log_size)), tolerance, meter)
+            higher = path_at(math.exp(log_size)).misfit_of_cycle(tolerance, meter)
             if higher is None:
                 return math.nan
             found[log_size] = higher
@@ -84,7 +89,9 @@ class ShotSteps(Steps):
                 return
             smaller, larger, previous = larger, larger + stride, current
 
-    def _loose_root(self, meter: Meter) -> tuple[float, float] | None:
+    def _loose_root(
+        self, path_at: Callable[[float], CriticalPath], meter: Meter
+    ) -> tuple[float, float] | None:
         """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
         there.
         """
@@ -92,10 +99,10 @@ class ShotSteps(Steps):
 
         @cache
         def misfit(log_size: float) -> float:
-            scene = self.scene_at(math.exp(log_size))
-            state = rate_step_misfit(scene, LOOSE, meter)
+            size = math.exp(log_size)
+            state = path_at(size).misfit(LOOSE, meter)
             if state is None:
-                return self._verdict(scene, meter)
+                return self._verdict(self.scene_at(size), meter)
             found[log_size] = state
             return state
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.held import excess_of_peak
 from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
-from rsfstudy.analysis.touching import cycle_misfit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
@@ -194,7 +194,8 @@ def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool
     """True if the orbit that touches the norm peaks lower the next time: paths cannot cross, so
     that none inside of it ever reaches the norm.
     """
-    misfit = cycle_misfit(scene, accuracy.solver, meter)
+    path = CriticalPath.of(scene, meter.engine)
+    misfit = path.misfit_of_cycle(accuracy.solver, meter)
     return misfit is not None and misfit < -100.0 * accuracy.solver
 
 

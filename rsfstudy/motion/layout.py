@@ -14,6 +14,9 @@ MOTION = np.dtype(
         ("time", "f8"),  # time, slip and spring stress at the start
         ("slip", "f8"),
         ("spring_stress", "f8"),
+        ("tolerance", "f8"),
+        ("finer", "f8"),  # part of the longest steps at this tolerance
+        ("direction", "f8"),  # of the clock: 1 or -1
         ("budget", "i8"),  # right-hand sides that it may spend
         ("records", "i8"),  # when the slider is recorded
         ("kinks", "i8"),  # kinks of the loading that are ahead, and the last of them that are told
@@ -24,9 +27,6 @@ MOTION = np.dtype(
         ("events", "i8"),  # rows of the table of events, and of the recording
         ("recorded", "i8"),
         ("jacobians", "i8"),
-        ("direction", "f8"),  # of the clock: 1 or -1
-        ("tolerance", "f8"),
-        ("finer", "f8"),  # part of the longest steps at this tolerance
         ("started", "f8"),  # time at which the regime began
         ("clock", "f8"),  # at the beginning of a step, and at its end
         ("end", "f8"),
@@ -56,8 +56,8 @@ MOTION = np.dtype(
     ]
 )
 #: The same as bytes: fields of records take much longer to write and to read.
-CALLED_WITH_FIELDS = "lasts", "time", "slip", "spring_stress", "budget", "records", "kinks", "told"
-CALLED_WITH, SAYS = struct.Struct("=4d4q"), struct.Struct("=6q")
+CALLED_WITH, SAYS = struct.Struct("=7d4q"), struct.Struct("=6q")
+CALLED_WITH_FIELDS = (MOTION.names or ())[:11]
 #: Rows of the table of functions; and how many equations have there, of which the last may be
 #: missing (see `columns.Filling`).
 SLOW, FAST = 0, 1

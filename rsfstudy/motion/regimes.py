@@ -100,12 +100,12 @@ def on_slow_manifold(
     """The point with this spring stress and these states, where mass hardly acts."""
     slow = between_ruptures(scene, clock=False)
     given = (spring_stress, *psis), slow.p
-    now: Point = of_floats(_point_of(slow.rate, slow.point), engine, *given)(*given)
+    now: Point = of_floats(point_of(slow.rate, slow.point), engine, *given)(*given)
     return now
 
 
 @cache
-def _point_of(rate: Function, point: Function) -> Function:
+def point_of(rate: Function, point: Function) -> Function:
     """``(state, p) -> Point``."""
 
     def at(state: Numbers, p: Numbers) -> Point:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Plain:
         """Arrays as the loop takes them."""
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
-    def numbers(self, p: Numbers) -> list[float]:
+    def numbers(self, p: Sequence[float]) -> Any:
         """The numbers of a scene as the loop takes them."""
         return list(p)
 
@@ -99,31 +99,150 @@ class PlainState(SimpleNamespace):
         return float(getattr(self, name))
 
 
-class _Plan(NamedTuple):
-    """Plan that motions by the same equations share: their beginning and arguments.
+class Runner:
+    """Runs motions by the same equations, which may differ in their numbers and beginnings.
 
-    Attributes
+    Parameters
     ----------
-    machine : Plain or Compiled
-    initial : object
-        What they begin with.
-    called : tuple
-        The argument `plan` of the loop.
-    systems : tuple of Equations
-        Those of the regimes they go through.
-    regimes : tuple of str
-        Names of these.
-    unknowns, states : int
-        Most unknowns of a regime, and how many states there are.
+    slow : Equations
+        The equations, or those between ruptures.
+    fast : Equations, optional
+        Those in ruptures, which begin and end at limits.
+    given : Limits
+    engine : str
+    fields : float
+        Fields of the state of a motion (`layout.MOTION`) in which such motions differ from others.
     """
 
-    machine: Any
-    initial: Any
-    called: tuple[Any, ...]
-    systems: tuple[Equations, ...]
-    regimes: tuple[str, ...]
-    unknowns: int
-    states: int
+    def __init__(
+        self,
+        slow: Equations,
+        fast: Equations | None = None,
+        given: Limits = _NO_MASS,
+        *,
+        engine: str,
+        **fields: float,
+    ) -> None:
+        self._systems: tuple[Equations, ...] = (slow,) if fast is None else (slow, fast)
+        self._machine = compiled_engine().Compiled() if engine == COMPILED else Plain()
+        self._states, unknowns = slow.states, [len(system.unknowns) for system in self._systems]
+        self._unknowns = max(unknowns)
+        scales = np.array([scale for system in self._systems for scale in system.scales])
+        table, self._p = self._machine.table(self._systems), self._machine.numbers(slow.p)
+        self._called = *self._machine.passed(scales), table, tuple(given)
+        fields |= {
+            "begins": layout.BEGIN,
+            "limits_steps": not slow.is_rigid,
+            "slip_is_clock": slow.is_rigid,
+            "unknowns": unknowns[0],
+            "states": slow.states,
+            "unknowns_fast": sum(unknowns[1:]),
+            "has_mass": fast is not None,
+        }
+        self._initial = self._machine.initial(tuple(fields.items()))
+
+    def run(
+        self,
+        start: Point | Numbers,
+        meter: Meter,
+        watches: Sequence[EventSpecification],
+        tolerance: float,
+        *,
+        times: tuple[float, ...] = (math.inf, 0.0, 0.0, 0.0),
+        backward: bool = False,
+        p: Numbers | None = None,
+        budget: float = math.inf,
+        recording: Recording | None = None,
+        kinks: tuple[np.ndarray, int] = _NO_KINKS,
+        imposed: float | None = None,
+    ) -> Iterator[Event]:
+        """Events of a motion, a table of them by each call of the loop.
+
+        Parameters
+        ----------
+        start : Point or tuple of float
+            Where it begins: a point, whose regime is found, or the unknowns.
+        meter : Meter
+            Charged with the work.
+        watches : sequence of EventSpecification
+        tolerance : float
+            Local error per step.
+        times : tuple of float
+            How long it lasts, and time, slip and spring stress where it begins.
+        backward : bool
+            Run against the clock of the equations.
+        p : tuple of float, optional
+            Other numbers than those of the equations.
+        budget : float
+            Right-hand sides it may spend, if fewer than the meter leaves.
+        recording : Recording, optional
+        kinks : tuple of ndarray and int
+            Those of the loading, and how many of the last ones are told.
+        imposed : float, optional
+            What the last unknown is less of where it is shear stress that is to be recorded.
+
+        Raises
+        ------
+        Halt
+            Where it cannot go on.
+        """
+        machine, states, systems, numbers = self._machine, self._states, self._systems, self._p
+        before, turns = numbers, len(kinks[0])
+        if isinstance(start, Point):
+            y, last = np.empty(2 * self._unknowns), _columns_of(start)
+        else:  # behind the unknowns is room for as many
+            y, last = np.array((*start, *start)), np.empty(layout.PSIS + states)
+        if p is not None or turns:  # numbers that are those of this motion alone
+            before = numbers = machine.numbers(systems[0].p if p is None else p)
+            if turns:
+                before = machine.numbers(numbers)
+            systems = tuple(system._replace(p=numbers) for system in systems)
+        tolerance = max(tolerance, TIGHTEST)
+        records, samples, rows = _to_record(recording, systems[0], states)
+        state = machine.state(
+            self._initial,
+            (
+                *times,
+                tolerance,
+                # what limits a step must differ between two tolerances whose results tell errors
+                (tolerance / TOLERANCE_OF_STRIDES) ** 0.125,
+                -1.0 if backward else 1.0,
+                int(min(budget, meter.budget - meter.spent)),
+                *(records, turns, kinks[1]),
+            ),
+        )
+        asked, meanings = _asked(tuple(watches))
+        stepper = stepper_of(meter.engine, systems, meter.methods)
+        columns = layout.POINT + layout.PSIS + states
+        events = np.empty((max(_EVENTS, 2 * len(watches) + 4), columns))
+        block = np.empty(workspace.size(self._unknowns, states, len(watches)))
+        arguments = (
+            *machine.passed(y, last, block),
+            (*self._called, numbers, before),
+            *machine.passed(asked.copy(), kinks[0], samples, events, rows),
+            stepper,
+        )
+        regimes = [system.regime for system in systems]
+        run, end, known = machine.advance(), layout.HANDS_OVER, (0, 0, 0, 0)
+        while end == layout.HANDS_OVER:
+            end = run(state.memory, *arguments)
+            slow, fast, steps, happened, recorded, jacobians = state.says()
+            known, settled = (slow, fast, steps, jacobians), known
+            others = meter.settle(regimes, settled, known)
+            if recording is not None and recorded:
+                kept = rows[:recorded].copy()
+                if imposed is not None:
+                    kept[:, STRESSES] += kept[:, -1:] - imposed
+                recording.take(kept, regimes)
+            for line in events[:happened].tolist():
+                code, regime, clock, time, slip, spent, *of_point = line
+                point = _named(Point, (*of_point[: layout.PSIS], tuple(of_point[layout.PSIS :])))
+                kind, watch = meanings[int(code)]
+                name, work = regimes[int(regime)], others + int(spent)
+                yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
+            meter.check()
+        if end != layout.ENDED:
+            raise _halt(end, state, regimes, stepper)
 
 
 def chain(
@@ -153,14 +272,22 @@ def chain(
     told : int
         How many segments, the last ones, are told to begin.
     """
-    plan = _planned(scene, accuracy, compiled=meter.engine == COMPILED, clock=clock)
+    runner = _runner(scene, accuracy, engine=meter.engine, clock=clock)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
     first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
     if first is not None:  # in the loop stresses are without what the load point imposes
         start = _pushed(start, first - start.psis[-1])
         origin = *origin[:2], start.spring_stress
-    begins, kinks = (np.empty(2 * plan.unknowns), _columns_of(start)), (table[1:], told)
-    happens = _events(plan, (lasts, *origin), begins, meter, watches, recording, kinks, first)
+    happens = runner.run(
+        start,
+        meter,
+        watches,
+        accuracy.solver,
+        times=(lasts, *origin),
+        recording=recording,
+        kinks=(table[1:], told),
+        imposed=first,
+    )
     if first is None:
         return happens
     return (e._replace(point=_pushed(e.point, e.point.psis[-1] - first)) for e in happens)
@@ -184,129 +311,27 @@ def along(
 
     A rigid slider has slip for its clock: a recording that asks for values has them at slips.
     """
-    fields = _fields(tolerance, equations)
-    fields |= {"direction": -1.0 if backward else 1.0, "slip_is_clock": equations.is_rigid}
-    plan = _plan(_machine(compiled=meter.engine == COMPILED), fields, equations)
-    begins = np.array((*state, *state)), np.empty(layout.PSIS + equations.states)
-    return _events(plan, (math.inf, 0.0, 0.0, 0.0), begins, meter, watches, recording, _NO_KINKS)
+    runner = Runner(equations, engine=meter.engine)
+    return runner.run(state, meter, watches, tolerance, backward=backward, recording=recording)
 
 
 @once
-def _planned(scene: Scene, accuracy: Accuracy, *, compiled: bool, clock: bool) -> _Plan:
-    """Plan that motions of a scene at an accuracy share; made once."""
+def _runner(scene: Scene, accuracy: Accuracy, *, engine: str, clock: bool) -> Runner:
+    """What runs the motions of a scene at an accuracy."""
     slow, fast, given = between_ruptures(scene, clock=clock), None, _NO_MASS
     if scene.has_mass:
         fast, given = in_rupture(scene, clock=clock), limits(scene, accuracy)
-    fields = _fields(accuracy.solver, slow, fast)
-    fields["behind"] = len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0
-    fields["reverses"] = scene.parts.law.regularised
-    fields |= {"at_point": 1, "terminates": 1, "has_clock": clock, "direction": 1.0}
-    return _plan(_machine(compiled=compiled), fields, slow, fast, given)
-
-
-def _machine(*, compiled: bool) -> Any:
-    """Machine that runs the loop."""
-    return compiled_engine().Compiled() if compiled else Plain()
-
-
-def _fields(tolerance: float, slow: Equations, fast: Equations | None = None) -> dict[str, float]:
-    """Fields of the state of a motion at first, by an integrator of that tolerance."""
-    tolerance = max(tolerance, TIGHTEST)
-    return {
-        "tolerance": tolerance,
-        # what limits a step must differ between two tolerances whose results are to tell errors
-        "finer": (tolerance / TOLERANCE_OF_STRIDES) ** 0.125,
-        "begins": layout.BEGIN,
-        "limits_steps": not slow.is_rigid,
-        "unknowns": len(slow.unknowns),
-        "states": slow.states,
-        "unknowns_fast": len(fast.unknowns) if fast else 0,
-        "has_mass": fast is not None,
-    }
-
-
-def _plan(
-    machine: Any,
-    fields: dict[str, float],
-    slow: Equations,
-    fast: Equations | None = None,
-    given: Limits = _NO_MASS,
-) -> _Plan:
-    """A plan of motions by equations, and by those of ruptures, which begin and end at limits."""
-    systems = (slow,) if fast is None else (slow, fast)
-    scales = np.array([scale for system in systems for scale in system.scales])
-    table, p = machine.table(systems), machine.numbers(slow.p)
-    called = *machine.passed(scales), table, tuple(given), p, p
-    initial, regimes = machine.initial(tuple(fields.items())), tuple(s.regime for s in systems)
-    unknowns = max(fields["unknowns"], fields["unknowns_fast"])
-    return _Plan(machine, initial, called, systems, regimes, int(unknowns), slow.states)
-
-
-def _events(
-    plan: _Plan,
-    times: tuple[float, ...],
-    begins: tuple[np.ndarray, np.ndarray],
-    meter: Meter,
-    watches: Sequence[EventSpecification],
-    recording: Recording | None,
-    kinks: tuple[np.ndarray, int],
-    imposed: float | None = None,
-) -> Iterator[Event]:
-    """Events of a motion, a table of them by each call of the loop.
-
-    Parameters
-    ----------
-    times : tuple of float
-        How long it lasts, and time, slip and spring stress where it begins.
-    begins : tuple of ndarray
-        The unknowns with which it begins, behind which is room for as many; and the columns of the
-        point at which it begins, if it is that which the plan begins with.
-    kinks : tuple of ndarray and int
-        Those of the loading, and how many of the last ones are told.
-    imposed : float, optional
-        What the last unknown is less of where it is shear stress that is to be recorded.
-
-    Raises
-    ------
-    Halt
-        Where it cannot go on.
-    """
-    machine, regimes, states, (y, last) = plan.machine, plan.regimes, plan.states, begins
-    asked, meanings = _asked(tuple(watches))
-    called, systems = plan.called, plan.systems
-    if len(kinks[0]):  # where the numbers change, they are those of this motion alone
-        p, p_before = (machine.numbers(systems[0].p) for _ in range(2))
-        called, systems = (*called[:-2], p, p_before), tuple(s._replace(p=p) for s in systems)
-    stepper = stepper_of(meter.engine, systems, meter.methods)
-    columns = layout.POINT + layout.PSIS + states
-    events = np.empty((max(_EVENTS, 2 * len(watches) + 4), columns))
-    records, samples, rows = _to_record(recording, systems[0], states)
-    called_with = *times, meter.budget - meter.spent, records, len(kinks[0]), kinks[1]
-    state = machine.state(plan.initial, called_with)
-    block = np.empty(workspace.size(plan.unknowns, states, len(watches)))
-    arrays = machine.passed(y, last, block)
-    tables = machine.passed(asked.copy(), kinks[0], samples, events, rows)
-    arguments = *arrays, called, *tables, stepper
-    run, end, known = machine.advance(), layout.HANDS_OVER, (0, 0, 0, 0)
-    while end == layout.HANDS_OVER:
-        end = run(state.memory, *arguments)
-        slow, fast, steps, happened, recorded, jacobians = state.says()
-        known, settled = (slow, fast, steps, jacobians), known
-        before = meter.settle(regimes, settled, known)
-        if recording is not None and recorded:
-            kept = rows[:recorded].copy()
-            if imposed is not None:
-                kept[:, STRESSES] += kept[:, -1:] - imposed
-            recording.take(kept, regimes)
-        for line in events[:happened].tolist():
-            code, regime, clock, time, slip, spent, *of_point = line
-            point = _named(Point, (*of_point[: layout.PSIS], tuple(of_point[layout.PSIS :])))
-            kind, watch = meanings[int(code)]
-            name, work = regimes[int(regime)], before + int(spent)
-            yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
-        meter.check()
-    if end != layout.ENDED:
-        raise _halt(end, state, regimes, stepper)
+    return Runner(
+        slow,
+        fast,
+        given,
+        engine=engine,
+        behind=len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0,
+        reverses=scene.parts.law.regularised,
+        at_point=1,
+        terminates=1,
+        has_clock=clock,
+    )
 
 
 def _to_record(

@@ -41,7 +41,7 @@ class Compiled:
     def passed(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         return arrays
 
-    def numbers(self, p: Numbers) -> np.ndarray:
+    def numbers(self, p: Sequence[float]) -> Any:
         return np.array(p)
 
     def advance(self) -> Any:
