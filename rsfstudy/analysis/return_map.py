@@ -123,8 +123,8 @@ def section(point: Point) -> np.ndarray:
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
     """The derivative of the section over several events, one after the other."""
     size = slopes[0].shape[1]
-    together = np.eye(size)
-    for each in slopes:
+    together = slopes[0][:size]
+    for each in slopes[1:]:
         together = each[:size] @ together
     return together
 

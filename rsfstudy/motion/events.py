@@ -40,6 +40,9 @@ class Kind(StrEnum):
     SAMPLED = "sampled"
     END = "end"
 
+    # that of an enumeration is written in Python, and tables of events are looked up by it
+    __hash__ = str.__hash__
+
 
 class EventSpecification(NamedTuple):
     """Event specification; whether the motion ends there; and whether whoever asks can wait for it,

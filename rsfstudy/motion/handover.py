@@ -9,6 +9,7 @@ import math
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.slider.derived import once
 from rsfstudy.slider.places import LARGEST_LOG_SLIP_RATE
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.system import SLOWEST
@@ -50,6 +51,7 @@ class Limits(NamedTuple):
     inertial_time: float
 
 
+@once
 def limits(scene: Scene, accuracy: Accuracy) -> Limits:
     """The limits of a scene with mass, at an accuracy."""
     softness = scene.stiffness / scene.a

@@ -162,24 +162,27 @@ def along_path(
     """
     if not len(table):
         return {name: np.full(points, np.nan) for name in names}
-    seen = table[:, [OBSERVED.index(n) for n in ("time", "log10_slip_rate", "shear_stress")]]
-    spread = np.ptp(seen, axis=0)
-    lengths = np.abs(np.diff(seen, axis=0) / np.where(spread > 0.0, spread, 1.0)).sum(axis=1)
+    columns = np.ascontiguousarray(table.T)
+    seen = columns[_PATH]
+    spread = np.ptp(seen, axis=1)[:, None]
+    spread[spread == 0.0] = 1.0
+    lengths = np.abs(np.diff(seen, axis=1) / spread).sum(axis=0)
     total = lengths.sum()
     lengths = lengths / (total if total > 0.0 else 1.0) + 1.0 / max(len(lengths), 1)
     path = np.concatenate([[0.0], np.cumsum(lengths)])
     at = np.interp(np.linspace(0.0, path[-1], points), path, np.arange(len(table)))
-    for column in ("log10_slip_rate", "shear_stress") if points > 2 else ():
-        values = table[:, OBSERVED.index(column)]
+    for values in seen[1:] if points > 2 else ():
         for sign in (1.0, -1.0):
-            extreme = _extreme(sign * values, table[:, PLACE])
+            extreme = _extreme(sign * values, columns[PLACE])
             at[1:-1][np.argmin(np.abs(at[1:-1] - extreme))] = extreme
-    found = _at_rows(table[:, : len(names)], table[:, PLACE], at)
+    found = _at_rows(columns[: len(names)], columns[PLACE], at)
     # times of a rupture may differ by less than rounding
     found[0] = np.maximum.accumulate(found[0])
     return dict(zip(names, found, strict=True))
 
 
+#: Columns by which the length of a path is measured.
+_PATH = [OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_stress")]
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
 _HALF = 0.5 * SAMPLES
@@ -206,19 +209,22 @@ def _weights(parts: np.ndarray) -> np.ndarray:
     return np.asarray(_COEFFICIENTS.T @ powers)
 
 
-def _at_rows(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values between rows, of each column a row, at numbers of rows and parts: of the polynomial
-    through those of the step.
+def _at_rows(columns: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values of columns between rows, at numbers of rows and parts: of the polynomial through those
+    of the step.
     """
-    after = np.minimum(np.ceil(at).astype(int), len(values) - 1)
+    last = columns.shape[1] - 1
+    after = np.minimum(np.ceil(at).astype(int), last)
+    within = places[after].astype(int)
     # from one regime to the next there is a straight line
-    jumps = (places[after] == 0.0) & (at > 0.0)
-    begin = np.where(jumps, after - 1, after - places[after]).astype(int)
-    part, columns = at - begin, np.ascontiguousarray(values.T)
+    jumps = np.flatnonzero((within == 0) & (at > 0.0))
+    within[jumps] = 1
+    begin = after - within
+    part = at - begin
     around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
     around *= _weights(part)
     found: np.ndarray = around.sum(axis=1)
-    at_a_row = part == np.rint(part)
+    at_a_row = np.flatnonzero(part == np.rint(part))
     found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]
     found[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]

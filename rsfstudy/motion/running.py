@@ -107,8 +107,7 @@ class Runner:
     slow : Equations
         The equations, or those between ruptures.
     fast : Equations, optional
-        Those in ruptures, which begin and end at limits.
-    given : Limits
+        Those in ruptures.
     engine : str
     fields : float
         Fields of the state of a motion (`layout.MOTION`) in which such motions differ from others.
@@ -118,7 +117,6 @@ class Runner:
         self,
         slow: Equations,
         fast: Equations | None = None,
-        given: Limits = _NO_MASS,
         *,
         engine: str,
         **fields: float,
@@ -128,8 +126,9 @@ class Runner:
         self._states, unknowns = slow.states, [len(system.unknowns) for system in self._systems]
         self._unknowns = max(unknowns)
         scales = np.array([scale for system in self._systems for scale in system.scales])
-        table, self._p = self._machine.table(self._systems), self._machine.numbers(slow.p)
-        self._called = *self._machine.passed(scales), table, tuple(given)
+        self._called = *self._machine.passed(scales), self._machine.table(self._systems)
+        self._p = self._machine.numbers(slow.p)
+        self._regimes = [system.regime for system in self._systems]
         fields |= {
             "begins": layout.BEGIN,
             "limits_steps": not slow.is_rigid,
@@ -151,6 +150,7 @@ class Runner:
         times: tuple[float, ...] = (math.inf, 0.0, 0.0, 0.0),
         backward: bool = False,
         p: Numbers | None = None,
+        between: Limits = _NO_MASS,
         budget: float = math.inf,
         recording: Recording | None = None,
         kinks: tuple[np.ndarray, int] = _NO_KINKS,
@@ -173,6 +173,8 @@ class Runner:
             Run against the clock of the equations.
         p : tuple of float, optional
             Other numbers than those of the equations.
+        between : Limits
+            When to change between the regimes.
         budget : float
             Right-hand sides it may spend, if fewer than the meter leaves.
         recording : Recording, optional
@@ -218,11 +220,11 @@ class Runner:
         block = np.empty(workspace.size(self._unknowns, states, len(watches)))
         arguments = (
             *machine.passed(y, last, block),
-            (*self._called, numbers, before),
+            (*self._called, tuple(between), numbers, before),
             *machine.passed(asked.copy(), kinks[0], samples, events, rows),
             stepper,
         )
-        regimes = [system.regime for system in systems]
+        regimes, psis = self._regimes, layout.POINT + layout.PSIS
         run, end, known = machine.advance(), layout.HANDS_OVER, (0, 0, 0, 0)
         while end == layout.HANDS_OVER:
             end = run(state.memory, *arguments)
@@ -230,13 +232,13 @@ class Runner:
             known, settled = (slow, fast, steps, jacobians), known
             others = meter.settle(regimes, settled, known)
             if recording is not None and recorded:
-                kept = rows[:recorded].copy()
+                kept = rows[:recorded].copy(order="F")  # columns are what is asked for
                 if imposed is not None:
                     kept[:, STRESSES] += kept[:, -1:] - imposed
                 recording.take(kept, regimes)
             for line in events[:happened].tolist():
-                code, regime, clock, time, slip, spent, *of_point = line
-                point = _named(Point, (*of_point[: layout.PSIS], tuple(of_point[layout.PSIS :])))
+                code, regime, clock, time, slip, spent = line[: layout.POINT]
+                point = _named(Point, (*line[layout.POINT : psis], tuple(line[psis:])))
                 kind, watch = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
                 yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
@@ -272,7 +274,7 @@ def chain(
     told : int
         How many segments, the last ones, are told to begin.
     """
-    runner = _runner(scene, accuracy, engine=meter.engine, clock=clock)
+    runner = _runner(scene, meter.engine, clock=clock)
     lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
     first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
     if first is not None:  # in the loop stresses are without what the load point imposes
@@ -284,6 +286,7 @@ def chain(
         watches,
         accuracy.solver,
         times=(lasts, *origin),
+        between=limits(scene, accuracy) if scene.has_mass else _NO_MASS,
         recording=recording,
         kinks=(table[1:], told),
         imposed=first,
@@ -316,15 +319,11 @@ def along(
 
 
 @once
-def _runner(scene: Scene, accuracy: Accuracy, *, engine: str, clock: bool) -> Runner:
-    """What runs the motions of a scene at an accuracy."""
-    slow, fast, given = between_ruptures(scene, clock=clock), None, _NO_MASS
-    if scene.has_mass:
-        fast, given = in_rupture(scene, clock=clock), limits(scene, accuracy)
+def _runner(scene: Scene, engine: str, *, clock: bool) -> Runner:
+    """What runs the motions of a scene."""
     return Runner(
-        slow,
-        fast,
-        given,
+        between_ruptures(scene, clock=clock),
+        in_rupture(scene, clock=clock) if scene.has_mass else None,
         engine=engine,
         behind=len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0,
         reverses=scene.parts.law.regularised,
