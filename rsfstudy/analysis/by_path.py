@@ -43,9 +43,11 @@ def from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Bounda
     boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
     if boundary is None or not steps.smaller_ones_decay(boundary.size):
         return None
-    scene = steps.scene_at(boundary.size)
     # by laws whose orbits close at critical stiffness no motion goes beyond where it comes back
-    if scene.parts.law.orbits_close or scene.log_load_rate == -math.inf:
+    if steps.scene.parts.law.orbits_close:
+        return boundary
+    scene = steps.scene_at(boundary.size)
+    if scene.log_load_rate == -math.inf:
         return boundary
     return None if CriticalPath.of(scene, meter.engine).goes_beyond(LOOSE, meter) else boundary
 

@@ -28,7 +28,7 @@ from rsfstudy.motion.events import (
     settling,
 )
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import Recording, row, up_to
+from rsfstudy.motion.recording import Recording, in_units_of, row, up_to
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
@@ -142,12 +142,9 @@ def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) ->
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    ends = Recording()
-    ends.add([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)])
-    if recording is None:
-        return ends.seen(scene)
+    ends = in_units_of(scene, np.array([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)]))
     # the last step goes beyond the end
-    return up_to(recording.seen(scene), ends.seen(scene)[-1])
+    return ends if recording is None else up_to(recording.seen(scene), ends[-1])
 
 
 @lru_cache(maxsize=256)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.sought import RISE_OF_MASS, UNSEEN, Steps, falls_behind
+from rsfstudy.analysis.swing import settles
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import log_slip_rate_at
@@ -44,13 +45,17 @@ class DisplacementSteps(Steps):
         """The slider falls behind on the same path, but for what the load point moves meanwhile,
         and for half of b times that slip, which the state misses because slip rate is lower.
         """
-        scene = self.scene_at(size)
+        scene = self.scene
         if not scene.has_mass:
             return False
-        behind, rate = falls_behind(scene)
+        behind, rate = falls_behind(self.scene_at(size))
         missed = 0.5 * scene.a * scene.parts.law.size_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
         return behind * (loaded + missed) > UNSEEN * rtol * size
+
+    def smaller_ones_decay(self, size: float) -> bool:
+        """They move nothing that steady sliding depends on."""
+        return settles(self.scene)
 
     def values_beside(self, size: float) -> dict[str, float]:
         """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13), which

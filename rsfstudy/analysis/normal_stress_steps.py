@@ -59,8 +59,8 @@ class NormalStressSteps(ShotSteps):
         """The slider falls behind while slip rate rises; by how much of the size is a matter of
         what slip rate the step leads to.
         """
-        scene = self.scene_at(size)
-        behind = falls_behind(scene)[0] if scene.has_mass else 0.0
+        scene = self.scene
+        behind = falls_behind(self.scene_at(size))[0] if scene.has_mass else 0.0
         missed = max(1.0, 0.5 * scene.parts.law.size_over_a) * behind
         return missed > UNSEEN * rtol * size * scene.mu_star / scene.a
 

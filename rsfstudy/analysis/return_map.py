@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -80,12 +81,12 @@ class Orbit:
         """The section where the cycle begins."""
         return np.asarray(section(self.events[0].begin) + self.ahead)
 
-    @property
+    @cached_property
     def implied(self) -> np.ndarray:
         """Corrections of the numbers of its first event, because its events do not close."""
         return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
 
-    @property
+    @cached_property
     def numbers(self) -> np.ndarray:
         """The headline numbers of its first event, had its events closed."""
         return np.asarray(self.events[0].numbers() + self.implied)
@@ -274,24 +275,23 @@ class ReturnMap:
         where there is none. By Newton's method with Broyden's corrections.
         """
         at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
-        jacobian = product(slopes) - np.eye(len(start))
-        move = np.zeros(len(start))
+        jacobian, move = product(slopes) - np.eye(len(start)), None
         for _ in range(_TRIES):
             spent, recording = self._meter.spent, Recording() if self._recorded else None
             events = self.events(at, len(slopes), recording)
             if len(events) < len(slopes):
                 return None
             off = section(events[-1].end) - at
-            if move.any():
+            if move is not None:
                 jacobian += np.outer(off, move) / (move @ move)
             move = -np.linalg.solve(jacobian, off)
-            size = float(np.abs(move).max())
+            size = max(map(abs, move.tolist()))
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.spent - spent
                 return Orbit(tuple(events), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
-            if not np.abs(at - start).max() <= reach * scale:
+            if not max(map(abs, (at - start).tolist())) <= reach * scale:
                 return None
         return None
 

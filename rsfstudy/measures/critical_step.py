@@ -23,7 +23,14 @@ from rsfstudy.analysis.displacement_steps import DisplacementSteps
 from rsfstudy.analysis.normal_stress_steps import NormalStressSteps
 from rsfstudy.analysis.rate_steps import RateSteps
 from rsfstudy.analysis.sought import Steps
-from rsfstudy.analysis.swing import Swing, neutral, orbits_may_close, ratio_after, swing
+from rsfstudy.analysis.swing import (
+    Swing,
+    friction_acts_alone,
+    neutral,
+    orbits_may_close,
+    ratio_after,
+    swing,
+)
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
@@ -141,7 +148,11 @@ class CriticalStep(Measure):
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
         below = not orbits_may_close(scene) or ratio_after(scene) < 1.0
-        if below and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol):
+        if (
+            below
+            and friction_acts_alone(scene)
+            and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol)
+        ):
             return Outcome(
                 Status.UNVERIFIED,
                 message="stiffness is critical to within the accuracy: ask for a smaller rtol",

@@ -255,8 +255,9 @@ def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
     derivatives that both share, because the events do not quite close.
     """
     chance, scales = _BY_CHANCE * accuracy.rtol, _scales(one)
-    errors = map(error_between, one.numbers, again.numbers, [chance] * len(scales), scales)
-    return np.asarray(np.abs(one.implied) + np.array(list(errors)))
+    pairs = zip(one.numbers.tolist(), again.numbers.tolist(), scales.tolist(), strict=True)
+    errors = [error_between(number, refined, chance, scale) for number, refined, scale in pairs]
+    return np.asarray(np.abs(one.implied) + np.array(errors))
 
 
 def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:

@@ -136,7 +136,7 @@ def _left(scene: Scene, since: Event) -> tuple[Sequence[tuple[Scene, np.ndarray]
 
 def _up_to(table: np.ndarray, until: float) -> np.ndarray:
     """Those of the segments of a chain that begin before a time, the last of which ends then."""
-    if table[-1, ENDS_AT] <= until:
+    if until == math.inf or table[-1, ENDS_AT] <= until:
         return table
     count = max(int(np.searchsorted(table[:, BEGINS], until)), 1)
     cut = table[:count].copy()

@@ -33,7 +33,7 @@ def named(engine: Any) -> str:
         For a class that is no stepper, or has no name of its own.
     """
     if not isinstance(engine, type):
-        if not isinstance(engine, str) or not is_name(engine):
+        if not isinstance(engine, str) or not (engine in ENGINES or is_name(engine)):
             raise _unknown(engine)
         return engine
     base = importlib.import_module("rsfstudy.motion.steppers").Stepper

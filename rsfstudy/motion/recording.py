@@ -99,9 +99,14 @@ class Recording:
         if until is not None:
             last = row(until.time, until.slip, until.point, self.number(until.regime))
             table = up_to(table, np.array(last[:columns]))
-        table[:, 2] /= math.log(10.0)
-        table[:, 3:5] += scene.mu_star
-        return table
+        return in_units_of(scene, table)
+
+
+def in_units_of(scene: Scene, rows: np.ndarray) -> np.ndarray:
+    """The same rows, of which slip rates become decimal logarithms, and stresses those that act."""
+    rows[..., 2] /= math.log(10.0)
+    rows[..., STRESSES] += scene.mu_star
+    return rows
 
 
 def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
@@ -213,8 +218,7 @@ def _at_rows(columns: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndar
     """Values of columns between rows, at numbers of rows and parts: of the polynomial through those
     of the step.
     """
-    last = columns.shape[1] - 1
-    after = np.minimum(np.ceil(at).astype(int), last)
+    after = np.ceil(at).astype(int)
     within = places[after].astype(int)
     # from one regime to the next there is a straight line
     jumps = np.flatnonzero((within == 0) & (at > 0.0))
