@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events
-from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, section
+from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, image_of, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -49,6 +49,9 @@ class Approach:
         #: Derivatives of the section at the end of a cycle, and of its numbers below that, by the
         #: section at its beginning; and whether they are known.
         self._slopes, self._known = np.zeros((2 + NUMBERS, 2)), False
+        #: Section where the last cycle begins, its image, and by how much that has changed.
+        self._before = np.zeros(2), np.zeros(2 + NUMBERS)
+        self._changes = np.zeros(2 + NUMBERS)
         #: From the section where the last cycle begins to that of the limit cycle.
         self._ahead = np.zeros(2)
         #: What was left to go along the map where the motion leapt last.
@@ -100,27 +103,25 @@ class Approach:
         what is ahead from the last.
         """
         last = self.seen[-1]
-        begin, end = section(last.begin), section(last.end)
+        begin, image = section(last.begin), image_of(last)
         if len(self.seen) > 1:
-            before = self.seen[-2]
-            apart = begin - section(before.begin)
+            apart = begin - self._before[0]
             if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
                 self._known = True
-                changes = np.append(end, last.numbers())
-                changes -= np.append(section(before.end), before.numbers())
                 # the motion passes a section without a change of spring stress
                 (_none, way), passed = self._by.along(last.begin)
                 self._slopes[:, 1] = passed / way
-                self._slopes[:, 0] = (changes - apart[1] * self._slopes[:, 1]) / apart[0]
-        off = end - begin
+                changes = image - self._before[1] - apart[1] * self._slopes[:, 1]
+                self._slopes[:, 0] = changes / apart[0]
+        self._changes, self._before = image - self._before[1], (begin, image)
+        off = image[:2] - begin
         self._ahead = off + self._slopes[:2] @ off / (1.0 - min(self._return, _DIVERGES))
 
     def _repeats(self) -> bool:
         """True if the next cycles would all be the same: as the derivatives say, or because the
         last two are.
         """
-        numbers = self.seen[-1].numbers()
-        allowed = 0.3 * self._accuracy.rtol * np.abs(numbers)
+        allowed = 0.3 * self._accuracy.rtol * np.abs(self._before[1][2:])
         attracts = self._known and self._return < _DIVERGES
         if attracts and (np.abs(self._slopes[2:] @ self._ahead) <= allowed).all():
             return True
@@ -128,7 +129,7 @@ class Approach:
             return False
         if self._wavers():
             return True
-        change = np.abs(numbers - self.seen[-2].numbers())
+        change = np.abs(self._changes[2:])
         left = min(max(self._return, 0.0), _DIVERGES)
         return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
 

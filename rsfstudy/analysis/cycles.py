@@ -82,20 +82,13 @@ class Cycle(NamedTuple):
         """Range of ln V."""
         return self.fastest - self.slowest
 
-    def numbers(self) -> np.ndarray:
+    def numbers(self) -> tuple[float, ...]:
         """The headline numbers, in the order of their names; stress drops are from where the event
         begins, because the next may begin elsewhere.
         """
         highest = self.begin.spring_stress
-        return np.array(
-            [
-                self.interval,
-                highest - self.lowest,
-                highest - self.at_peak,
-                self.slowest / LN10,
-                self.fastest / LN10,
-            ]
-        )
+        drops = highest - self.lowest, highest - self.at_peak
+        return self.interval, *drops, self.slowest / LN10, self.fastest / LN10
 
 
 def cycles(

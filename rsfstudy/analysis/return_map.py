@@ -89,7 +89,7 @@ class Orbit:
     @cached_property
     def numbers(self) -> np.ndarray:
         """The headline numbers of its first event, had its events closed."""
-        return np.asarray(self.events[0].numbers() + self.implied)
+        return np.asarray(np.array(self.events[0].numbers()) + self.implied)
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -119,6 +119,11 @@ class Orbit:
 def section(point: Point) -> np.ndarray:
     """Spring stress and states: all there is to say where V rises through V_0."""
     return np.array((point.spring_stress, *point.psis))
+
+
+def image_of(cycle: Cycle) -> np.ndarray:
+    """The section at the end of an event, and its numbers below that."""
+    return np.array((cycle.end.spring_stress, *cycle.end.psis, *cycle.numbers()))
 
 
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
@@ -194,7 +199,7 @@ class ReturnMap:
         does not come that far.
         """
         seen = self.events(start, 1)
-        return np.append(section(seen[0].end), seen[0].numbers()) if seen else None
+        return image_of(seen[0]) if seen else None
 
     def slopes(self, start: np.ndarray, count: int, scale: float) -> tuple[np.ndarray, ...]:
         """Derivatives of so many events, one after the other, none of which takes a small step far;

@@ -174,12 +174,14 @@ def along_path(
     lengths = np.abs(np.diff(seen, axis=1) / spread).sum(axis=0)
     total = lengths.sum()
     lengths = lengths / (total if total > 0.0 else 1.0) + 1.0 / max(len(lengths), 1)
-    path = np.concatenate([[0.0], np.cumsum(lengths)])
+    path = np.zeros(len(table))
+    lengths.cumsum(out=path[1:])
     at = np.interp(np.linspace(0.0, path[-1], points), path, np.arange(len(table)))
+    inner = at[1:-1]
     for values in seen[1:] if points > 2 else ():
-        for sign in (1.0, -1.0):
-            extreme = _extreme(sign * values, columns[PLACE])
-            at[1:-1][np.argmin(np.abs(at[1:-1] - extreme))] = extreme
+        for top in (int(values.argmax()), int(values.argmin())):
+            extreme = _extreme(values, top, columns[PLACE])
+            inner[np.abs(inner - extreme).argmin()] = extreme
     found = _at_rows(columns[: len(names)], columns[PLACE], at)
     # times of a rupture may differ by less than rounding
     found[0] = np.maximum.accumulate(found[0])
@@ -235,9 +237,8 @@ def _at_rows(columns: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndar
     return found
 
 
-def _extreme(values: np.ndarray, places: np.ndarray) -> float:
-    """Number of the row, and part to the next, where values are largest."""
-    top = int(np.argmax(values))
+def _extreme(values: np.ndarray, top: int, places: np.ndarray) -> float:
+    """Number of the row, and part to the next, where values are extreme; next to an extreme row."""
     for after in (top, top + 1):  # the step it lies in, or ends, and the one that begins with it
         if after >= len(values) or not places[after]:
             continue
