@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy import Scene
-from rsfstudy.analysis.swing import settles
+from rsfstudy.analysis.after_step import settles
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy

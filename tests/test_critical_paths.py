@@ -7,9 +7,9 @@ import pytest
 from conftest import cot_phi
 
 from rsfstudy import Scene
-from rsfstudy.analysis import shooting
+from rsfstudy.analysis import search_of_steps
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.rate_steps import RateSteps
+from rsfstudy.analysis.kinds_of_steps import RateSteps
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -74,11 +74,11 @@ def test_the_slope_of_the_misfit_is_that_of_paths():
         found[log_size] = 2.0 * (0.75 - log_size)
         return found[log_size]
 
-    root, slope = shooting._root(misfit, found, 0.5, 1.0)
+    root, slope = search_of_steps._root(misfit, found, 0.5, 1.0)
     assert root == pytest.approx(0.75, abs=2e-4)
     assert slope == pytest.approx(-2.0, rel=1e-9)
     found.clear()
-    assert shooting._root(lambda size: 1.0 if size < 0.7 else -1.0, found, 0.5, 1.0) is None
+    assert search_of_steps._root(lambda size: 1.0 if size < 0.7 else -1.0, found, 0.5, 1.0) is None
 
 
 def test_a_fall_of_normal_stress_leaves_sigma_3_positive():

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis import swing
+from rsfstudy.analysis import after_step
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.rate_steps import RateSteps
+from rsfstudy.analysis.kinds_of_steps import RateSteps
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
@@ -263,7 +263,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     without = found(scene.with_(inertia=False), rtol=1e-8)[0]
     values = {}
     for heavy in (False, True):
-        for module in (critical_step, swing):
+        for module in (critical_step, after_step):
             monkeypatch.setattr(module, "mass_acts", lambda *_scene, heavy=heavy: heavy)
         values[heavy] = found(scene, rtol=1e-8)[:2]
     (path, error), (forward, its_error) = values[False], values[True]
@@ -444,9 +444,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_norm_rate
-        assert not swing.swing(scene, Accuracy(1e-6), Meter(500_000)).reached
+        assert not after_step.reaches_norm(scene, Accuracy(1e-6), Meter(500_000))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert swing.swing(low, Accuracy(1e-6), Meter(500_000)).reached
+    assert after_step.reaches_norm(low, Accuracy(1e-6), Meter(500_000))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():

@@ -15,7 +15,12 @@ from rsfstudy.named_studies._triggers import Triggers
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.swing import friction_acts_alone, neutral, orbits_may_close, swing
+from rsfstudy.analysis.after_step import (
+    friction_acts_alone,
+    neutral,
+    orbits_may_close,
+    reaches_norm,
+)
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -147,7 +152,7 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
         return
     for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
         stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
-        assert swing(stepped, Accuracy(1e-6), Meter(200_000)).reached is reached
+        assert reaches_norm(stepped, Accuracy(1e-6), Meter(200_000)) is reached
 
 
 @pytest.mark.parametrize(("ratio", "b_over_a"), [(1.0625, 2.5), (1.125, 2.515625)])
@@ -171,7 +176,7 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     """What is shot for, and what a survey by motions alone closes in on."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
-    for shot in ("from_touching_path", "from_touching_cycle"):
+    for shot in ("from_critical_path", "from_touching_cycle"):
         monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
     forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
     assert abs(value - forward) <= error + its_error

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rsfstudy import Laboratory, Scene, protocol, simulate
-from rsfstudy.analysis.swing import swing
+from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.meter import Meter
@@ -104,7 +104,7 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     step = 1.0 / q - 1.0
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
-        assert swing(stepped, Accuracy(1e-9), Meter(100_000)).reached is reached
+        assert reaches_norm(stepped, Accuracy(1e-9), Meter(100_000)) is reached
 
 
 @pytest.mark.parametrize("inertia", [False, True])

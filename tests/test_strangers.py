@@ -304,7 +304,7 @@ def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, 
             again()
 
 
-@pytest.mark.parametrize("name", ["problem", "sought"])
+@pytest.mark.parametrize("name", ["problem", "cycles"])
 def test_a_measure_that_is_no_measure_of_ours(name, tiny, tmp_path):
     """Though a module beside the measures bears its name."""
     other = with_other_attributes(tiny, ("", "declaration", "measure", "name"), replaced(name))

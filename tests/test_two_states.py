@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.analysis import swing
+from rsfstudy.analysis import after_step
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -253,12 +253,12 @@ def test_growth_confirms_a_threshold_close_to_another(mass):
 )
 def test_below_a_window_of_instability_motions_settle(ratio, margin):
     scene = Scene(law="two_slip_states", stiffness_ratio=ratio, load_velocity_ratio=1.2, **WINDOW)
-    assert swing.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
-    assert swing.settles(scene) is (margin > 0.0)
+    assert after_step.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
+    assert after_step.settles(scene) is (margin > 0.0)
     if ratio == 0.2:
         assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
-        small = swing.swing(scene, Accuracy(1e-4), Meter(2_000_000))
-        assert not small.reached
+        small = after_step.reaches_norm(scene, Accuracy(1e-4), Meter(2_000_000))
+        assert not small
 
 
 # ---- three states --------------------------------------------------------------------------------

@@ -9,10 +9,9 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from rsfstudy.analysis.after_step import stability_margin
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.shooting import LOOSE
-from rsfstudy.analysis.sought import Steps
-from rsfstudy.analysis.swing import stability_margin
+from rsfstudy.analysis.search_of_steps import LOOSE, Steps
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.meter import TIGHTEST, Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold
@@ -36,7 +35,7 @@ class Boundary:
     of_cycle: bool = False
 
 
-def from_touching_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
+def from_critical_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
     """Boundary from the critical path, unless smaller steps may be unstable, at once or when the
     motion comes back; None where there is no such path.
     """

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.analysis.swing import settles
+from rsfstudy.analysis.after_step import settles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import (

@@ -4,8 +4,9 @@ stress that triggers instability.
 A step is critical when the peak slip rate of the motion it sets off just touches the instability
 norm. Where mass hardly acts up to the norm, the touching path is known at its end: ln V is at the
 norm and at rest there. Followed against time, where it attracts its neighbours, it leads to the
-step that started it; see `touching`. Where mass acts below the norm, the peak is followed forward;
-see `swing`. Either way the answer counts only once a motion on each side of it has confirmed it.
+step that started it; see `critical_path`. Where mass acts below the norm, the peak is followed
+forward; see `after_step`. Either way the answer counts only once a motion on each side of it has
+confirmed it.
 """
 
 from __future__ import annotations
@@ -18,19 +19,17 @@ from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.analysis.by_path import Boundary, from_touching_cycle, from_touching_path
-from rsfstudy.analysis.displacement_steps import DisplacementSteps
-from rsfstudy.analysis.normal_stress_steps import NormalStressSteps
-from rsfstudy.analysis.rate_steps import RateSteps
-from rsfstudy.analysis.sought import Steps
-from rsfstudy.analysis.swing import (
-    Swing,
+from rsfstudy.analysis.after_step import (
+    excess_over_norm,
     friction_acts_alone,
     neutral,
     orbits_may_close,
     ratio_after,
-    swing,
+    reaches_norm,
 )
+from rsfstudy.analysis.by_path import Boundary, from_critical_path, from_touching_cycle
+from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressSteps, RateSteps
+from rsfstudy.analysis.search_of_steps import Steps
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
@@ -132,7 +131,7 @@ class CriticalStep(Measure):
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Find the boundary, then confirm it with a motion on each side.
 
-        Where mass hardly acts below the norm it is found from the `touching` path; where there is
+        Where mass hardly acts below the norm it is found from the `critical_path`; where there is
         no such path, or mass acts, from motions followed forward.
         """
         check_single_step(scene)
@@ -163,7 +162,7 @@ class CriticalStep(Measure):
         if not mass_acts(scene, accuracy):
             # a cycle attracts no path, and takes more care
             careful = replace(accuracy, rtol=min(accuracy.rtol, _CAREFUL))
-            for find, asked in ((from_touching_path, accuracy), (from_touching_cycle, careful)):
+            for find, asked in ((from_critical_path, accuracy), (from_touching_cycle, careful)):
                 boundary = find(steps, asked, meter)
                 if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
                     outcome = self._verified(steps, boundary, asked, meter)
@@ -190,8 +189,8 @@ class CriticalStep(Measure):
         first = width = max(first, accuracy.rtol)
         while width < _WIDEST:
             inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
-            below, above = (_swung(steps, size, accuracy, meter) for size in (inner, outer))
-            if below and above and above.reached and not below.reached:
+            below, above = (_excess(steps, size, accuracy, meter) for size in (inner, outer))
+            if below is not None and above is not None and above >= 0.0 > below:
                 at_once = width == first and not boundary.by_motions
                 relative = boundary.relative_error if at_once else width
                 error = steps.error(boundary.size, relative)
@@ -201,7 +200,7 @@ class CriticalStep(Measure):
                 return Outcome(Status.OK, values)
             if not (boundary.by_motions or boundary.of_cycle):
                 break
-            if boundary.of_cycle and below and below.reached and below.excess > _AT_ONCE:
+            if boundary.of_cycle and below is not None and below > _AT_ONCE:
                 break
             width *= 10.0
         return Outcome(
@@ -233,16 +232,13 @@ class CriticalStep(Measure):
         on the boundary.
         """
 
-        def at(log_size: float) -> Swing:
-            return swing(steps.scene_at(math.exp(log_size)), accuracy, meter)
-
         smallest, largest = math.log(steps.smallest), math.log(steps.largest)
         spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
         stable: float | None = None
         unstable = smallest
         while unstable <= largest + 1e-9:
             try:
-                if at(unstable).reached:
+                if reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
                     break
             except Halt as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
@@ -262,7 +258,7 @@ class CriticalStep(Measure):
     def _closed_in(
         self, steps: Steps, bracket: tuple[float, float], accuracy: Accuracy, meter: Meter
     ) -> Outcome:
-        """Boundary between a stable and an unstable log size, where the excess of the swings
+        """Boundary between a stable and an unstable log size, where the excess of the motions
         changes sign; the middle of what is left where a motion in between cannot go on.
         """
         stable, unstable = bracket
@@ -271,12 +267,12 @@ class CriticalStep(Measure):
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = swing(steps.scene_at(math.exp(log_size)), accuracy, meter)
-            if found.reached:
+            found = excess_over_norm(steps.scene_at(math.exp(log_size)), accuracy, meter)
+            if found >= 0.0:
                 unstable = min(unstable, log_size)
             else:
                 stable = max(stable, log_size)
-            return found.excess
+            return found
 
         try:
             log_size = toms748(excess, *bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
@@ -286,7 +282,7 @@ class CriticalStep(Measure):
             if unstable - stable > _WIDEST:
                 return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
             log_size = 0.5 * (stable + unstable)
-        # the swings that found it would confirm their own errors: the verdicts come from others
+        # the motions that found it would confirm their own errors: the verdicts come from others
         size = math.exp(log_size)
         error = max(accuracy.rtol + steps.blur(size, accuracy.rtol), unstable - stable)
         boundary = Boundary(size, error, by_motions=True)
@@ -315,10 +311,10 @@ class CriticalStep(Measure):
         )
 
 
-def _swung(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> Swing | None:
-    """Motion after a step of this size; None where it cannot go on."""
+def _excess(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> float | None:
+    """Excess of the motion after a step of this size; None where it cannot go on."""
     try:
-        return swing(steps.scene_at(size), accuracy, meter)
+        return excess_over_norm(steps.scene_at(size), accuracy, meter)
     except Halt as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
@@ -341,11 +337,11 @@ def _neighbours(
     of four.
     """
     middle = math.log(near)
-    reached = swing(steps.scene_at(near), accuracy, meter).reached
+    reached = reaches_norm(steps.scene_at(near), accuracy, meter)
     inner, reach = middle, 1e-4
     while reach < 1.5:
         outer = middle - reach if reached else min(middle + reach, math.log(steps.largest))
-        if swing(steps.scene_at(math.exp(outer)), accuracy, meter).reached != reached:
+        if reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
             return (outer, inner) if reached else (inner, outer)
         inner, reach = outer, 5.0 * reach
     return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.analysis.swing import neutral, swing
+from rsfstudy.analysis.after_step import neutral, reaches_norm
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import Accuracy
@@ -40,7 +40,7 @@ class Triggered(Measure):
         if not scene.is_disturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
-        answer, again = (swing(scene, asked, meter).reached for asked in accuracies)
+        answer, again = (reaches_norm(scene, asked, meter) for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
         if answer != again or neutral(scene, 10.0 * accuracy.rtol):
             return Outcome(

@@ -1,4 +1,4 @@
-"""The swings after a step, forward in time: does the slip rate reach the instability norm?"""
+"""The motion after a step and its outcome: does the slip rate reach the instability norm?"""
 
 from __future__ import annotations
 
@@ -41,24 +41,6 @@ _TOP = maximum("log_slip_rate")
 
 
 @dataclass(frozen=True)
-class Swing:
-    """Motion after a step, and its outcome.
-
-    Attributes
-    ----------
-    reached : bool
-        Whether the slip rate reaches the instability norm.
-    excess : float
-        Positive where it does, negative where not; continuous across the boundary as far as the
-        motion allows: the peak's distance in ln V from the norm where mass acts, the growth from
-        one peak to the next where it does not.
-    """
-
-    reached: bool
-    excess: float
-
-
-@dataclass(frozen=True)
 class _Steady(steady.Steady):
     """Steady sliding at the load point velocity, and the margin of its stability.
 
@@ -86,13 +68,22 @@ class _Orbit:
     top_at_start: float = -math.inf
 
 
-def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
-    """Follow the motion after the step until it is certain whether it reaches the instability norm.
+def reaches_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
+    """True if the slip rate reaches the norm after the step (see `excess_over_norm`)."""
+    return excess_over_norm(scene, accuracy, meter) >= 0.0
+
+
+def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
+    """Excess of the motion after the step, which is followed until it is certain whether its slip
+    rate reaches the instability norm: negative where it does not.
+
+    It is continuous across the boundary as far as the motion allows: the distance of the peak of ln
+    V from the norm where mass acts, the growth from one peak to the next where it does not.
 
     Without mass the motion is planar and autonomous: paths cannot cross, so a peak no higher than
     the one before means that none will ever be higher, and peaks that grow go on growing until they
-    reach the norm or a limit cycle. To see which without following a thousand swings, the motion
-    leaps to a somewhat larger orbit: if that grows too, and so on up to the norm, so does the orbit
+    reach the norm or a limit cycle. To see which without following a thousand orbits, the motion
+    leaps to a somewhat larger one: if that grows too, and so on up to the norm, so does the orbit
     inside it. With mass, which acts during ruptures only, the same rules serve; with several states
     only the norm, steady sliding itself or a cycle that repeats ends a motion. For load points that
     are held see `held`.
@@ -103,20 +94,19 @@ def swing(scene: Scene, accuracy: Accuracy, meter: Meter) -> Swing:
         With `no_steady_state` where the load point velocity has none, or as `motion` does.
     """
     if scene.log_load_rate == -math.inf:
-        excess = excess_of_peak(scene, accuracy, meter)
-        return Swing(excess >= 0.0, excess)
+        return excess_of_peak(scene, accuracy, meter)
     steady = _steady(scene)
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
     if orbits_may_close(scene) and abs(steady.margin) < accuracy.rtol:
         top = _top_of_closed_orbit(scene, accuracy, meter)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
-            return Swing(top >= norm, top - norm)
+            return top - norm
     first = _orbit(scene, steady, None, accuracy, meter)
     reached = first.reached
     if first.slow_growth_at is not None:
         reached = _grows_to_the_norm(scene, steady, first.slow_growth_at, accuracy, meter)
     excess = _excess(first, norm, heavy=heavy)
-    return Swing(reached, max(excess, 1e-12) if reached else min(excess, -1e-12))
+    return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
 
 def friction_acts_alone(scene: Scene) -> bool:
