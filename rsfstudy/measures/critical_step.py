@@ -161,8 +161,9 @@ class CriticalStep(Measure):
             return self._surveyed(steps, accuracy, meter)
         if not mass_acts(scene, accuracy):
             # a cycle attracts no path, and takes more care
-            careful = replace(accuracy, rtol=min(accuracy.rtol, _CAREFUL))
-            for find, asked in ((from_critical_path, accuracy), (from_touching_cycle, careful)):
+            rtols = accuracy.rtol, min(accuracy.rtol, _CAREFUL)
+            for find, rtol in zip((from_critical_path, from_touching_cycle), rtols, strict=True):
+                asked = accuracy if rtol == accuracy.rtol else replace(accuracy, rtol=rtol)
                 boundary = find(steps, asked, meter)
                 if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
                     outcome = self._verified(steps, boundary, asked, meter)
