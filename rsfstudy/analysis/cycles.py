@@ -103,24 +103,30 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    watch, ahead = _Watch(start), 0 if start else scene.parts.loading.told
+    begin, begun, fallen, seen = start, 0.0, start is None, list[Event]()
+    ahead = 0 if start else scene.parts.loading.told
     swings, asked = list[float](), _asked(scene.log_load_rate)
     motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
     for event in motion:
         if event.kind is Kind.SEGMENT:
-            watch, ahead = _Watch(None), ahead - 1
+            begin, fallen, seen, ahead = None, True, [], ahead - 1
         if ahead:
             continue
-        cycle = watch.see(event)
-        if cycle is not None:
+        if event.kind is Kind.SETTLED:
+            yield None
+            return
+        fallen = fallen or event.kind is Kind.FALL
+        seen.append(event)
+        if event.kind is not Kind.RISE or not fallen:
+            continue
+        if begin is not None:
+            cycle = _cycle(begin, begun, seen)
             swings.append(cycle.swing)
             if swings[-1] < _STEADY or (_dies_down(swings) and settles(scene)):
                 yield None
                 return
             yield cycle
-        elif event.kind is Kind.SETTLED:
-            yield None
-            return
+        begin, begun, fallen, seen = event.point, event.time, False, []
 
 
 def more_events(events: int, name: str = "events") -> str:
@@ -165,46 +171,28 @@ def _dies_down(swings: list[float]) -> bool:
     return swings[-1] - still_to_come < 0.1 * swings[-1]
 
 
-class _Watch:
-    """Sees events go by and puts cycles together."""
+def _cycle(begin: Point, begun: float, seen: Sequence[Event]) -> Cycle:
+    """The cycle that has begun at a point and a time, and ends with the last of some events."""
+    points, end = [event.point for event in seen], seen[-1]
+    fastest, rested = max(points, key=_LOG_RATE), min(points, key=_LOG_RATE)
+    return Cycle(
+        interval=end.time - begun,
+        highest=end.point.spring_stress,
+        lowest=min(map(_SPRING, points)),
+        at_peak=fastest.spring_stress,
+        sliding=fastest.coefficient,
+        slowest=rested.log_slip_rate,
+        fastest=fastest.log_slip_rate,
+        landed=_landed(seen) or rested,
+        rested=rested,
+        begin=begin,
+        end=end.point,
+    )
 
-    def __init__(self, start: Point | None) -> None:
-        self._begin, self._begun = start, 0.0
-        self._fallen = start is None
-        self._seen: list[Event] = []
 
-    def see(self, event: Event) -> Cycle | None:
-        """Take one event in; returns a cycle that ends with it."""
-        self._fallen = self._fallen or event.kind is Kind.FALL
-        self._seen.append(event)
-        if event.kind is not Kind.RISE or not self._fallen:
-            return None
-        cycle = None if self._begin is None else self._complete(self._begin, event)
-        self._begin, self._begun, self._fallen = event.point, event.time, False
-        self._seen = []
-        return cycle
-
-    def _complete(self, begin: Point, end: Event) -> Cycle:
-        points = [event.point for event in self._seen]
-        fastest, rested = max(points, key=_LOG_RATE), min(points, key=_LOG_RATE)
-        return Cycle(
-            interval=end.time - self._begun,
-            highest=end.point.spring_stress,
-            lowest=min(map(_SPRING, points)),
-            at_peak=fastest.spring_stress,
-            sliding=fastest.coefficient,
-            slowest=rested.log_slip_rate,
-            fastest=fastest.log_slip_rate,
-            landed=self._landed() or rested,
-            rested=rested,
-            begin=begin,
-            end=end.point,
-        )
-
-    def _landed(self) -> Point | None:
-        """Point where slip is below V_0 after the rupture, and friction balances the spring."""
-        for fallen, event in enumerate(self._seen):
-            if event.kind is Kind.FALL:
-                after = self._seen[fallen:]
-                return next((e.point for e in after if e.regime != IN_RUPTURE), None)
-        return None
+def _landed(seen: Sequence[Event]) -> Point | None:
+    """Point where slip is below V_0 after the rupture, and friction balances the spring."""
+    for fallen, event in enumerate(seen):
+        if event.kind is Kind.FALL:
+            return next((e.point for e in seen[fallen:] if e.regime != IN_RUPTURE), None)
+    return None

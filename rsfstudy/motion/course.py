@@ -9,13 +9,14 @@ import numpy as np
 
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, EventSpecification, Kind
+from rsfstudy.motion.handover import limits
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regimes import jumped, starting
 from rsfstudy.motion.running import along as along
-from rsfstudy.motion.running import chain, happening
+from rsfstudy.motion.running import happening, runner_of
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import BEGINS, ENDS_AT, LOG_LOAD_RATE, LOG_VELOCITY
+from rsfstudy.slider.places import BEGINS, ENDS_AT, LOADING, LOG_LOAD_RATE, LOG_VELOCITY
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import FOR_EVER, Scene
 
@@ -80,17 +81,16 @@ def follow(
         asked = watches if goes_on else _without_settling(watches)
         table = _up_to(table, until)
         end = float(table[-1, ENDS_AT])
-        for last in chain(
-            acting,
-            accuracy,
-            meter,
+        for last in runner_of(acting, meter.engine, clock=clock).run(
             start,
+            meter,
             asked,
-            origin=(time, slip, start.spring_stress),
-            table=table,
-            told=told,
-            clock=clock,
+            accuracy.solver,
+            times=(float(table[0, ENDS_AT]) - time if clock else math.inf, time, slip),
+            between=limits(acting, accuracy),
             recording=recording,
+            kinks=(table[1:], told),
+            imposed=acting.numbers[LOADING + 2] if acting.parts.loading.displaces else None,
         ):
             if before is not None and last.kind is Kind.START:
                 for event in _begun(last, before, acting, asked):

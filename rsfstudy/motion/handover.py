@@ -51,9 +51,15 @@ class Limits(NamedTuple):
     inertial_time: float
 
 
+#: The limits of a motion without mass, which reads none.
+NO_MASS = Limits(*[math.nan] * len(Limits._fields))
+
+
 @once
 def limits(scene: Scene, accuracy: Accuracy) -> Limits:
-    """The limits of a scene with mass, at an accuracy."""
+    """The limits of a scene at an accuracy."""
+    if not scene.has_mass:
+        return NO_MASS
     softness = scene.stiffness / scene.a
     return Limits(
         math.sqrt(accuracy.switch_weight / softness),

@@ -67,10 +67,6 @@ class Recording:
         assert self.at is not None
         return np.asarray(self.at, dtype=float)[sum(map(len, self._rows)) :]
 
-    def add(self, rows: Sequence[tuple[float, ...]]) -> None:
-        """Add rows as `row` makes them."""
-        self._rows.append(np.array(rows, dtype=float))
-
     def take(self, rows: np.ndarray, regimes: Sequence[str]) -> None:
         """Take in rows as the loop makes them, in which regimes are numbered as in a list."""
         if self.at is not None and not np.isnan(rows[0, 0]):

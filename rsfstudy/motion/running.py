@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.motion import layout, workspace
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.columns import filling
 from rsfstudy.motion.detection import BEFORE, NOWHERE, between
 from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
 from rsfstudy.motion.events import Event, EventSpecification, Kind
-from rsfstudy.motion.handover import Limits, limits
+from rsfstudy.motion.handover import NO_MASS, Limits
 from rsfstudy.motion.loop import advance
 from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
@@ -24,7 +23,7 @@ from rsfstudy.motion.regimes import halted
 from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import ENDS_AT, LOADING, RELIEF
+from rsfstudy.slider.places import RELIEF
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -41,7 +40,6 @@ _named = tuple.__new__
 _TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
 _NOTHING = layout.NEVER, np.empty(0), np.empty((0, STATES))
 _NO_KINKS = np.empty((0, RELIEF + 1)), 0
-_NO_MASS = Limits(*[math.nan] * len(Limits._fields))
 
 
 class Plain:
@@ -147,10 +145,10 @@ class Runner:
         watches: Sequence[EventSpecification],
         tolerance: float,
         *,
-        times: tuple[float, ...] = (math.inf, 0.0, 0.0, 0.0),
+        times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
         backward: bool = False,
         p: Numbers | None = None,
-        between: Limits = _NO_MASS,
+        between: Limits = NO_MASS,
         budget: float = math.inf,
         recording: Recording | None = None,
         kinks: tuple[np.ndarray, int] = _NO_KINKS,
@@ -168,7 +166,7 @@ class Runner:
         tolerance : float
             Local error per step.
         times : tuple of float
-            How long it lasts, and time, slip and spring stress where it begins.
+            How long it lasts, and time and slip where it begins.
         backward : bool
             Run against the clock of the equations.
         p : tuple of float, optional
@@ -181,7 +179,8 @@ class Runner:
         kinks : tuple of ndarray and int
             Those of the loading, and how many of the last ones are told.
         imposed : float, optional
-            What the last unknown is less of where it is shear stress that is to be recorded.
+            Where the load point moves to and fro, shear stress that this adds when the last unknown
+            is zero: while steps are taken, stresses are without what it adds, told with it.
 
         Raises
         ------
@@ -191,9 +190,10 @@ class Runner:
         machine, states, systems, numbers = self._machine, self._states, self._systems, self._p
         before, turns = numbers, len(kinks[0])
         if isinstance(start, Point):
-            y, last = np.empty(2 * self._unknowns), _columns_of(start)
+            start = start if imposed is None else _pushed(start, imposed - start.psis[-1])
+            y, last, stress = np.empty(2 * self._unknowns), _columns_of(start), start.spring_stress
         else:  # behind the unknowns is room for as many
-            y, last = np.array((*start, *start)), np.empty(layout.PSIS + states)
+            y, last, stress = np.array((*start, *start)), np.empty(layout.PSIS + states), 0.0
         if p is not None or turns:  # numbers that are those of this motion alone
             before = numbers = machine.numbers(systems[0].p if p is None else p)
             if turns:
@@ -204,8 +204,7 @@ class Runner:
         state = machine.state(
             self._initial,
             (
-                *times,
-                tolerance,
+                *(*times, stress, tolerance),
                 # what limits a step must differ between two tolerances whose results tell errors
                 (tolerance / TOLERANCE_OF_STRIDES) ** 0.125,
                 -1.0 if backward else 1.0,
@@ -239,61 +238,14 @@ class Runner:
             for line in events[:happened].tolist():
                 code, regime, clock, time, slip, spent = line[: layout.POINT]
                 point = _named(Point, (*line[layout.POINT : psis], tuple(line[psis:])))
+                if imposed is not None:
+                    point = _pushed(point, point.psis[-1] - imposed)
                 kind, watch = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
                 yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
             meter.check()
         if end != layout.ENDED:
             raise _halt(end, state, regimes, stepper)
-
-
-def chain(
-    scene: Scene,
-    accuracy: Accuracy,
-    meter: Meter,
-    start: Point,
-    watches: Sequence[EventSpecification],
-    *,
-    origin: Numbers,
-    table: np.ndarray,
-    told: int,
-    clock: bool,
-    recording: Recording | None,
-) -> Iterator[Event]:
-    """Events of segments of loading that follow each other without a jump; the last is their end,
-    unless one ends the motion earlier.
-
-    Parameters
-    ----------
-    scene, accuracy, meter, start, watches, clock, recording
-        As those of `course.follow`.
-    origin : tuple of float
-        Time, slip and spring stress where the first segment begins.
-    table : ndarray
-        The segments, one row each (see `places`).
-    told : int
-        How many segments, the last ones, are told to begin.
-    """
-    runner = _runner(scene, meter.engine, clock=clock)
-    lasts = float(table[0, ENDS_AT]) - origin[0] if clock else math.inf
-    first = scene.numbers[LOADING + 2] if scene.parts.loading.displaces else None
-    if first is not None:  # in the loop stresses are without what the load point imposes
-        start = _pushed(start, first - start.psis[-1])
-        origin = *origin[:2], start.spring_stress
-    happens = runner.run(
-        start,
-        meter,
-        watches,
-        accuracy.solver,
-        times=(lasts, *origin),
-        between=limits(scene, accuracy) if scene.has_mass else _NO_MASS,
-        recording=recording,
-        kinks=(table[1:], told),
-        imposed=first,
-    )
-    if first is None:
-        return happens
-    return (e._replace(point=_pushed(e.point, e.point.psis[-1] - first)) for e in happens)
 
 
 def _pushed(point: Point, by: float) -> Point:
@@ -319,7 +271,7 @@ def along(
 
 
 @once
-def _runner(scene: Scene, engine: str, *, clock: bool) -> Runner:
+def runner_of(scene: Scene, engine: str, *, clock: bool) -> Runner:
     """What runs the motions of a scene."""
     return Runner(
         between_ruptures(scene, clock=clock),
