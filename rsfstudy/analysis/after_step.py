@@ -167,8 +167,8 @@ def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> floa
     begin = starting(scene)
     equations, start = without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
     rising, norm = equations.at(start).growth > 0.0, scene.log_norm_rate
-    watches = (_TOP, minimum("log_slip_rate"), rise("log_slip_rate", norm))
-    for event in along(equations, start, accuracy.solver, meter, watches, backward=not rising):
+    specs = (_TOP, minimum("log_slip_rate"), rise("log_slip_rate", norm))
+    for event in along(equations, start, accuracy.solver, meter, specs, backward=not rising):
         if event.kind is Kind.RISE:
             return norm + _HIGHER
         if (
@@ -223,13 +223,13 @@ def _orbit(
     follow.
     """
     norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    watches = [_TOP] if heavy else [_TOP, rise("log_slip_rate", norm)]
+    specs = [_TOP] if heavy else [_TOP, rise("log_slip_rate", norm)]
     levels = levels_of_rise(scene) if steady.stable else []
-    watches += [settling(_CLOSE), *levels] if steady.stable else []
+    specs += [settling(_CLOSE), *levels] if steady.stable else []
     planar, repeating = scene.states == 1, _Repeating(scene, steady, accuracy)
     peaks: list[float] = []
     at_start = -math.inf
-    for event in follow(scene, accuracy, meter, watches, start=start):
+    for event in follow(scene, accuracy, meter, specs, start=start):
         top = event.point.log_slip_rate
         if event.kind is Kind.START:
             if start is None and event.point.growth <= 0.0:

@@ -132,9 +132,9 @@ class CriticalPath(NamedTuple):
         """
         above = rise("log_slip_rate", self.log_norm_rate + _ABOVE, ends=True, waits=True)
         lost = fall("log_slip_rate", _SLOWEST, ends=True, waits=True)
-        watches = (above, lost, rise(*crossing), fall(*crossing))
-        for event in self._events(tolerance, meter, watches, backward=True):
-            if event.watch in watches[2:] and accepts(event.point):
+        specs = (above, lost, rise(*crossing), fall(*crossing))
+        for event in self._events(tolerance, meter, specs, backward=True):
+            if event.watch in specs[2:] and accepts(event.point):
                 return event.point
         return None
 
@@ -142,7 +142,7 @@ class CriticalPath(NamedTuple):
         self,
         tolerance: float,
         meter: Meter,
-        watches: Sequence[EventSpecification],
+        specs: Sequence[EventSpecification],
         *,
         backward: bool,
     ) -> Iterator[Event]:
@@ -155,7 +155,7 @@ class CriticalPath(NamedTuple):
         enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
         try:
             yield from self.runner.run(
-                start, meter, watches, tolerance, backward=backward, p=self.p, budget=enough
+                start, meter, specs, tolerance, backward=backward, p=self.p, budget=enough
             )
         except Halt as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
@@ -201,14 +201,14 @@ class CriticalPath(NamedTuple):
         return False
 
     def _coming_back(
-        self, tolerance: float, meter: Meter, *watches: EventSpecification
+        self, tolerance: float, meter: Meter, *specs: EventSpecification
     ) -> Iterator[Event]:
         """Events, peaks among them, of the motion that has touched the norm and fallen below
         V_0.
         """
         fallen = False
         asked = (
-            *watches,
+            *specs,
             maximum("log_slip_rate"),
             fall("log_slip_rate", self.p[LOG_LOAD_RATE], waits=True),
         )

@@ -40,7 +40,7 @@ def excess_of_peak(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
     """
     norm, heavy, highest = scene.log_norm_rate, mass_acts(scene, accuracy), -math.inf
     try:
-        for event in follow(scene, accuracy, meter, _watches(scene, norm, heavy=heavy)):
+        for event in follow(scene, accuracy, meter, _specs(scene, norm, heavy=heavy)):
             if event.kind is Kind.RISE:
                 return event.point.growth**2
             if event.kind in (Kind.START, Kind.MAXIMUM):
@@ -54,18 +54,18 @@ def excess_of_peak(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
     return highest - norm
 
 
-def _watches(scene: Scene, norm: float, *, heavy: bool) -> list[EventSpecification]:
+def _specs(scene: Scene, norm: float, *, heavy: bool) -> list[EventSpecification]:
     """Peaks, the norm, the end of shear stress, and levels of ln V ever farther below the norm."""
-    watches = [maximum("log_slip_rate")]
+    specs = [maximum("log_slip_rate")]
     if not heavy:
-        watches.append(rise("log_slip_rate", norm))
+        specs.append(rise("log_slip_rate", norm))
     if scene.states > 1:
-        watches.append(fall("spring_stress", -scene.mu_star))
+        specs.append(fall("spring_stress", -scene.mu_star))
         below = _APART
         while norm - below > SLOWEST:
-            watches.append(fall("log_slip_rate", norm - below))
+            specs.append(fall("log_slip_rate", norm - below))
             below += max(_APART, _PART * below)
-    return watches
+    return specs
 
 
 def _was_last(scene: Scene, event: Event) -> bool:

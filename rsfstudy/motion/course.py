@@ -25,7 +25,7 @@ def follow(
     scene: Scene,
     accuracy: Accuracy,
     meter: Meter,
-    watches: Sequence[EventSpecification] = (),
+    specs: Sequence[EventSpecification] = (),
     *,
     start: Point | None = None,
     clock: bool = False,
@@ -41,7 +41,7 @@ def follow(
     accuracy : Accuracy
     meter : Meter
         Charged with the work, by regime.
-    watches : sequence of EventSpecification
+    specs : sequence of EventSpecification
         What to be told of.
     start : Point, optional
         Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
@@ -78,7 +78,7 @@ def follow(
         elif number:
             start = jumped(acting, start)
         goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
-        asked = watches if goes_on else _without_settling(watches)
+        asked = specs if goes_on else _without_settling(specs)
         table = _up_to(table, until)
         end = float(table[-1, ENDS_AT])
         for last in runner_of(acting, meter.engine, clock=clock).run(
@@ -148,16 +148,16 @@ def _begun(
     event: Event,
     before: tuple[Point, Numbers],
     acting: Scene,
-    watches: Sequence[EventSpecification],
+    specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
     """Events where a later segment begins: that it does, and what happens there, after a point with
     the numbers of the segment before.
     """
     yield event._replace(kind=Kind.SEGMENT)
-    for watch, point in happening(*before, event.point, acting.numbers, watches):
+    for spec, point in happening(*before, event.point, acting.numbers, specs):
         # slip from the first point: the spring may have jumped with the load point
-        yield event._replace(kind=watch.kind, watch=watch, point=point)
+        yield event._replace(kind=spec.kind, watch=spec, point=point)
 
 
-def _without_settling(watches: Sequence[EventSpecification]) -> list[EventSpecification]:
-    return [watch for watch in watches if watch.kind is not Kind.SETTLED]
+def _without_settling(specs: Sequence[EventSpecification]) -> list[EventSpecification]:
+    return [spec for spec in specs if spec.kind is not Kind.SETTLED]

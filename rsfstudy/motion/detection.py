@@ -33,46 +33,46 @@ from rsfstudy.motion.layout import (
     SETTLED,
     SLIP,
     SLOW,
+    SPECIFIED,
     SPENT,
     SPRING,
     TIME,
     WAITS,
-    WATCHED,
 )
 from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.steppers import unknowns_at
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
 from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, B
 
-#: What is read off a step beside the watches: how far the regime is from being left, time less that
-#: which is looked for, and how far the motion is from its end.
+#: What is read off a step beside event specifications: how far the regime is from being left, time
+#: less that which is looked for, and how far the motion is from its end.
 #: Not whole numbers, of each of which the compiler would make a case of its own.
 EXCESS, PASSED, MARGIN = -1.0, -2.0, -3.0
 #: Where something happens between two points.
 NOWHERE, BEFORE, AFTER = range(3)
 
 
-def quantity(watch, columns, p):
+def quantity(spec, columns, p):
     """Quantity that changes sign where it happens: a slope, or the distance from a level."""
-    if watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM:
-        if watch[OF] == LOG_RATE:
+    if spec[KIND] == MAXIMUM or spec[KIND] == MINIMUM:
+        if spec[OF] == LOG_RATE:
             return columns[GROWTH]
-        if watch[OF] == READING:
+        if spec[OF] == READING:
             return columns[READING_GROWTH]
         return p[LOG_LOAD_RATE] - columns[LOG_RATE]
-    return columns[int(watch[OF])] - watch[LEVEL]
+    return columns[int(spec[OF])] - spec[LEVEL]
 
 
-def watch_of(space, number):
-    """One of the watches."""
-    return moved(space.watches, len(WATCHED) * number)
+def spec_of(space, number):
+    """One of the event specifications."""
+    return moved(space.specs, len(SPECIFIED) * number)
 
 
 def waits(space):
     """True if the asker can wait for anything; for the beginning then, too."""
     found = False
-    for w in range(space.watched):
-        found = found or watch_of(space, w)[WAITS] != 0.0
+    for w in range(space.specified):
+        found = found or spec_of(space, w)[WAITS] != 0.0
     return found
 
 
@@ -84,11 +84,11 @@ def excess(motion, space, columns):
     return weight_of_mass(columns[LOG_RATE], missing, space.limits) - 1.0
 
 
-def happens(watch, before, after, direction):
+def happens(spec, before, after, direction):
     """True if a quantity that changes so has done what is watched for."""
-    upwards = watch[KIND] == RISE or watch[KIND] == MINIMUM
+    upwards = spec[KIND] == RISE or spec[KIND] == MINIMUM
     # against the clock, slopes change sign the other way round
-    if direction < 0.0 and (watch[KIND] == MAXIMUM or watch[KIND] == MINIMUM):
+    if direction < 0.0 and (spec[KIND] == MAXIMUM or spec[KIND] == MINIMUM):
         upwards = not upwards
     if upwards:
         return before < 0.0 <= after
@@ -96,7 +96,7 @@ def happens(watch, before, after, direction):
 
 
 def reading(clock, given):
-    """The quantity of a watch, `EXCESS`, `PASSED` or `MARGIN`, at a clock within the step."""
+    """Quantity of a specification, `EXCESS`, `PASSED` or `MARGIN`, at a clock within the step."""
     what, motion, space = given
     if what == PASSED:
         unknowns_at(motion, space, clock)
@@ -106,7 +106,7 @@ def reading(clock, given):
         return excess(motion, space, space.between)
     if what == MARGIN:
         return margin(space.between[LOG_RATE], space.between[RATIO], space.p[LOAD_VELOCITY])
-    return quantity(watch_of(space, int(what)), space.between, space.p)
+    return quantity(spec_of(space, int(what)), space.between, space.p)
 
 
 _root = root_of(reading)
@@ -158,33 +158,33 @@ def report_beginning(motion, space, last, events):
     """
     p, passed = space.p, passed_at_begin(motion, space)
     p_before = space.p_before if motion.begins == KINK else p
-    if motion.begins != KINK or motion.kinks < motion.told:
+    if motion.begins != KINK or motion.kinks < motion.reported:
         add_event(motion, events, float(motion.begins), motion.clock, passed, space.before, p)
     if motion.begins == BEGIN:
         return False
-    for w in range(space.watched):
-        watch = watch_of(space, w)
-        jumps = between(watch, last, p_before, space.before, p)
+    for w in range(space.specified):
+        spec = spec_of(space, w)
+        jumps = between(spec, last, p_before, space.before, p)
         if jumps != NOWHERE:
             columns = last if jumps == BEFORE else space.before
             add_event(motion, events, float(w), motion.clock, passed, columns, p)
-            if watch[ENDS]:
+            if spec[ENDS]:
                 return True
     return False
 
 
-def between(watch: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
+def between(spec: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
     """True if what is watched for happens where a motion jumps from the last point of one regime or
     segment to the first of another: `NOWHERE`, or at the more extreme one, or the first beyond the
     level, which is `BEFORE` or `AFTER` the jump.
     """
-    if watch[KIND] == SETTLED:
+    if spec[KIND] == SETTLED:
         return NOWHERE
-    if not happens(watch, quantity(watch, last, p_last), quantity(watch, first, p_first), 1.0):
+    if not happens(spec, quantity(spec, last, p_last), quantity(spec, first, p_first), 1.0):
         return NOWHERE
     x, y = last[LOG_RATE], first[LOG_RATE]
-    kept = (watch[KIND] == MAXIMUM and x > y) or (watch[KIND] == MINIMUM and x < y)
-    return BEFORE if kept and watch[OF] == LOG_RATE else AFTER
+    kept = (spec[KIND] == MAXIMUM and x > y) or (spec[KIND] == MINIMUM and x < y)
+    return BEFORE if kept and spec[OF] == LOG_RATE else AFTER
 
 
 def detect(motion, space):
@@ -192,21 +192,21 @@ def detect(motion, space):
     many do.
     """
     count, p = 0, space.p
-    for w in range(space.watched):
-        watch = watch_of(space, w)
+    for w in range(space.specified):
+        spec = spec_of(space, w)
         space.when[w] = math.nan
-        if watch[KIND] == SETTLED:
+        if spec[KIND] == SETTLED:
             against = motion.reverses and p[LOAD_VELOCITY] * space.after[COEFFICIENT] < 0.0
             if motion.kinks > 0 or against:
                 continue
             apart = abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE])
             away = max(apart, space.after[DISTANCE] / abs(p[B]))
-            watch[FARTHEST] = max(watch[FARTHEST], away)
-            if away < watch[LEVEL] * watch[FARTHEST]:
+            spec[FARTHEST] = max(spec[FARTHEST], away)
+            if away < spec[LEVEL] * spec[FARTHEST]:
                 space.when[w] = motion.end
         else:
-            before, after = quantity(watch, space.before, p), quantity(watch, space.after, p)
-            if happens(watch, before, after, motion.direction):
+            before, after = quantity(spec, space.before, p), quantity(spec, space.after, p)
+            if happens(spec, before, after, motion.direction):
                 space.when[w] = located(float(w), before, after, motion, space)
         if not math.isnan(space.when[w]):
             count += 1
@@ -220,7 +220,7 @@ def report(motion, space, events):
     urgent, p = 0, space.p
     for _ in range(detect(motion, space)):
         first = -1
-        for w in range(space.watched):
+        for w in range(space.specified):
             later = first >= 0 and motion.direction * (space.when[w] - space.when[first]) >= 0.0
             if not math.isnan(space.when[w]) and not later:
                 first = w
@@ -233,8 +233,8 @@ def report(motion, space, events):
             point_within(motion, space, clock)
             passed = motion.started + elapsed(motion, space, space.within)
             add_event(motion, events, float(first), clock, passed, space.between, p)
-        watch = watch_of(space, first)
-        urgent = max(urgent, 1 if watch[WAITS] else 2)
-        if watch[ENDS]:
+        spec = spec_of(space, first)
+        urgent = max(urgent, 1 if spec[WAITS] else 2)
+        if spec[ENDS]:
             return 3
     return urgent

@@ -90,7 +90,7 @@ class Event(NamedTuple):
     Attributes
     ----------
     kind : Kind
-    watch : Watch or None
+    watch : EventSpecification or None
         What was asked for, if it was.
     time, slip : float
         Since the start, in D_c/V_* and D_c; NaN in a motion without clock.

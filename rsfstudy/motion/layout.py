@@ -19,8 +19,8 @@ MOTION = np.dtype(
         ("direction", "f8"),  # of the clock: 1 or -1
         ("budget", "i8"),  # right-hand sides that it may spend
         ("records", "i8"),  # when the slider is recorded
-        ("kinks", "i8"),  # kinks of the loading that are ahead, and the last of them that are told
-        ("told", "i8"),
+        ("kinks", "i8"),  # kinks of the loading ahead, and the last of them that are reported
+        ("reported", "i8"),
         ("spent_slow", "i8"),  # right-hand sides, by regime
         ("spent_fast", "i8"),
         ("steps", "i8"),
@@ -63,8 +63,8 @@ CALLED_WITH_FIELDS = (MOTION.names or ())[:11]
 SLOW, FAST = 0, 1
 FUNCTIONS = 4
 
-#: Columns of the table of watches.
-WATCHED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
+#: Columns of the table of event specifications.
+SPECIFIED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
 MAXIMUM, MINIMUM, RISE, FALL, SETTLED = range(5)
 
 #: When the slider is recorded: never, evenly within each step, or at clocks or times asked for.
@@ -73,7 +73,7 @@ NEVER, WITHIN_STEPS, AT_CLOCKS, AT_TIMES = range(4)
 
 #: Columns of the table of events; from POINT on, those of a point.
 CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
-#: Codes of events that are not asked for; those of others are the places of their watches.
+#: Codes of events that are not asked for; those of others are the places of their specifications.
 BEGIN, CHANGE, END, SAMPLED, KINK = -1, -2, -3, -4, -5
 
 #: Columns of a point, in the order of `Point`, of which the states are the last.

@@ -53,9 +53,9 @@ from rsfstudy.motion.layout import (
     RATIO,
     SAMPLED,
     SLOW,
+    SPECIFIED,
     SPRING,
     TAKEN,
-    WATCHED,
     WITHIN_STEPS,
 )
 from rsfstudy.motion.recording import SAMPLES
@@ -91,7 +91,7 @@ CORRECTIONS = 2
 FAR = 3.0
 
 
-def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows, stepper):
+def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, stepper):
     """Follow a motion from where `memory` and `y` are.
 
     Parameters
@@ -108,8 +108,8 @@ def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows,
         Scales of the unknowns, of which those in a rupture follow those between ruptures; the table
         of functions, a row for each regime; the limits of the regimes; the numbers of the
         scene; and as many that take in what those were before a kink.
-    watches, samples : array
-        What is watched for, one row of numbers after the other, and when to record.
+    specs, samples : array
+        Event specifications, one row of numbers after the other, and when to record.
     kinks : array
         The segments of loading that follow on the first without a jump.
     events, rows : array
@@ -142,8 +142,8 @@ def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows,
             moved(scales, first),
             motion.states,
             functions[motion.regime],
-            first_of(watches),
-            len(watches) // len(WATCHED),
+            first_of(specs),
+            len(specs) // len(SPECIFIED),
             p,
             p_before,
             limits,
@@ -159,14 +159,14 @@ def advance(memory, y, last, block, plan, watches, kinks, samples, events, rows,
             begin_at(motion, y, last, functions, block, limits, p)
             if motion.regime != regime:
                 motion.length = 0.0
-        if end == CHANGES and (motion.urgent or is_full(motion, space.watched, events, rows)):
+        if end == CHANGES and (motion.urgent or is_full(motion, space.specified, events, rows)):
             motion.urgent, end = 0, HANDS_OVER
     return end
 
 
-def is_full(motion, watched, events, rows):
+def is_full(motion, specified, events, rows):
     """True if the tables have no room for all that one more step may add to them."""
-    full = len(events) - motion.events < 2 * watched + 4
+    full = len(events) - motion.events < 2 * specified + 4
     return full or (len(rows) > 0 and len(rows) - motion.recorded < 2 * SAMPLES)
 
 
@@ -266,7 +266,7 @@ def through_regime(motion, space, last, samples, events, rows):
         if motion.terminates and motion.termination != GOES_ON:
             return HALTED
         move_on(motion, space)
-        if urgent == 2 or is_full(motion, space.watched, events, rows):
+        if urgent == 2 or is_full(motion, space.specified, events, rows):
             copy(space.rates, moved(space.y, space.unknowns), space.unknowns)
             return HANDS_OVER
 

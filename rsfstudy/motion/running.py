@@ -142,7 +142,7 @@ class Runner:
         self,
         start: Point | Numbers,
         meter: Meter,
-        watches: Sequence[EventSpecification],
+        specs: Sequence[EventSpecification],
         tolerance: float,
         *,
         times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
@@ -162,7 +162,7 @@ class Runner:
             Where it begins: a point, whose regime is found, or the unknowns.
         meter : Meter
             Charged with the work.
-        watches : sequence of EventSpecification
+        specs : sequence of EventSpecification
         tolerance : float
             Local error per step.
         times : tuple of float
@@ -177,7 +177,7 @@ class Runner:
             Right-hand sides it may spend, if fewer than the meter leaves.
         recording : Recording, optional
         kinks : tuple of ndarray and int
-            Those of the loading, and how many of the last ones are told.
+            Those of the loading, and how many of the last ones are reported.
         imposed : float, optional
             Where the load point moves to and fro, shear stress that this adds when the last unknown
             is zero: while steps are taken, stresses are without what it adds, told with it.
@@ -212,11 +212,11 @@ class Runner:
                 *(records, turns, kinks[1]),
             ),
         )
-        asked, meanings = _asked(tuple(watches))
+        asked, meanings = _asked(tuple(specs))
         stepper = stepper_of(meter.engine, systems, meter.methods)
         columns = layout.POINT + layout.PSIS + states
-        events = np.empty((max(_EVENTS, 2 * len(watches) + 4), columns))
-        block = np.empty(workspace.size(self._unknowns, states, len(watches)))
+        events = np.empty((max(_EVENTS, 2 * len(specs) + 4), columns))
+        block = np.empty(workspace.size(self._unknowns, states, len(specs)))
         arguments = (
             *machine.passed(y, last, block),
             (*self._called, tuple(between), numbers, before),
@@ -240,9 +240,9 @@ class Runner:
                 point = _named(Point, (*line[layout.POINT : psis], tuple(line[psis:])))
                 if imposed is not None:
                     point = _pushed(point, point.psis[-1] - imposed)
-                kind, watch = meanings[int(code)]
+                kind, spec = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
-                yield _named(Event, (kind, watch, time, slip, point, name, work, clock))
+                yield _named(Event, (kind, spec, time, slip, point, name, work, clock))
             meter.check()
         if end != layout.ENDED:
             raise _halt(end, state, regimes, stepper)
@@ -257,7 +257,7 @@ def along(
     state: Numbers,
     tolerance: float,
     meter: Meter,
-    watches: Sequence[EventSpecification] = (),
+    specs: Sequence[EventSpecification] = (),
     *,
     backward: bool = False,
     recording: Recording | None = None,
@@ -267,7 +267,7 @@ def along(
     A rigid slider has slip for its clock: a recording that asks for values has them at slips.
     """
     runner = Runner(equations, engine=meter.engine)
-    return runner.run(state, meter, watches, tolerance, backward=backward, recording=recording)
+    return runner.run(state, meter, specs, tolerance, backward=backward, recording=recording)
 
 
 @once
@@ -305,30 +305,30 @@ def happening(
     p_before: Numbers,
     after: Point,
     p_after: Numbers,
-    watches: Sequence[EventSpecification],
+    specs: Sequence[EventSpecification],
 ) -> Iterator[tuple[EventSpecification, Point]]:
     """Events that are watched for and happen where a motion jumps from a point to another, with the
     numbers of the scene at both; and at which of them.
     """
     last, first = _columns_of(before).tolist(), _columns_of(after).tolist()
-    table = _asked(tuple(watches))[0].reshape(-1, len(layout.WATCHED)).tolist()
-    for watch, row in zip(watches, table, strict=True):
+    table = _asked(tuple(specs))[0].reshape(-1, len(layout.SPECIFIED)).tolist()
+    for spec, row in zip(specs, table, strict=True):
         where = between(row, last, p_before, first, p_after)
         if where != NOWHERE:
-            yield watch, before if where == BEFORE else after
+            yield spec, before if where == BEFORE else after
 
 
 @lru_cache(maxsize=256)
 def _asked(
-    watches: tuple[EventSpecification, ...],
+    specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[Kind, EventSpecification | None]]]:
-    """The table of what is watched for, and what codes of events mean."""
-    meanings = [*((watch.kind, watch) for watch in watches), *_BESIDE]
-    asked = np.zeros((len(watches), len(layout.WATCHED)))
-    for row, watch in zip(asked, watches, strict=True):
-        row[layout.KIND], row[layout.OF] = _KINDS[watch.kind], _COLUMNS[watch.of]
-        row[layout.LEVEL], row[layout.ENDS] = watch.level, watch.ends
-        row[layout.WAITS] = watch.waits
+    """The table of event specifications, and what codes of events mean."""
+    meanings = [*((spec.kind, spec) for spec in specs), *_BESIDE]
+    asked = np.zeros((len(specs), len(layout.SPECIFIED)))
+    for row, spec in zip(asked, specs, strict=True):
+        row[layout.KIND], row[layout.OF] = _KINDS[spec.kind], _COLUMNS[spec.of]
+        row[layout.LEVEL], row[layout.ENDS] = spec.level, spec.ends
+        row[layout.WAITS] = spec.waits
     return asked.ravel(), meanings
 
 

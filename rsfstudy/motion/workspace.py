@@ -36,9 +36,9 @@ class Workspace(NamedTuple):
         Clocks at which events happen within a step.
     rate, point, attempt, balance : function
         The equations (see `columns`).
-    watches : array
-        What is watched for, one row of numbers after the other.
-    watched : int
+    specs : array
+        Event specifications, one row of numbers after the other.
+    specified : int
         How many rows.
     p, p_before : array
         The numbers of the scene, and what they were before the last kink.
@@ -68,22 +68,22 @@ class Workspace(NamedTuple):
     point: Any
     attempt: Any
     balance: Any
-    watches: Array
-    watched: int
+    specs: Array
+    specified: int
     p: Array
     p_before: Array
     limits: Limits
     stepper: Any
 
 
-def size(unknowns: int, states: int, watches: int) -> int:
+def size(unknowns: int, states: int, specs: int) -> int:
     """Length of a workspace."""
     of_unknowns = 1 + ROWS + 1 + ALL_STAGES + 1 + 1 + 1
-    return SIZES + of_unknowns * unknowns + 3 * (PSIS + states) + watches
+    return SIZES + of_unknowns * unknowns + 3 * (PSIS + states) + specs
 
 
 def workspace(
-    block, y, unknowns, scales, states, functions, watches, watched, p, p_before, limits, stepper
+    block, y, unknowns, scales, states, functions, specs, specified, p, p_before, limits, stepper
 ):
     """The workspace of a regime, in a block of that size."""
     new = moved(block, SIZES)
@@ -119,8 +119,8 @@ def workspace(
         functions[1],
         functions[2],
         functions[FUNCTIONS - 1],
-        watches,
-        watched,
+        specs,
+        specified,
         p,
         p_before,
         limits,
