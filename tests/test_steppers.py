@@ -163,11 +163,8 @@ def begun(
     block, unknowns, scales = (memoryview(np.zeros(numbers)) for numbers in arrays)
     unknowns[:n], scales[:] = np.array(y, dtype=float), np.array(equations.scales)
     functions = [*filling(equations)]
-    nothing = memoryview(np.zeros(1))
-    space = workspace(
-        block, unknowns, n, scales, states, functions, nothing, 0, equations.p, equations.p,
-        None, stepper,
-    )  # fmt: skip
+    others = memoryview(np.zeros(1)), 0, equations.p, equations.p, None, stepper
+    space = workspace(block, unknowns, n, scales, states, functions, others)
     stepper.begin(motion, space)
     return stepper, motion, space
 

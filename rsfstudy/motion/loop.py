@@ -127,7 +127,8 @@ def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, s
     scales, functions, numbers, p, p_before = plan
     y, scales, block = first_of(y), first_of(scales), first_of(block)
     last, p, p_before = first_of(last), first_of(p), first_of(p_before)
-    limits = Limits(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5])
+    limits = Limits(*numbers)
+    given = first_of(specs), len(specs) // len(SPECIFIED), p, p_before, limits, stepper
     if motion.at_point:
         begin_at(motion, y, last, functions, block, limits, p)
     end = CHANGES
@@ -135,20 +136,8 @@ def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, s
         unknowns, first = motion.unknowns, 0
         if motion.regime == FAST:
             unknowns, first = motion.unknowns_fast, motion.unknowns
-        space = workspace(
-            block,
-            y,
-            unknowns,
-            moved(scales, first),
-            motion.states,
-            functions[motion.regime],
-            first_of(specs),
-            len(specs) // len(SPECIFIED),
-            p,
-            p_before,
-            limits,
-            stepper,
-        )
+        own, equations = moved(scales, first), functions[motion.regime]
+        space = workspace(block, y, unknowns, own, motion.states, equations, given)
         end = through_regime(motion, space, last, samples, events, rows)
         if end == CHANGES:
             motion.regime, motion.begins, motion.length = FAST - motion.regime, CHANGE, 0.0

@@ -21,17 +21,18 @@ class Workspace(NamedTuple):
     ----------
     unknowns : int
         How many unknowns there are.
-    y, new, within : array
-        Unknowns at the beginning of a step, at its end, and within it.
-    rates, rates_at_end, rates_within : array
+    y, new : array
+        Unknowns at the beginning of a step, and at its end.
+    rates, rates_at_end : array
         Their rates there.
-    slopes : array
-        Slopes of dense output.
     stages, step, scales, dense : array
-        Of a step of order eight: its stages; its block (see `steppers.unrolled`), and of this the
-        scales of the unknowns and the rows of dense output.
+        Of a step of order eight: its stages, of which the rates there are the first and the last;
+        its block (see `steppers.unrolled`), and of this the scales of the unknowns and the rows of
+        dense output.
+    within, rates_within, slopes : array
+        Unknowns within the step, their rates, and slopes of dense output.
     before, after, between : array
-        Columns of the points there.
+        Columns of the points at the beginning of the step, at its end, and within it.
     when : array
         Clocks at which events happen within a step.
     rate, point, attempt, balance : function
@@ -51,15 +52,15 @@ class Workspace(NamedTuple):
     unknowns: int
     y: Array
     new: Array
-    within: Array
     rates: Array
     rates_at_end: Array
-    rates_within: Array
-    slopes: Array
     stages: Array
     step: Array
     scales: Array
     dense: Array
+    within: Array
+    rates_within: Array
+    slopes: Array
     before: Array
     after: Array
     between: Array
@@ -82,50 +83,20 @@ def size(unknowns: int, states: int, specs: int) -> int:
     return SIZES + of_unknowns * unknowns + 3 * (PSIS + states) + specs
 
 
-def workspace(
-    block, y, unknowns, scales, states, functions, specs, specified, p, p_before, limits, stepper
-):
-    """The workspace of a regime, in a block of that size."""
-    new = moved(block, SIZES)
+def workspace(block, y, unknowns, scales, states, functions, given):
+    """The workspace of a regime, in a block of that size; `given` are its last six members."""
+    new, columns = moved(block, SIZES), PSIS + states
     own = moved(new, unknowns)
     dense = moved(own, unknowns)
     stages = moved(dense, ROWS * unknowns)
     within = moved(stages, ALL_STAGES * unknowns)
-    rates_within = moved(within, unknowns)
-    slopes = moved(rates_within, unknowns)
-    before = moved(slopes, unknowns)
-    after = moved(before, PSIS + states)
-    between = moved(after, PSIS + states)
-    when = moved(between, PSIS + states)
+    before = moved(within, 3 * unknowns)
     copy(scales, own, unknowns)
-    return Workspace(
-        unknowns,
-        y,
-        new,
-        within,
-        stages,
-        moved(stages, STAGES * unknowns),
-        rates_within,
-        slopes,
-        stages,
-        block,
-        own,
-        dense,
-        before,
-        after,
-        between,
-        when,
-        functions[0],
-        functions[1],
-        functions[2],
-        functions[FUNCTIONS - 1],
-        specs,
-        specified,
-        p,
-        p_before,
-        limits,
-        stepper,
-    )
+    step = stages, moved(stages, STAGES * unknowns), stages, block, own, dense
+    inside = within, moved(within, unknowns), moved(within, 2 * unknowns)
+    points = before, moved(before, columns), moved(before, 2 * columns), moved(before, 3 * columns)
+    equations = functions[0], functions[1], functions[2], functions[FUNCTIONS - 1]
+    return Workspace(unknowns, y, new, *step, *inside, *points, *equations, *given)
 
 
 def copy(source, target, count):
