@@ -11,21 +11,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from rsfstudy.motion.layout import (
-    COEFFICIENT,
-    DISTANCE,
-    FRICTION,
-    GROWTH,
-    IMBALANCE,
-    LOG_RATE,
-    PSI,
-    PSIS,
-    RATIO,
-    READING,
-    READING_GROWTH,
-    SPRING,
-    STATE,
-)
+from rsfstudy.motion.layout import LOG_RATE, PSIS
 from rsfstudy.motion.steppers import unrolled
 from rsfstudy.slider.equations import Equations
 from rsfstudy.slider.parts import Function, Numbers
@@ -89,18 +75,9 @@ def point_into(point_of: Function, unknowns: Function, numbers: Function, states
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_RATE] = math.nan
         point = point_of(unknowns(y), unknowns(rates), numbers(p))
-        result[LOG_RATE] = point.log_slip_rate
-        result[GROWTH] = point.growth
-        result[SPRING] = point.spring_stress
-        result[FRICTION] = point.friction
-        result[PSI] = point.psi
-        result[STATE] = point.state
-        result[IMBALANCE] = point.imbalance
-        result[DISTANCE] = point.distance_from_steady_state
-        result[COEFFICIENT] = point.coefficient
-        result[RATIO] = point.normal_stress
-        result[READING] = point.reading
-        result[READING_GROWTH] = point.reading_growth
+        columns = point[:PSIS]
+        for i in range(PSIS):
+            result[i] = columns[i]
         for i in range(states):
             result[PSIS + i] = point.psis[i]
 
