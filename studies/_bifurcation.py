@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from rsfstudy import Scene, Segment
+from rsfstudy.analysis.approach import Course, course
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events
-from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import STEP, Orbit, ReturnMap, section
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome

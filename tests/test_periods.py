@@ -8,9 +8,8 @@ from rsfstudy.named_studies._bifurcation import Bifurcation, _growth
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
-from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.approach import Approach, course, recurrence
 from rsfstudy.analysis.cycles import Cycle
-from rsfstudy.analysis.periods import course, recurrence
 from rsfstudy.analysis.return_map import ReturnMap, product, section
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy

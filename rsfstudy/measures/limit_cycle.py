@@ -21,9 +21,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.approach import Approach, Course, course
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
-from rsfstudy.analysis.periods import Course, course
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Recorded, recorded

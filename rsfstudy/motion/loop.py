@@ -12,18 +12,6 @@ from __future__ import annotations
 import math
 
 from rsfstudy.motion.calls import evaluate, first_of, moved
-from rsfstudy.motion.detection import (
-    EXCESS,
-    MARGIN,
-    PASSED,
-    excess,
-    located,
-    report,
-    report_beginning,
-    report_end,
-    slipped,
-    waits,
-)
 from rsfstudy.motion.handover import (
     GOES_ON,
     Limits,
@@ -59,7 +47,6 @@ from rsfstudy.motion.layout import (
     WITHIN_STEPS,
 )
 from rsfstudy.motion.recording import SAMPLES
-from rsfstudy.motion.sampling import is_recorded, record, record_begin
 from rsfstudy.motion.steppers import begin, retake
 from rsfstudy.motion.steps import (
     cut,
@@ -68,6 +55,21 @@ from rsfstudy.motion.steps import (
     passed_at_begin,
     passed_at_end,
     take_step,
+)
+from rsfstudy.motion.within_steps import (
+    EXCESS,
+    MARGIN,
+    PASSED,
+    excess,
+    is_recorded,
+    located,
+    record,
+    record_begin,
+    report,
+    report_beginning,
+    report_end,
+    slipped,
+    waits,
 )
 from rsfstudy.motion.workspace import copy, workspace
 from rsfstudy.slider.places import (
