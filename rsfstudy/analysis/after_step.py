@@ -124,8 +124,9 @@ def orbits_may_close(scene: Scene) -> bool:
 
 
 def ratio_after(scene: Scene) -> float:
-    """Stiffness over the critical one at V_* and at the normal stress after the step, where
-    friction acts alone: critical stiffness is in proportion to normal stress.
+    """``k/[k_cr(V_*) sigma/sigma_*]``: stiffness over the critical one at V_* and at the normal
+    stress sigma after the step, where friction acts alone: critical stiffness is in proportion to
+    normal stress.
     """
     return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
 
@@ -150,9 +151,13 @@ def settles(scene: Scene) -> bool:
 
 
 def stability_margin(scene: Scene) -> float:
-    """By how much stiffness exceeds the critical one at the scene's load point velocity, over that;
-    infinite where every stiffness is stable. Positive too where several states are stable below it,
-    by how far they are below.
+    """``k/k_cr(V_0) - 1``: by how much stiffness exceeds the critical one at the scene's load point
+    velocity, over that; infinite where every stiffness is stable. Positive too where several states
+    are stable below it, by how far they are below.
+
+    References
+    ----------
+    Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
     return math.inf if scene.log_load_rate == -math.inf else _steady(scene).margin
 

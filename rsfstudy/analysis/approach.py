@@ -108,14 +108,17 @@ class Approach:
 
     @property
     def _return(self) -> float:
-        """Part of its distance to the limit cycle that a cycle keeps: of two directions, the motion
-        forgets one.
+        """Part of its distance to the limit cycle that a cycle keeps: the trace of the derivative
+        A of the map, whose other eigenvalue is zero, because the motion forgets one direction.
         """
         return float(self._slopes[0, 0] + self._slopes[1, 1])
 
     def _learn(self) -> None:
         """Take the derivatives from the last two cycles, as long as numerical errors allow, and
         what is ahead from the last.
+
+        A has rank one, so that what is left to the fixed point of ``s -> P(s)``,
+        ``(1 - A)^-1 (P(s) - s)``, is ``[1 + A/(1 - tr A)] (P(s) - s)``.
         """
         last = self.seen[-1]
         begin, image = section(last.begin), image_of(last)
@@ -227,8 +230,11 @@ def _on_its_way(seen: Sequence[Cycle]) -> bool:
 
 def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
     """After how many events a motion comes closest to where it was, in all of the later half of its
-    events; and how far it is off then, over a times how far ln V swings (infinitely, where there
-    are too few events to say).
+    events; and how far it is off then (infinitely, where there are too few events to say).
+
+    After n events it is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the ends of
+    these events, over a times how far ln V swings; the smallest n that is within twice the least
+    of all counts.
     """
     if len(seen) < 4:
         return 1, math.inf

@@ -25,8 +25,14 @@ _MOST_PATHS = 5
 
 @dataclass(frozen=True)
 class Boundary:
-    """A boundary in step size with its numerical error, both before verification; found by motions,
-    or as a limit cycle.
+    """A boundary in step size with its numerical error, both before verification.
+
+    Attributes
+    ----------
+    size, relative_error : float
+        Size of the step (see `Steps`), and its error over that.
+    by_motions, of_cycle : bool
+        Whether motions have found it, or whether a limit cycle is what touches the norm.
     """
 
     size: float

@@ -7,6 +7,12 @@ motions forward would amplify every error.
 
 Two unknowns suffice as long as the norm is a slip rate at which mass hardly acts; it does not act
 at all where ln V is stationary.
+
+Stresses are in sigma_*, above those of steady sliding at V_*; slip is in D_c, slip rate in V_*.
+
+References
+----------
+Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196: the path by the slip law.
 """
 
 from __future__ import annotations
@@ -97,8 +103,10 @@ class CriticalPath(NamedTuple):
 
     @property
     def tangency(self) -> tuple[float, float] | None:
-        """Spring stress and state (f, Psi) at which ln V rests at the instability norm; None where
-        it never can, or where there are several states and the path is none in a plane.
+        """Spring stress over sigma_*, and state, (f, Psi), at which ln V rests at the norm; None
+        where it never can, or where there are several states and the path is none in a plane.
+
+        f is frictional stress there, and what waves carry away.
         """
         if not self.planar:
             return None
@@ -162,8 +170,8 @@ class CriticalPath(NamedTuple):
                 raise
 
     def misfit(self, tolerance: float, meter: Meter) -> float | None:
-        """State on the path where it passes the slip rate of the start, over a; zero after the
-        critical step.
+        """Psi/a on the path where it passes the slip rate of the start: zero after the critical
+        step, because a step that starts from steady sliding at V_* leaves Psi = 0.
 
         None where the path never passes that slip rate as the motion of this scene would.
         """
@@ -179,7 +187,7 @@ class CriticalPath(NamedTuple):
         return None if start is None else start.psi / self.p[A]
 
     def misfit_of_cycle(self, tolerance: float, meter: Meter) -> float | None:
-        """Height in ln V above the norm of the peak of the motion one orbit after it has touched
+        """Height in ln V, above the norm, of the peak of the motion one orbit after it has touched
         the norm; zero where a limit cycle touches it.
 
         None where the motion does not come back.
@@ -223,7 +231,11 @@ def _tangency(friction: Friction) -> Function:
     """``(x, weakest, p) -> (g, Psi)``: frictional stress above the weakest, and the state, where
     ln(V/V_*) = x is stationary; NaN where it never is.
 
-    There, strength'(g) K (V_0/V - 1) equals the evolution of the state per unit slip.
+    From strength(g) = a x + Psi, whose derivative with respect to slip is taken at constant x,
+
+        strength'(g) K (V_0/V - 1) = dPsi/d(delta),
+
+    K being k D_c/sigma_*: one equation for g, which is solved by Brent's method.
     """
     strength, evolutions = friction.strength, friction.evolutions
 

@@ -46,7 +46,7 @@ _AT_REST = 1e-6
 
 
 class Cycle(NamedTuple):
-    """One cycle, in the units of the scene.
+    """One cycle: time in D_c/V_*, stress in sigma_*, slip rate in V_*.
 
     Attributes
     ----------
@@ -83,8 +83,11 @@ class Cycle(NamedTuple):
         return self.fastest - self.slowest
 
     def numbers(self) -> tuple[float, ...]:
-        """The headline numbers, in the order of their names; stress drops are from where the event
-        begins, because the next may begin elsewhere.
+        """The headline numbers, in the order of their names: recurrence interval (D_c/V_*), static
+        and dynamic stress drop (sigma_*), and the decimal logarithms of the extremes of V/V_*.
+
+        Stress drops, down to the lowest spring stress and to that at peak slip rate, are from where
+        the event begins, because the next may begin elsewhere.
         """
         highest = self.begin.spring_stress
         drops = highest - self.lowest, highest - self.at_peak
@@ -135,7 +138,12 @@ def more_events(events: int, name: str = "events") -> str:
 
 
 def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
-    """Record of cycles that follow each other; their ends, where nothing was."""
+    """Record of cycles that follow each other, a row for each sample (see `Recording.seen`); their
+    ends, where nothing was recorded.
+
+    Slip over a cycle is what the load point moves, less what the spring is longer by:
+    ``V_0 T - (f_end - f_begin)/K``.
+    """
     begin, end = seen[0].begin, seen[-1].end
     passed = math.fsum(cycle.interval for cycle in seen)
     slip = (
@@ -161,8 +169,8 @@ def _asked(load: float) -> tuple[EventSpecification, ...]:
 def _dies_down(swings: list[float]) -> bool:
     """True if swings that shrink, time after time, are headed for nothing rather than for a cycle.
 
-    Geometrically extrapolated from the last three; near the onset of stick-slip cycles shrink
-    slowly to a finite limit.
+    Geometrically extrapolated from the last three, whose differences are d_1 and d_2, they have
+    d_2**2/(d_1 - d_2) to go; near the onset of stick-slip cycles shrink slowly to a finite limit.
     """
     if len(swings) <= _SHRINKING or not all(y < x for x, y in pairwise(swings[-_SHRINKING:])):
         return False

@@ -10,6 +10,14 @@ Beyond 1 in size, the cycle repels; at -1, one of twice as many events comes off
 There is one unknown more than a departure can have directions, as long as mass hardly acts: the
 motion forgets one along itself, which is a change of states at the same spring stress, because
 spring stress is highest there.
+
+Sections are arrays (f, Psi_1, ...) of shape (1 + states,): spring stress over sigma_*, and states.
+With P the map of n events, a cycle solves P(s) - s = 0 by Newton's method, whose Jacobian dP - 1
+comes from differences of order four, and is corrected by what each step finds (Broyden).
+
+References
+----------
+Broyden (1965), Math. Comp. 19, 577-593.
 """
 
 from __future__ import annotations
@@ -53,7 +61,7 @@ class Orbit:
         One after the other.
     slopes : tuple of ndarray
         Of each event, the derivatives of the section at its end, and of its numbers below that, by
-        the section at its beginning.
+        the section at its beginning: of shape (1 + states + numbers, 1 + states).
     ahead : ndarray
         From the section where the events begin to that of the cycle which they imply.
     accuracy : Accuracy
@@ -127,7 +135,9 @@ def image_of(cycle: Cycle) -> np.ndarray:
 
 
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
-    """The derivative of the section over several events, one after the other."""
+    """The derivative of the section over several events, one after the other: the product of
+    theirs, of shape (1 + states, 1 + states).
+    """
     size = slopes[0].shape[1]
     together = slopes[0][:size]
     for each in slopes[1:]:
@@ -195,8 +205,8 @@ class ReturnMap:
         return seen
 
     def image(self, start: np.ndarray) -> np.ndarray | None:
-        """The section one event later, and the numbers of the event below it; None where the motion
-        does not come that far.
+        """The section one event later, and the numbers of the event below it, of shape (1 + states
+        + numbers,); None where the motion does not come that far.
         """
         seen = self.events(start, 1)
         return image_of(seen[0]) if seen else None
@@ -277,7 +287,10 @@ class ReturnMap:
         self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, reach: float
     ) -> Orbit | None:
         """The cycle of as many events as derivatives are known of, within reach of a section; None
-        where there is none. By Newton's method with Broyden's corrections.
+        where there is none.
+
+        By Newton's method, ``J move = -(P(s) - s)``, with Broyden's corrections: where P(s) - s is
+        still `off` after a move, J changes by ``off move^T/(move . move)``.
         """
         at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
         jacobian, move = product(slopes) - np.eye(len(start)), None

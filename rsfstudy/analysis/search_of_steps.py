@@ -79,7 +79,7 @@ class Steps:
 
     def allowed(self, size: float, rtol: float) -> float:
         """Relative error of a size at which `value`, less what it is without a step, has this one;
-        no more than that.
+        no more than that: ``rtol |value(size) - value(0)|/(d value/d ln size)``.
         """
         change = abs(self.value(size) - self.value(0.0))
         return min(rtol, rtol * change / self.error(size, 1.0))
@@ -131,8 +131,9 @@ class Steps:
 
 
 def falls_behind(scene: Scene) -> tuple[float, float]:
-    """Slip by which a slider with mass falls behind one without after a step, and the slip rate it
-    rises to: less than (K/a) w**2 of slip, w being the norm just after the step.
+    """Slip (D_c) by which a slider with mass falls behind one without after a step, and the slip
+    rate (V_*) it rises to: less than (K/a) w**2 of slip, w = V T/(2 pi D_c) being the norm just
+    after the step.
     """
     rate = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
@@ -304,7 +305,8 @@ def _refined(
     misfit: Callable[[float, float], float | None],
 ) -> Iterator[float]:
     """Sizes at which a misfit vanishes, by one local tolerance after the other, from a loose root
-    and its slope, by the secant method; none from where that leads nowhere.
+    and its slope (per change of the logarithm of size), by the secant method: until what is left is
+    below thirty local tolerances. None from where that leads nowhere.
     """
     if not math.isfinite(slope) or slope == 0.0:
         return
