@@ -65,9 +65,6 @@ class RateSteps(ShotSteps):
     def value(self, size: float) -> float:
         return math.exp(self.sign * size)
 
-    def error(self, size: float, relative_error: float) -> float:
-        return math.exp(self.sign * size) * size * relative_error
-
     def _guess(self) -> float:
         """Of the size of the closed forms for the slip law (Gu et al. 1984)."""
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _LEAST_WEAKENING)
@@ -195,9 +192,6 @@ class NormalStressSteps(ShotSteps):
 
     def value(self, size: float) -> float:
         return math.expm1(self.sign * size)
-
-    def error(self, size: float, relative_error: float) -> float:
-        return math.exp(self.sign * size) * size * relative_error
 
     def mass_delays(self, size: float, rtol: float) -> bool:
         """The slider falls behind while slip rate rises; by how much of the size is a matter of

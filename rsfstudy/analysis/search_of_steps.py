@@ -151,6 +151,10 @@ class ShotSteps(Steps):
 
     triggers: ClassVar[int]
 
+    def error(self, size: float, relative_error: float) -> float:
+        """As the size is a logarithm of what is stepped."""
+        return math.exp(self.sign * size) * size * relative_error
+
     def sizes_on_path(self, tolerances: Iterable[float], meter: Meter) -> Iterator[float]:
         """Shoot: find the step whose critical path comes from the state before it.
 

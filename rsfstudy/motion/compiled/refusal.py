@@ -12,6 +12,7 @@ from types import FunctionType
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Function, Part
 
+_EQUATIONS = "the equations"
 _PLACE = re.compile(r'\n+File "(?P<file>.+?)", line (?P<line>\d+)')
 
 
@@ -26,10 +27,10 @@ def check_raises_nothing(function: Function, seen: set[Function] | None = None) 
     for instruction in dis.get_instructions(function):
         if instruction.opname == "RAISE_VARARGS":
             code = function.__code__
-            names = [part.name for part in _parts() if _file_of(part) == _path(code.co_filename)]
-            what = f"the part {' or '.join(names)}" if names else "the equations"
             where = f"{function.__name__}, {code.co_filename}, line {code.co_firstlineno}"
-            rule = f"cannot compile {what} ({where}): it raises an error"
+            rule = (
+                f"cannot compile {_what_stands_in(code.co_filename)} ({where}): it raises an error"
+            )
             remedy = "Return math.nan instead, which ends the motion; or use the engine scipy."
             raise InvalidValue("engine", "compiled", rule, remedy=remedy)
     named = (function.__globals__.get(name) for name in function.__code__.co_names)
@@ -40,22 +41,22 @@ def check_raises_nothing(function: Function, seen: set[Function] | None = None) 
 
 def refused(error: Exception) -> InvalidValue:
     """Error of Numba, with the part and the line: its text begins with the innermost function."""
-    text = str(error)
+    text, what, where = str(error), _EQUATIONS, ""
     places = list(_PLACE.finditer(text))
-    for place in places:
-        names = [part.name for part in _parts() if _file_of(part) == _path(place["file"])]
-        if names:
-            return _refused(f"the part {' or '.join(names)}", place, text)
-    return _refused("the equations", places[0] if places else None, text)
-
-
-def _refused(what: str, place: re.Match[str] | None, text: str) -> InvalidValue:
-    before = text if place is None else text[: place.start()]
-    cause = before.strip().rpartition("\n")[2]
-    where = "" if place is None else f" ({place['file']}, line {place['line']})"
+    of_parts = [place for place in places if _what_stands_in(place["file"]) != _EQUATIONS]
+    for place in (of_parts or places)[:1]:
+        what, where = _what_stands_in(place["file"]), f" ({place['file']}, line {place['line']})"
+        text = text[: place.start()]
+    cause = text.strip().rpartition("\n")[2]
     rule = f"cannot compile {what}{where}: {cause}"
     remedy = "Compute with numbers, tuples and math only, or use the engine scipy."
     return InvalidValue("engine", "compiled", rule, remedy=remedy)
+
+
+def _what_stands_in(file: str) -> str:
+    """The parts that a file defines, in words, or the equations."""
+    names = [part.name for part in _parts() if _file_of(part) == _path(file)]
+    return f"the part {' or '.join(names)}" if names else _EQUATIONS
 
 
 def _parts(of: type[Part] = Part) -> Iterator[type[Part]]:
