@@ -462,7 +462,7 @@ def test_other_processes_find_equations_again(tmp_path):
         said = subprocess.check_output([sys.executable, "-c", asks], env=environment, text=True)
         programs.append(int(said))
         written.append({str(file) for file in tmp_path.rglob("*.nb?")})
-    assert programs == [3, 0]
+    assert programs == [2, 0]
     assert written[0] == written[1]
 
 

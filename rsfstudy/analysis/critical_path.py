@@ -61,6 +61,8 @@ class CriticalPath(NamedTuple):
     tangency_of, point_of : callable
         ``(x, weakest, p) -> (g, Psi)`` (see `_tangency`); ``(state, p) -> Point``.
     runner : Runner
+    engine : str
+        What follows it.
     planar : bool
         Whether there is one state, as there must be for a path that touches the norm.
     """
@@ -73,6 +75,7 @@ class CriticalPath(NamedTuple):
     tangency_of: Function
     point_of: Function
     runner: Runner
+    engine: str
     planar: bool
 
     @classmethod
@@ -89,8 +92,9 @@ class CriticalPath(NamedTuple):
             begin,
             slow.p,
             of_floats(tangency, engine, x, x, slow.p) if planar else tangency,
-            of_floats(point_of(slow.rate, slow.point), engine, begin, slow.p),
+            point_of(slow.rate, slow.point),
             Runner(slow, engine=engine),
+            engine,
             planar,
         )
 
@@ -175,7 +179,8 @@ class CriticalPath(NamedTuple):
 
         None where the path never passes that slip rate as the motion of this scene would.
         """
-        begin = self.point_of(self.begin, self.p)
+        given = self.begin, self.p
+        begin = of_floats(self.point_of, self.engine, *given)(*given)
         if begin.growth == 0.0:
             return None
         start = self.start(
