@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
+from itertools import accumulate, pairwise, repeat, takewhile
 from typing import ClassVar
 
 import numpy as np
@@ -165,9 +166,7 @@ class ShotSteps(Steps):
         loose = self._loose_root(path_at, meter) if self.scene.states == 1 else None
         if loose is not None:
             yield from _refined(
-                *loose,
-                tolerances,
-                lambda size, tolerance: path_at(size).misfit(tolerance, meter),
+                *loose, tolerances, lambda size, tolerance: path_at(size).misfit(tolerance, meter)
             )
 
     def paths(self, engine: str) -> Callable[[float], CriticalPath]:
@@ -188,21 +187,14 @@ class ShotSteps(Steps):
             found[log_size] = higher
             return higher
 
-        stride = math.log(1.5)
-        smaller, larger = math.log(self.smallest), math.log(self.smallest) + stride
-        previous = misfit(smaller)
-        while larger <= math.log(self.largest):
-            current = misfit(larger)
-            if previous < 0.0 <= current:
-                root = _root(misfit, found, smaller, larger)
-                if root is not None:
-                    yield from _refined(
-                        *root,
-                        tolerances,
-                        lambda size, tolerance: misfit(math.log(size), tolerance),
-                    )
-                return
-            smaller, larger, previous = larger, larger + stride, current
+        sizes = accumulate(repeat(math.log(1.5)), initial=math.log(self.smallest))
+        pairs = pairwise(takewhile(lambda log_size: log_size <= math.log(self.largest), sizes))
+        bracket = next((pair for pair in pairs if misfit(pair[0]) < 0.0 <= misfit(pair[1])), None)
+        root = _root(misfit, found, *bracket) if bracket else None
+        if root is not None:
+            yield from _refined(
+                *root, tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
+            )
 
     def _loose_root(
         self, path_at: Callable[[float], CriticalPath], meter: Meter
