@@ -19,14 +19,7 @@ from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.analysis.after_step import (
-    excess_over_norm,
-    friction_acts_alone,
-    neutral,
-    orbits_may_close,
-    ratio_after,
-    reaches_norm,
-)
+from rsfstudy.analysis import after_step
 from rsfstudy.analysis.by_path import Boundary, from_critical_path, from_touching_cycle
 from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressSteps, RateSteps
 from rsfstudy.analysis.search_of_steps import Steps
@@ -146,11 +139,11 @@ class CriticalStep(Measure):
                 Status.NORM_BELOW_LOADING_RATE,
                 message=f"norm {scene.instability_norm:g} is reached by the loading alone",
             )
-        below = not orbits_may_close(scene) or ratio_after(scene) < 1.0
+        below = not after_step.orbits_may_close(scene) or after_step.ratio_after(scene) < 1.0
         if (
             below
-            and friction_acts_alone(scene)
-            and neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol)
+            and after_step.friction_acts_alone(scene)
+            and after_step.neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol)
         ):
             return Outcome(
                 Status.UNVERIFIED,
@@ -239,7 +232,7 @@ class CriticalStep(Measure):
         unstable = smallest
         while unstable <= largest + 1e-9:
             try:
-                if reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
+                if after_step.reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
                     break
             except Halt as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
@@ -268,7 +261,7 @@ class CriticalStep(Measure):
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = excess_over_norm(steps.scene_at(math.exp(log_size)), accuracy, meter)
+            found = after_step.excess_over_norm(steps.scene_at(math.exp(log_size)), accuracy, meter)
             if found >= 0.0:
                 unstable = min(unstable, log_size)
             else:
@@ -315,7 +308,7 @@ class CriticalStep(Measure):
 def _excess(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> float | None:
     """Excess of the motion after a step of this size; None where it cannot go on."""
     try:
-        return excess_over_norm(steps.scene_at(size), accuracy, meter)
+        return after_step.excess_over_norm(steps.scene_at(size), accuracy, meter)
     except Halt as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
@@ -338,11 +331,11 @@ def _neighbours(
     of four.
     """
     middle = math.log(near)
-    reached = reaches_norm(steps.scene_at(near), accuracy, meter)
+    reached = after_step.reaches_norm(steps.scene_at(near), accuracy, meter)
     inner, reach = middle, 1e-4
     while reach < 1.5:
         outer = middle - reach if reached else min(middle + reach, math.log(steps.largest))
-        if reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
+        if after_step.reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
             return (outer, inner) if reached else (inner, outer)
         inner, reach = outer, 5.0 * reach
     return None
