@@ -134,8 +134,8 @@ def strictly_later(table: np.ndarray) -> np.ndarray:
 
 
 def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Rows up to one within a step, or at its end, evenly spaced in what is left of the step. Its
-    time tells where in the step it is.
+    """Rows up to one within a step, or at its end, evenly spaced in what is left of the step, whose
+    rows in the table they replace. Its time tells where in the step it is.
     """
     after = int(np.searchsorted(table[:, 0], last[0]))
     place = int(table[after, PLACE]) if after < len(table) else 0
@@ -149,9 +149,10 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
         if _polynomial(sides[0], late) < 0.0 < _polynomial(sides[1], late):
             part = _HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
     within = part / SAMPLES * np.arange(1.0, SAMPLES)
-    rows, last = _weights(within).T @ table[begin : begin + SAMPLES + 1], last.copy()
-    rows[:, REGIME], rows[:, PLACE], last[PLACE] = last[REGIME], range(1, SAMPLES), SAMPLES
-    return np.concatenate([table[: begin + 1], rows, last[None]])
+    step = table[begin + 1 : begin + SAMPLES + 1]
+    step[:-1], step[-1] = _weights(within).T @ table[begin : begin + SAMPLES + 1], last
+    step[:, REGIME], step[:, PLACE] = last[REGIME], range(1, SAMPLES + 1)
+    return table[: begin + SAMPLES + 1]
 
 
 def along_path(
