@@ -12,11 +12,12 @@ from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
-from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.velocity_step import VelocityStep
+
+from ._normal_stress_response import NormalStressResponse
+from ._normal_stress_transient import NormalStressTransient
 
 #: What draws a number.
 Draw = Callable[[np.random.Generator], float]

@@ -7,9 +7,9 @@ from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 
+from ._synthetic_fit import SyntheticFit
 from .law_identification import CHANCE, ScatterOverPromise
 
 RECORDS, DISTANCE = 4, 10.0

@@ -10,10 +10,11 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.measures.synthetic_fit import ONE, TWO, SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
+
+from ._synthetic_fit import ONE, TWO, SyntheticFit
 
 RECORDS = 24
 PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")

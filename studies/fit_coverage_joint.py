@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.figure import Figure
-from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 
+from ._synthetic_fit import SyntheticFit
 from .fit_coverage import REDUCTIONS, covers, shares
 
 RECORDS = 6

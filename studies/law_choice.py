@@ -9,10 +9,11 @@ import xarray as xr
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
+
+from ._synthetic_fit import SyntheticFit
 
 RECORDS = 6
 LAWS = ("slip", "slowness")

@@ -10,10 +10,11 @@ import xarray as xr
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.measures.synthetic_fit import SyntheticFit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
+
+from ._synthetic_fit import SyntheticFit
 
 RECORDS = 12
 STEP, BACK = "1:30, 10:270", "10:30, 1:270"

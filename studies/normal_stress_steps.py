@@ -10,9 +10,9 @@ from scipy.integrate import quad
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
 
+from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_of
 
 #: Stiffness over critical stiffness, compliant to stiff.

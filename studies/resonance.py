@@ -12,11 +12,11 @@ import xarray as xr
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Inverse
 from rsfstudy.slider.stability import response_to_normal_stress
 
+from ._normal_stress_response import NormalStressResponse
 from ._phase_plane import scene_of
 
 base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0)

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
+from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 
 from rsfstudy import Scene, protocol, simulate
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
-from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.slider.stability import response_to_normal_stress

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from test_readings import PLAIN, read, recorded
 
 from rsfstudy import Scene, measures, named_studies, protocol, simulate, vocabulary
@@ -15,7 +16,6 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.elasticities import Elasticities
 from rsfstudy.measures.fit import Fit
 from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES

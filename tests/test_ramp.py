@@ -6,11 +6,11 @@ import math
 
 import pytest
 from in_time import InTime
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from running import cell_key
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene, history, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.slider.laws import PARTS as LAWS

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
+from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 
 from rsfstudy import Scene
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
-from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.velocity_step import VelocityStep

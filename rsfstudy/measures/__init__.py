@@ -1,5 +1,5 @@
 """Measures: from a scene to named numbers with a status, an error estimate and a cost; one file
-each, found by name.
+each, found by name. Those that studies alone use stand beside these.
 
 A measure is a frozen dataclass derived from `Measure` that fills in the physics. It is picklable,
 so Dask can send it, and describes itself as plain data, so a NetCDF file can hold it. Its fields

@@ -24,5 +24,5 @@ def check_leaves_alone(scene: Scene) -> None:
     if loading.unknowns:
         what = "load point velocity" if loading.displaces else "normal stress"
         rule = f"changes {what} all along, so that no motion settles or repeats by itself"
-        remedy = "Read its motion by simulate, or that of an oscillation by normal_stress_response."
+        remedy = "Read its motion by simulate; that of an oscillation as the study resonance does."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
