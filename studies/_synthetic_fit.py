@@ -13,7 +13,15 @@ from scipy.linalg import solve_toeplitz, toeplitz
 
 from rsfstudy.analysis.fitting.intervals import Profile, reach
 from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, Model, Values, check_free, check_positive
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC,
+    Model,
+    Values,
+    check_free,
+    check_positive,
+    coordinate,
+    parameters_of,
+)
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.errors import InvalidValue
@@ -167,7 +175,7 @@ class SyntheticFit(Measure):
         values: dict[str, Value] = {
             **self._deviations(found, true),
             **self._inside(found, self._squared_distances(search, found, true), ""),
-            **self._inside(naive, np.square(self._off(naive, true) / _spread(naive)), "naive_"),
+            **self._inside(naive, np.square(self._off(naive, true) / naive.spread), "naive_"),
             "promised_spread": self._shown(self._promised(truth, true)),
             "told": self._shown(np.array([n not in found.untold for n in self._free], dtype=float)),
             "criterion": found.criterion,
@@ -181,20 +189,8 @@ class SyntheticFit(Measure):
 
     def _true(self, scene: Scene) -> dict[str, float]:
         """All parameters of the scene, with the numbers of windows."""
-        stated = scene.as_dict()
-        plainly = {
-            "a": scene.a,
-            "b": scene.b,
-            "slip_distance": self.slip_distance,
-            "stiffness": scene.stiffness / self.slip_distance,
-            "mu_star": scene.mu_star,
-        }
-        if scene.parts.law.states > 1:
-            del plainly["b"]
-            plainly |= {n: scene.a * stated[f"{n}_over_a"] for n in ("b1", "b2")}
-            plainly["slip_distance_2"] = self.slip_distance * stated["length_ratio"]
-        named = ("law_exponent", "alpha")
-        plainly |= {n: stated[n] for n in named if stated.get(n) is not None}
+        longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
+        plainly = parameters_of(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
         names = numbered(tuple(plainly), len(self._windows()))
         return {name: plainly[plain(name)] for name in names}
@@ -225,24 +221,23 @@ class SyntheticFit(Measure):
 
     def _off(self, found: Fitted, true: Values) -> np.ndarray:
         """What is found less the truth."""
-        return np.array([_coordinate(n, found.values) - _coordinate(n, true) for n in self._free])
+        pairs = ((n, found.values[n], true[n]) for n in self._free)
+        return np.array([coordinate(n, ours) - coordinate(n, exact) for n, ours, exact in pairs])
 
     def _deviations(self, found: Fitted, true: Values) -> dict[str, np.ndarray]:
         """Parameters, how far they are from the truth, and how far they may be."""
-        at = np.array([_coordinate(n, found.values) for n in self._free])
-        slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in self._free])
         values = {
-            "estimate": at,
+            "estimate": np.array([coordinate(n, found.values[n]) for n in self._free]),
             "deviation": self._off(found, true),
-            "deviation_error": np.array([found.errors[n] for n in self._free]) / slopes,
-            "spread": _spread(found),
+            "deviation_error": np.array([found.errors[n] for n in self._free]) / found.slopes,
+            "spread": found.spread,
         }
         return {name: self._shown(v) for name, v in values.items()}
 
     def _squared_distances(self, search: Search, found: Fitted, true: Values) -> np.ndarray:
         """Squared distances of the likelihood to the truth."""
         distances = [
-            Profile(search, found, name).squared_distance(_coordinate(name, true))
+            Profile(search, found, name).squared_distance(coordinate(name, true[name]))
             for name in self._free
         ]
         return np.array(distances)
@@ -267,14 +262,6 @@ class SyntheticFit(Measure):
         scales = np.sqrt(np.diag(information))
         inverse = np.linalg.pinv(information / np.outer(scales, scales), hermitian=True)
         return np.asarray(self.noise_size * np.sqrt(np.diag(inverse)) / scales)
-
-
-def _coordinate(name: str, values: Values) -> float:
-    return math.log(values[name]) if name in LOGARITHMIC else values[name]
-
-
-def _spread(found: Fitted) -> np.ndarray:
-    return np.asarray(np.sqrt(np.diag(found.covariance)))
 
 
 def _pieces(text: str, rows: int) -> list[_Piece]:

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.analysis.fitting.joint import plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, fields_of, parameters_of
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.slider.scene import Scene
@@ -133,16 +133,10 @@ def scene(dataset: xr.Dataset) -> Scene:
     first = contents.scene(plain["base"], {})
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))
-    value = {n: one[n].item() for n in map(str, one["parameter"].values)}
-    guess = float(plain["measure"]["slip_distance_guess"])
-    distance, a = value.get("slip_distance", guess), value.get("a", first.a)
-    changes: dict[str, Any] = {
-        n: value[n] for n in ("a", "mu_star", "alpha", "law_exponent") if n in value
-    }
-    changes |= {f"{n}_over_a": value[n] / a for n in ("b", "b1", "b2") if n in value}
-    if "slip_distance_2" in value:
-        changes["length_ratio"] = value["slip_distance_2"] / distance
-    changes["stiffness"] = value.get("stiffness", first.stiffness / guess) * distance
+    distances = (
+        float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
+    )
+    values = parameters_of(first, *distances)
+    values |= {n: one[n].item() for n in map(str, one["parameter"].values)}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
-    changes |= {"reference_rate": before / distance, "load_velocity_ratio": after / before}
-    return first.with_(**changes)
+    return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)

@@ -64,14 +64,37 @@ _NUMBERS = (
     Output("window_ends", "", "um", "load point displacement where the window ends"),
     Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
+    Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
+    *(
+        Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
+        for name in ("covariance", "correlation")
+    ),
 )
-_ROWS_OF = (
-    *(replace(about, name=f"record_{about.name}") for about in COLUMNS[:3]),
-    Quantity("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
-    Quantity("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
-    Quantity("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
-    Quantity("residual", "", "1", "friction less that of the fit"),
-    Quantity("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+_ROWS_OF = tuple(
+    Output(*about, dims=("row",))
+    for about in (
+        *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in COLUMNS[:3]),
+        ("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
+        ("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
+        ("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
+        ("residual", "", "1", "friction less that of the fit"),
+        ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+    )
+)
+_BESIDE = {
+    "stderr": "standard error",
+    "low": "lower end of the 95 % interval",
+    "high": "upper end of the 95 % interval",
+}
+_DRAWN = (
+    Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
+    Output(
+        "posterior",
+        "",
+        "1",
+        "draws of the parameters from their posterior",
+        dims=("draw", "parameter"),
+    ),
 )
 
 
@@ -221,27 +244,10 @@ class Fit(Measure):
         for name in self.parameters:
             about = PARAMETERS[plain(name)]
             found.append(Output(name, about.symbol, about.units, about.long_name, error=True))
-            for suffix, words in (
-                ("stderr", "standard error of the"),
-                ("low", "lower end of the 95 % interval of the"),
-                ("high", "upper end of the 95 % interval of the"),
-            ):
-                text = f"{words} {about.long_name}"
+            for suffix, words in _BESIDE.items():
+                text = f"{words} of the {about.long_name}"
                 found.append(Output(f"{name}_{suffix}", "", about.units, text))
-        both = "parameter", "other_parameter"
-        rows = [Output(q.name, q.symbol, q.units, q.long_name, dims=("row",)) for q in _ROWS_OF]
-        if self.posterior:
-            text = "steps after which a chain has forgotten where it was"
-            found.append(Output("autocorrelation_time", "", "1", text))
-            text = "draws of the parameters from their posterior"
-            found.append(Output("posterior", "", "1", text, dims=("draw", "parameter")))
-        return (
-            *found,
-            *_NUMBERS,
-            Output("covariance", "", "1", "covariance of parameters", dims=both),
-            Output("correlation", "", "1", "correlation of parameters", dims=both),
-            *rows,
-        )
+        return (*found, *(_DRAWN if self.posterior else ()), *_NUMBERS, *_ROWS_OF)
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -302,7 +308,7 @@ class Fit(Measure):
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
             guess = first_guess(part, window.step, self.free, distances)
             first = guess | first
-            if self.together:
+            if len(windows) > 1:
                 first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
         model = Joint(tuple(parts))
         search = Search(model, first, self.parameters, self.noise)
@@ -313,13 +319,13 @@ class Fit(Measure):
         values |= (place := _place(windows[0]))
         for name in self.parameters:
             told = name not in untold
-            ends = interval(search, found, name) if told else search.bounds(found, name)
+            ends = interval(search, found, name) if told else search.bounds(name)
             values[f"{name}_low"], values[f"{name}_high"] = ends
         if self.posterior:
             values |= self._drawn(search, found)
         if untold:
             text = f"{', '.join(untold)}: the record does not tell"
-            if "a" in untold and found.values["a"] < _LEAST * search.bounds(found, "a")[0]:
+            if "a" in untold and found.values["a"] < _LEAST * search.bounds("a")[0]:
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
@@ -343,9 +349,8 @@ class Fit(Measure):
         drawn, time = np.full((self.posterior, len(found.free)), math.nan), math.nan
         if np.isfinite(found.covariance).all():
             drawn, time = posterior.sample(search, found, self.posterior)
-        for place, name in enumerate(found.free):
-            if name in LOGARITHMIC:
-                drawn[:, place] = np.exp(drawn[:, place])
+        logs = [name in LOGARITHMIC for name in found.free]
+        drawn[:, logs] = np.exp(drawn[:, logs])
         return {"posterior": drawn, "autocorrelation_time": time}
 
     def _begins(self, record: Record) -> int:
@@ -365,19 +370,16 @@ class Fit(Measure):
     def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
         """Numbers and rows of what was found."""
         values: dict[str, Value] = {}
-        slopes = np.array([found.values[n] if n in LOGARITHMIC else 1.0 for n in found.free])
         for name in found.free:
             values[name], values[f"{name}_error"] = found.values[name], found.errors[name]
             values[f"{name}_stderr"] = found.stderr(name)
-        covariance = found.covariance * np.outer(slopes, slopes)
+        covariance = found.covariance * np.outer(found.slopes, found.slopes)
         spread = np.sqrt(np.diag(covariance))
-        signs = np.array(
-            [{"a": 1.0, "b": -1.0, "b1": -1.0, "b2": -1.0}.get(n, 0.0) for n in found.free]
-        )
+        signs = np.array([float(n == "a") - (n in ("b", "b1", "b2")) for n in found.free])
         with np.errstate(invalid="ignore"):
             correlation = covariance / np.outer(spread, spread)
             variance_of_rate = float(signs @ covariance @ signs)
-        b = found.values["b"] if "b" in found.values else found.values["b1"] + found.values["b2"]
+        b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
         left = model.friction - found.curve - found.trend
         variance = float(np.var(model.friction)) or math.nan
         values |= {
@@ -394,33 +396,34 @@ class Fit(Measure):
             "covariance": covariance,
             "correlation": correlation,
         }
-        columns = {
+        along = {
             "fitted_friction": found.curve + found.trend,
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
             "residual": left,
             "innovation": found.innovations,
         }
-        shape = len(self.inner_coordinates["row"])
-        for name, column in columns.items():
-            whole = np.full(shape, math.nan)
-            whole[rows] = column
-            values[name] = whole
-        for about in COLUMNS[:3]:
-            column = np.concatenate([record.columns[about.name] for record in self._involved])
-            whole = np.full(shape, math.nan)
-            whole[: len(column)] = column
-            values[f"record_{about.name}"] = whole
+        for name in (about.name for about in COLUMNS[:3]):
+            whole = [record.columns[name] for record in self._involved]
+            along[f"record_{name}"] = np.concatenate(whole)
+        for name, column in along.items():
+            values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)
+            along_rows[slice(len(column)) if name.startswith("record_") else rows] = column
         return values
 
 
 def _place(window: Window) -> dict[str, float]:
-    """Velocities of the step of a window, its ends, and how noisy its load point is."""
-    moved, time = (window.record.columns[n][window.rows] for n in ("displacement", "time"))
+    """Velocities of the step of a window, its ends, normal stress before the step, and how noisy
+    the load point is.
+    """
+    record, rows = window.record, window.rows
+    moved, time = record.columns["displacement"][rows], record.time[rows]
+    stress = record.columns.get("normal_stress", np.full(len(record), math.nan))[rows]
     return {
         "load_point_noise": math.sqrt(noise_variance(time, moved)),
         "velocity_before": window.step.before,
         "velocity_after": window.step.after,
         "window_begins": moved[0],
         "window_ends": moved[-1],
+        "normal_stress_before": stress[: max(np.searchsorted(time, window.step.begins), 1)].mean(),
     }

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.stats import t as student
 
-from rsfstudy.analysis.fitting.model import LOGARITHMIC
+from rsfstudy.analysis.fitting.model import value_of
 from rsfstudy.analysis.fitting.search import Fitted, Search
 
 #: What intervals cover, and by how much of itself a squared distance may miss that of a parabola
@@ -28,8 +28,8 @@ def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
     t says, or the bounds of the search.
     """
     profile, far = Profile(search, found, name), reach(found, COVERS)
-    low, high = (profile.end(sign, far) for sign in (-1.0, 1.0))
-    return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
+    low, high = (value_of(name, profile.end(sign, far)) for sign in (-1.0, 1.0))
+    return low, high
 
 
 class Profile:

@@ -148,21 +148,9 @@ class Model:
         columns[:, 1] = self.loading[:, 1] / velocity
         columns[:, 2] = 1.0 - self.loading[:, 2]
         columns[:, 3] = self.loading[:, 3] * distance / velocity
-        fields = {
-            "a": values["a"],
-            "mu_star": values["mu_star"],
-            "stiffness": values["stiffness"] * distance,
-            "reference_rate": velocity / distance,
-        }
-        if "b" in values:
-            fields["b_over_a"] = values["b"] / values["a"]
-        else:
-            fields["b1_over_a"] = values["b1"] / values["a"]
-            fields["b2_over_a"] = values["b2"] / values["a"]
-            fields["length_ratio"] = values["slip_distance_2"] / distance
-        fields |= {name: values[name] for name in ("alpha", "law_exponent") if name in values}
         history = of_samples(columns, self.is_stressed, "record")
-        return Scene(assembly.with_numbers(self.scene.parts._replace(loading=history), fields))
+        parts = self.scene.parts._replace(loading=history)
+        return Scene(assembly.with_numbers(parts, fields_of(values, velocity)))
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows, without trend; NaN where there is no such motion, or where it
@@ -271,7 +259,59 @@ class Model:
         return _SIZES.get(name, 1.0 / self.reference)
 
 
+def parameters_of(scene: Scene, distance: float, distance_2: float) -> dict[str, float]:
+    """Parameters of a scene, in units of records, by its slip distance and that of the second of
+    two states in um.
+    """
+    stated = scene.as_dict()
+    found = {
+        "a": scene.a,
+        "slip_distance": distance,
+        "mu_star": scene.mu_star,
+        "stiffness": scene.stiffness / distance,
+    }
+    if scene.parts.law.states == 1:
+        found["b"] = scene.b
+    else:
+        found |= {name: scene.a * stated[f"{name}_over_a"] for name in ("b1", "b2")}
+        found["slip_distance_2"] = distance_2
+    named = ("alpha", "law_exponent")
+    return found | {name: stated[name] for name in named if stated.get(name) is not None}
+
+
+def fields_of(values: Values, velocity: float) -> dict[str, float]:
+    """Fields of a scene with these parameters of a record, in units of its slip distance and of a
+    velocity in um/s.
+    """
+    a, distance = values["a"], values["slip_distance"]
+    fields = {
+        "a": a,
+        "mu_star": values["mu_star"],
+        "stiffness": values["stiffness"] * distance,
+        "reference_rate": velocity / distance,
+    }
+    fields |= {f"{n}_over_a": values[n] / a for n in ("b", "b1", "b2") if n in values}
+    if "slip_distance_2" in values:
+        fields["length_ratio"] = values["slip_distance_2"] / distance
+    return fields | {name: values[name] for name in ("alpha", "law_exponent") if name in values}
+
+
 def shifted(values: Values, name: str, by: float) -> dict[str, float]:
     """Values of which one, or its logarithm, is moved."""
     moved = values[name] * math.exp(by) if name in LOGARITHMIC else values[name] + by
     return {**values, name: moved}
+
+
+def coordinate(name: str, value: float) -> float:
+    """Coordinate of a parameter in searches: itself, or its logarithm."""
+    return math.log(value) if name in LOGARITHMIC else value
+
+
+def value_of(name: str, coordinate: float) -> float:
+    """Value of a parameter, by its coordinate."""
+    return math.exp(coordinate) if name in LOGARITHMIC else coordinate
+
+
+def slope(name: str, value: float) -> float:
+    """Derivative of a parameter by its coordinate."""
+    return value if name in LOGARITHMIC else 1.0

@@ -11,7 +11,17 @@ from scipy.optimize import least_squares
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import FINE, LOGARITHMIC, QUICK, Differences, Model, Values
+from rsfstudy.analysis.fitting.model import (
+    FINE,
+    LOGARITHMIC,
+    QUICK,
+    Differences,
+    Model,
+    Values,
+    coordinate,
+    slope,
+    value_of,
+)
 from rsfstudy.analysis.fitting.noise import Noise
 from rsfstudy.motion.meter import Halt
 from rsfstudy.status import Status
@@ -94,10 +104,19 @@ class Fitted:
     criterion: float
     untold: tuple[str, ...]
 
+    @property
+    def slopes(self) -> np.ndarray:
+        """Derivatives of the free parameters by their coordinates."""
+        return np.array([slope(name, self.values[name]) for name in self.free])
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard errors of the coordinates of the free parameters."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
     def stderr(self, name: str) -> float:
         """Standard error of a parameter."""
-        place = self.free.index(name)
-        return float(math.sqrt(self.covariance[place, place]) * _slope(name, self.values[name]))
+        return float((self.spread * self.slopes)[self.free.index(name)])
 
 
 class Search:
@@ -138,11 +157,11 @@ class Search:
     def values(self, x: np.ndarray) -> dict[str, float]:
         """All parameters, by the coordinates of the free ones."""
         found = zip(self.free, x.tolist(), strict=True)
-        return self.first | {n: math.exp(v) if n in LOGARITHMIC else v for n, v in found}
+        return self.first | {name: value_of(name, v) for name, v in found}
 
     def coordinates(self, values: Values) -> np.ndarray:
         """Coordinates of the free parameters."""
-        return np.array([math.log(values[n]) if n in LOGARITHMIC else values[n] for n in self.free])
+        return np.array([coordinate(name, values[name]) for name in self.free])
 
     def residuals(self, values: Values, *, checked: bool = False) -> np.ndarray:
         """What a model leaves of the record."""
@@ -253,17 +272,18 @@ class Search:
             if number + 1 >= _POLISHED[0] and _is_still(moved, whitened, _DONE):
                 break
         values = self.values(x)
-        left = self.residuals(values)
+        curve, trend = self.model.curve(values), self.model.trend(values)
+        left = self.model.friction - curve - trend
         innovations = noise.whitened(left[:, None])[:, 0]
         free_of = len(left) - len(x)
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _inverse(whitened[:, :-1])
         covariance = size**2 * inverse
         degrees = max(noise.degrees * free_of / len(left), _FEWEST)
-        finer = self.model.curve(values, refined=True) - self.model.curve(values)
+        finer = self.model.curve(values, refined=True) - curve
         with np.errstate(invalid="ignore"):  # of what is not told
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
-        slopes = [_slope(name, values[name]) for name in self.free]
+        slopes = [slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
         variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
         band = np.sqrt(np.maximum(variances, 0.0))  # rounding, where a parameter is not told
@@ -277,8 +297,8 @@ class Search:
             noise=noise,
             size=size,
             degrees=degrees,
-            curve=self.model.friction - left - self.model.trend(values),
-            trend=self.model.trend(values),
+            curve=curve,
+            trend=trend,
             innovations=innovations / size,
             band=band,
             jacobian=jacobian,
@@ -322,12 +342,12 @@ class Search:
                 found.append(name)
         return tuple(found)
 
-    def bounds(self, found: Fitted, name: str) -> tuple[float, float]:
+    def bounds(self, name: str) -> tuple[float, float]:
         """Bounds within which a parameter was looked for; NaN where there are none."""
-        place = found.free.index(name)
+        place = self.free.index(name)
         ends = self.low[place], self.high[place]
-        low, high = (v if math.isfinite(v) else math.nan for v in ends)
-        return (math.exp(low), math.exp(high)) if name in LOGARITHMIC else (low, high)
+        low, high = (value_of(name, v) if math.isfinite(v) else math.nan for v in ends)
+        return low, high
 
 
 def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
@@ -361,8 +381,3 @@ def _inverse(columns: np.ndarray) -> np.ndarray:
     values = np.maximum(values, 1e-14 * values[0])
     root = turned.T / values
     return np.asarray((root @ root.T) / np.outer(sizes, sizes))
-
-
-def _slope(name: str, value: float) -> float:
-    """Derivative of a parameter by its coordinate."""
-    return value if name in LOGARITHMIC else 1.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsfstudy.analysis.fitting.model import Model
+from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, loading_of
 from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.motion.accuracy import Accuracy
@@ -149,18 +149,7 @@ def first_guess(
     """
     scene, friction = model.scene, model.friction
     before, later = friction[model.time < step.begins], friction[model.time >= step.ends]
-    stated = scene.as_dict()
-    values = {
-        "a": scene.a,
-        "slip_distance": distances[0],
-        "mu_star": scene.mu_star,
-        "stiffness": scene.stiffness / distances[0],
-    }
-    if scene.parts.law.states == 1:
-        values["b"] = scene.b
-    else:
-        values |= {name: scene.a * stated[f"{name}_over_a"] for name in ("b1", "b2")}
-        values["slip_distance_2"] = distances[1]
+    values = parameters_of(scene, *distances)
     if "mu_star" in free and len(before):
         values["mu_star"] = float(np.mean(before))
     if step.after > 0.0 and len(before):
@@ -170,6 +159,4 @@ def first_guess(
         read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio
         seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
         values |= {name: v for name, v in seen.items() if name in free and name in values}
-    named = ("alpha", "law_exponent")
-    values |= {name: stated[name] for name in named if stated.get(name) is not None}
     return dict.fromkeys(free, 0.0) | values
