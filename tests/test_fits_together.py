@@ -40,6 +40,16 @@ def test_two_steps_of_a_record_share_a_law() -> None:
         assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
 
 
+def test_one_step_together_is_that_step() -> None:
+    one = record(PAIR, seed=1)
+    alone, both = (
+        rsfstudy.fit(one, laws=["slip"], steps=[1], together=together, **OPTIONS)
+        for together in (False, True)
+    )
+    for name in (*SHARED, "mu_star", "criterion"):
+        assert float(both[name].item()) == float(alone[name].item()), name
+
+
 def test_two_records_share_a_law_and_have_trends_of_their_own() -> None:
     records = [record(trend=2e-5, seed=1), record(trend=-3e-5, seed=2)]
     alone = rsfstudy.fit(records, laws=["slowness"], **OPTIONS)
@@ -253,6 +263,30 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
     motion = rsfstudy.simulate(fit.rsf.scene, times=times, engine="compiled")
     seen, fitted = motion.friction_coefficient.values, fit.detrended_friction.values[rows]
     assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some
+    # what was not looked for is as it was while it was looked for
+    held = {"b_over_a": 1.3, "a": 0.01, "slip_distance": "10 um"}
+    some = rsfstudy.fit(record(seed=4), laws=["slowness"], free=("a", "mu_star"), **OPTIONS | held)
+    assert some.squeeze().rsf.scene.b == pytest.approx(0.013, rel=1e-12)
+    with pytest.raises(InvalidValue, match="normal_stress = None: is not in the record"):
+        _ = fit.rsf.laboratory
+
+
+def test_the_rig_of_a_fit_gives_the_record_back() -> None:
+    """In s and um, where the record states its normal stress."""
+    one = record(seed=4)
+    columns = {**one.columns, "normal_stress": np.full(len(one), 20.0)}
+    stressed = rsfstudy.read_record(columns).with_steps(one.found)
+    fit = rsfstudy.fit(stressed, laws=["slowness"], **OPTIONS).squeeze()
+    rig, scene = fit.rsf.laboratory, fit.rsf.scene
+    assert rig.normal_stress == pytest.approx(20e6)
+    assert rig.slip_distance == pytest.approx(1e-6 * float(fit.slip_distance))
+    assert rig.scene(stiffness=rig.stiffness).stiffness == pytest.approx(scene.stiffness)
+    motion = rsfstudy.simulate(scene, duration=rig.dimensionless("5 s"), engine="compiled")
+    seen = rig.in_units(motion, stress="MPa", length="um")
+    rows = (fit.record_time.values > 40.0) & (fit.record_time.values < 45.0)
+    at = np.interp(fit.record_time.values[rows] - 40.0, seen.time, seen.shear_stress)
+    # straight lines between points of the motion
+    np.testing.assert_allclose(at / 20.0, fit.detrended_friction.values[rows], atol=1e-4)
 
 
 #: What is looked for, posterior draws, and by how many errors of sampling they may be off: 5.

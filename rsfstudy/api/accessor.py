@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from rsfstudy import plots
     from rsfstudy.declare.study import Study
+    from rsfstudy.rig.laboratory import Laboratory
     from rsfstudy.slider.scene import Scene
 
 _FOREIGN = (
@@ -69,6 +70,24 @@ class Accessor:
         if self._is_study:
             return self.study.scene(scenes.cell(self._dataset, self.study))
         return scenes.described(self._dataset)
+
+    @property
+    @door
+    def laboratory(self) -> Laboratory:
+        """The rig of one fit of a record, whose scales are those of ``.scene``: the slip distance
+        and the stiffness of the fit, velocity and mean normal stress before the step. It turns
+        motions of that scene into its units, as in ``rig.in_units(motion, length="um")``.
+
+        Raises
+        ------
+        DataError
+            Where the dataset is no fit.
+        InvalidValue
+            Where several fits are selected, or the record does not tell normal stress.
+        """
+        from rsfstudy.api import fit_results
+
+        return fit_results.laboratory(self._dataset)
 
     @property
     @door

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.analysis.fitting.joint import plain
+from rsfstudy.analysis.fitting.joint import of_window, plain
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, fields_of, parameters_of
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
+from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS
 
@@ -137,6 +139,26 @@ def scene(dataset: xr.Dataset) -> Scene:
         float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
     )
     values = parameters_of(first, *distances)
-    values |= {n: one[n].item() for n in map(str, one["parameter"].values)}
+    found = {n: one[n].item() for n in map(str, one["parameter"].values)}
+    values |= of_window(found, 1)
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
     return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
+
+
+def laboratory(dataset: xr.Dataset) -> Laboratory:
+    """The rig of one fit, as `Accessor.laboratory` says."""
+    one, slider = _only(dataset), scene(dataset)
+    stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
+    if not stress > 0.0:
+        remedy = (
+            "Read the record with normal_stress=, or make a rsfstudy.Laboratory that states it."
+        )
+        raise InvalidValue("normal_stress", None, "is not in the record", remedy=remedy)
+    velocity = one["velocity_before"].item() * 1e-6
+    distance = velocity / slider.reference_rate
+    return Laboratory(
+        normal_stress=stress,
+        slip_distance=distance,
+        reference_velocity=velocity,
+        stiffness=slider.stiffness * stress / distance,
+    )

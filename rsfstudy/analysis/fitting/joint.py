@@ -69,13 +69,13 @@ class Joint:
     def check(self, values: Values) -> None:
         """Raise InvalidValue for parameters that make no scene."""
         for number, part in enumerate(self.parts, start=1):
-            part.check(_of_window(values, number))
+            part.check(of_window(values, number))
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows of all windows, without trends (see `Model.curve`)."""
         return np.concatenate(
             [
-                part.curve(_of_window(values, number), refined=refined, checked=checked)
+                part.curve(of_window(values, number), refined=refined, checked=checked)
                 for number, part in enumerate(self.parts, start=1)
             ]
         )
@@ -83,7 +83,7 @@ class Joint:
     def trend(self, values: Values) -> np.ndarray:
         """The trends along the rows of all windows."""
         return np.concatenate(
-            [part.trend(_of_window(values, n)) for n, part in enumerate(self.parts, start=1)]
+            [part.trend(of_window(values, n)) for n, part in enumerate(self.parts, start=1)]
         )
 
     def jacobian(
@@ -99,12 +99,12 @@ class Joint:
                 if plain(name) == name or name.endswith(f"_{number}")
             ]
             names = [plain(free[place]) for place in acting]
-            block[:, acting] = part.jacobian(_of_window(values, number), names, differences)
+            block[:, acting] = part.jacobian(of_window(values, number), names, differences)
             blocks.append(block)
         return np.concatenate(blocks)
 
 
-def _of_window(values: Values, number: int) -> dict[str, float]:
+def of_window(values: Values, number: int) -> dict[str, float]:
     """The parameters of one window, by their plain names."""
     ending, found = f"_{number}", {}
     for name, value in values.items():
