@@ -29,7 +29,7 @@ def written(path: Path, headings: list[str], columns: list[np.ndarray], between:
 @pytest.mark.parametrize("between", [",", ";", "\t"])
 def test_units_of_headings(between: str, tmp_path: Path) -> None:
     """Millimetres, minutes and kilopascals: each column of another power, none by chance right."""
-    headings = ["Time (min)", "Displ (mm)", "Shear stress (kPa)", "Normal stress [MPa]"]
+    headings = ["Time (min)", "LP [mm]", "tau [kPa]", "Normal stress [MPa]"]
     columns = [TIME / 60.0, MOVED * 1e-3, SHEAR * 1e3, NORMAL]
     record = rsfstudy.read_record(written(tmp_path / "a run-2.csv", headings, columns, between))
     told = record.columns

@@ -1,6 +1,7 @@
 """Tables that commands print break no number, name or heading, however narrow the terminal."""
 
 import pytest
+import xarray as xr
 from running import call, named_results
 from test_shown import rows as of_html
 
@@ -9,6 +10,7 @@ from rsfstudy.api import runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import layout, terminal
 from rsfstudy.declare import catalogue, names
+from rsfstudy.status import Status
 
 WIDTHS = (40, 80)
 
@@ -64,6 +66,14 @@ def test_declarations_of_every_study(width, printed, tmp_path):
             words = {word for point in shown for word in f"{point},".split()}
             last = str(shown[-1]).split()[-1]
             assert not [w for w in words if not in_one_piece(w, lines) and w != f"{last},"]
+
+
+def test_where_no_cell_has_a_number_the_status_is_explained():
+    dataset = xr.Dataset({"status": ("x", [3, 3]), "rhs_evaluations": ("x", [5, 5])})
+    why = Status.NO_LIMIT_CYCLE.meaning
+    assert tables.tally(dataset) == f"2 no_limit_cycle ({why}); 10 right-hand sides"
+    one = dataset.assign(status=("x", [0, 3]))
+    assert tables.tally(one) == "1 ok, 1 no_limit_cycle; 10 right-hand sides"
 
 
 def test_a_relation_stays_with_its_number(printed):

@@ -64,10 +64,14 @@ def with_units(along: xr.DataArray) -> str:
 
 
 def tally(dataset: xr.Dataset) -> str:
-    """How many cells ended how, and their work."""
-    work = int(dataset["rhs_evaluations"].sum())
-    counts = ", ".join(f"{count} {label}" for label, count in runner.counts(dataset).items())
-    return f"{counts}; {work:,} right-hand sides"
+    """How many cells ended how, with what that means where none is ok, and their work."""
+    work, counts = int(dataset["rhs_evaluations"].sum()), runner.counts(dataset)
+    nothing = Status.OK.label not in counts
+    told = ", ".join(
+        f"{count} {label}" + f" ({Status[label.upper()].meaning})" * nothing
+        for label, count in counts.items()
+    )
+    return f"{told}; {work:,} right-hand sides"
 
 
 def origin(dataset: xr.Dataset) -> dict[str, str]:

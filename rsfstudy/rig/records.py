@@ -28,7 +28,7 @@ _USUAL = {"time": "s", "displacement": "um"}
 #: How headings of the usual files begin.
 _HEADINGS = {
     "time": r"t(ime)?\b|time",
-    "displacement": r"(load.*)?disp|lp_?disp|l\.?p\.? disp|load.?point",
+    "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
     "friction": r"fric|mu\b|coeff",
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",

@@ -138,7 +138,9 @@ def _fast(text: str, between: str, line: int, width: int) -> tuple[np.ndarray | 
 
 def _delimiter(header: str) -> str:
     """What stands between columns: tabs, semicolons, commas, or blanks."""
-    return next((mark for mark in "\t;," if mark in header), " " if "(" not in header else ",")
+    return next(
+        (mark for mark in "\t;," if mark in header), " " if not {"(", "["} & {*header} else ","
+    )
 
 
 def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:
