@@ -12,6 +12,7 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.events import Event
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
@@ -42,6 +43,12 @@ def recorded(*names: str) -> tuple[Output, ...]:
     return tuple(
         Output(q.name, q.symbol, q.units, q.long_name, q.scale, dims=("phase",)) for q in abouts
     )
+
+
+def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What is kept of a record, with time and slip since its beginning."""
+    found = {name: path[name] for name in ("friction_coefficient", "log10_slip_rate")}
+    return {"time": path["time"] - begin.time, "slip": path["slip"] - path["slip"][0], **found}
 
 
 @dataclass(frozen=True)

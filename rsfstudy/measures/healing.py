@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, errors_of, recorded
+from rsfstudy.measures._records import Recorded, errors_of, recorded, since
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, Kind, maximum, settling
@@ -110,8 +110,6 @@ class Healing(Recorded):
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow the motion, and once more with smaller tolerances for the errors."""
         hold = _hold(scene)
-        if isinstance(hold, Outcome):
-            return hold
         first = _follow(scene, hold, accuracy, meter)
         said = _beginning(scene, hold, first.begin, max(_STEADY, accuracy.rtol))
         peakless = Outcome(
@@ -144,31 +142,26 @@ class Healing(Recorded):
     def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
         """The record itself, from the beginning of the hold on."""
         path = along_path(record.rows, self.phases, READ)
-        rows = np.column_stack([path[name] for name in READ])
-        displacement = load_point_of(scene, rows)
-        return {
-            "time": path["time"] - record.begin.time,
-            "load_point_displacement": displacement - displacement[0],
-            "slip": path["slip"] - path["slip"][0],
-            "friction_coefficient": path["friction_coefficient"],
-            "log10_slip_rate": path["log10_slip_rate"],
-        }
+        moved = load_point_of(scene, np.column_stack([*path.values()]))
+        return {**since(record.begin, path), "load_point_displacement": moved - moved[0]}
 
 
-def _hold(scene: Scene) -> int | Outcome:
-    """The number of the segment in which the load point is held first; or why it is no hold."""
+def _hold(scene: Scene) -> int:
+    """The number of the segment in which the load point is held first; `Halt` says why there is
+    none.
+    """
     history = scene.parts.loading.segments
     holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
     if not holds:
-        return Outcome(Status.NO_STEP, message="the load point is never held and moved again")
+        raise Halt(Status.NO_STEP, "the load point is never held and moved again")
     before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
     if reload.load_velocity <= 0.0:
         why = "the hold is followed by another, or by a load point that moves back"
-        return Outcome(Status.NOT_APPLICABLE, message=why)
+        raise Halt(Status.NOT_APPLICABLE, why)
     stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
     if hold.displacement or reload.displacement or len(stresses) > 1:
         why = "the load point is displaced, or normal stress stepped, at an end of the hold"
-        return Outcome(Status.NOT_APPLICABLE, message=why)
+        raise Halt(Status.NOT_APPLICABLE, why)
     return holds[0]
 
 

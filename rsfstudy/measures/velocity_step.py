@@ -11,15 +11,16 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, errors_of, recorded
+from rsfstudy.measures._records import Recorded, errors_of, recorded, since
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, minimum, rise
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.events import Event, Kind, fall, maximum, minimum, rise
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import friction_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.quantity import Output
+from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess
 from rsfstudy.status import Status
@@ -151,8 +152,7 @@ class VelocityStep(Recorded):
         """Frictions themselves, and a for their differences, here over ln r; slip distances end
         where friction falls by 1/e of the evolution over D_c.
         """
-        step = self._step(scene)
-        ratio = abs(step.ratio) if isinstance(step, _Step) else math.inf
+        ratio = abs(self._step(scene).ratio)
         sizes = {about.name: abs(values[about.name]) for about in self.outputs if about.error}
         for name in ("apparent_a", "apparent_b", "apparent_a_minus_b"):
             sizes[name] += scene.a / ratio
@@ -167,12 +167,8 @@ class VelocityStep(Recorded):
         """
         check_leaves_alone(scene)
         step = self._step(scene)
-        if isinstance(step, Outcome):
-            return step
-        record = self._follow(scene, step, accuracy, meter)
-        values = self._read(scene, step, record, accuracy, meter)
-        tighter = accuracy.refined()
-        again = self._read(scene, step, self._follow(scene, step, tighter, meter), tighter, meter)
+        records = [self._follow(scene, step, a, meter) for a in (accuracy, accuracy.refined())]
+        (record, values), (_again, again) = records
         errors = errors_of(values, again, _by_friction(step, values), scene, accuracy)
         found = {**values, **errors, **self._shown(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
@@ -180,27 +176,29 @@ class VelocityStep(Recorded):
             return Outcome(Status.NOT_APPLICABLE, found, text)
         return Outcome(Status.OK, found)
 
-    def _step(self, scene: Scene) -> _Step | Outcome:
-        """The step to read; or why there is none."""
+    def _step(self, scene: Scene) -> _Step:
+        """The step to read; `Halt` says why there is none."""
         history = scene.parts.loading.segments
         if self.step_number > len(history):
-            text = f"the loading has {len(history)} segments"
-            return Outcome(Status.NOT_APPLICABLE, message=text)
+            raise Halt(Status.NOT_APPLICABLE, f"the loading has {len(history)} segments")
         earlier, own = history[: self.step_number - 1], history[self.step_number - 1]
-        before = earlier[-1].load_velocity if earlier else 1.0
-        if own.load_velocity == before:
-            return Outcome(Status.NO_STEP, message="the load point goes on as before")
-        stressed = earlier[-1].normal_stress if earlier else 0.0
-        changed = own.displacement or own.normal_stress != stressed
-        if min(own.load_velocity, before) <= 0.0 or changed:
+        before = earlier[-1] if earlier else Segment(1.0)
+        if own.load_velocity == before.load_velocity:
+            raise Halt(Status.NO_STEP, "the load point goes on as before")
+        changed = own.displacement or own.normal_stress != before.normal_stress
+        if min(own.load_velocity, before.load_velocity) <= 0.0 or changed:
             text = "a hold, a reversal, a displacement or a change of normal stress is no step"
-            return Outcome(Status.NOT_APPLICABLE, message=text)
+            raise Halt(Status.NOT_APPLICABLE, text)
         start_time = math.fsum(segment.duration for segment in earlier)
         duration = min(own.duration, self.record / own.load_velocity)
-        return _Step(before, own.load_velocity, start_time, duration)
+        return _Step(before.load_velocity, own.load_velocity, start_time, duration)
 
-    def _follow(self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter) -> _Record:
-        turn, recording = _turn(scene, step), Recording()
+    def _follow(
+        self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter
+    ) -> tuple[_Record, dict[str, float]]:
+        """The record, and what is read off it."""
+        extreme = maximum if step.ratio > 0.0 else minimum
+        turn, recording = extreme(watched(scene)[0]), Recording()
         begun: list[Event] = []
         peak, end = None, step.start_time + step.duration
         for event in follow(scene, accuracy, meter, [turn], recording=recording, until=end):
@@ -210,15 +208,13 @@ class VelocityStep(Recorded):
                 peak = event
         rows = recording.seen(scene)
         begin = begun[self.step_number - 1]
-        return _Record(begin, peak, event, rows[rows[:, 0] >= begin.time])
+        record = _Record(begin, peak, event, rows[rows[:, 0] >= begin.time])
+        return record, self._read(step, record, self._left(scene, record, accuracy, meter))
 
-    def _read(
-        self, scene: Scene, step: _Step, record: _Record, accuracy: Accuracy, meter: Meter
-    ) -> dict[str, float]:
+    def _read(self, step: _Step, record: _Record, left: Event | None) -> dict[str, float]:
         """Numbers that are read off; NaN for those of the peak where there is none."""
         before, after = (e.point.reading for e in (record.begin, record.end))
         top = record.peak.point.reading if record.peak else math.nan
-        left = self._left(scene, record, accuracy, meter)
         return {
             "apparent_a": (top - before) / step.ratio,
             "apparent_b": (top - after) / step.ratio,
@@ -260,14 +256,12 @@ class VelocityStep(Recorded):
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.end
         direct = turned.point.reading - friction[0]
-        path = along_path(rows, self.phases, READ)
+        path = since(record.begin, along_path(rows, self.phases, READ))
         return {
             "settled": float(np.ptp(last) < _STAYS * abs(direct)),
             "closed_form_departure": _departure(scene, step, record),
-            "load_point_displacement": step.after * (path["time"] - record.begin.time),
-            "slip": path["slip"] - rows[0, OBSERVED.index("slip")],
-            "friction_coefficient": path["friction_coefficient"],
-            "log10_slip_rate": path["log10_slip_rate"],
+            "load_point_displacement": step.after * path.pop("time"),
+            **path,
         }
 
 
@@ -281,11 +275,6 @@ def _by_friction(step: _Step, values: Mapping[str, float]) -> dict[str, float]:
     over_friction = math.e / evolved if evolved else math.nan
     distances = ("apparent_slip_distance", "corrected_slip_distance")
     return dict.fromkeys(values, 1.0) | effects | {n: over_friction * values[n] for n in distances}
-
-
-def _turn(scene: Scene, step: _Step) -> EventSpecification:
-    of, _above = watched(scene)
-    return maximum(of) if step.ratio > 0.0 else minimum(of)
 
 
 def _departure(scene: Scene, step: _Step, record: _Record) -> float:
