@@ -112,19 +112,21 @@ class _Record(NamedTuple):
     periods: int
 
     @property
+    def harmonics(self) -> np.ndarray:
+        """Fourier's coefficients of spring stress."""
+        return np.fft.rfft(self.spring_stress)
+
+    @property
     def drift(self) -> float:
         """Response that the trend would have made, over the response."""
-        amplitude = (
-            2.0 * abs(np.fft.rfft(self.spring_stress)[self.periods]) / len(self.spring_stress)
-        )
+        amplitude = 2.0 * abs(self.harmonics[self.periods]) / len(self.spring_stress)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
         """Spring stress at other periods than that of forcing, over that at it."""
-        harmonics = np.fft.rfft(self.spring_stress)
-        at = harmonics[self.periods]
-        return np.asarray(np.delete(harmonics, [0, self.periods]) / at)
+        harmonics = self.harmonics
+        return np.asarray(np.delete(harmonics, [0, self.periods]) / harmonics[self.periods])
 
     @property
     def aliasing(self) -> float:
@@ -144,15 +146,12 @@ class _Record(NamedTuple):
         return self._from_every(1)
 
     def _from_every(self, stride: int) -> complex:
-        spring_stress, imposed = (
-            np.fft.rfft(x[::stride]) for x in (self.spring_stress, self.imposed)
-        )
-        return complex(spring_stress[self.periods] / imposed[self.periods])
+        pair = self.spring_stress, self.imposed
+        ours, imposed = (np.fft.rfft(x[::stride])[self.periods] for x in pair)
+        return complex(ours / imposed)
 
     def is_as(self, other: _Record) -> bool:
-        """True if spring stress is the same: in the median, for where it jumps an instant may come
-        before or after.
-        """
+        """True if spring stress is the same in the median: jumps may come an instant earlier."""
         apart = np.abs(self.spring_stress - other.spring_stress)
         return bool(np.median(apart) < _SAME * np.ptp(self.spring_stress))
 
@@ -230,9 +229,7 @@ class NormalStressResponse(Recorded):
         if not isinstance(loading, Oscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
         if len(loading.segments) > 1:
-            rule = (
-                "begins later or ends: the response is that to an oscillation that goes on for ever"
-            )
+            rule = "begins later or ends: the response is that to one that goes on for ever"
             remedy = "Leave out oscillation_begin and oscillation_cycles, or read it by simulate."
             raise InvalidValue("loading", loading.name, rule, remedy=remedy)
         if not scene.load_velocity or steady_sliding(scene, scene.log_load_rate) is None:
@@ -243,8 +240,7 @@ class NormalStressResponse(Recorded):
             why = "steady sliding is unstable: no transient decays"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         period = loading.oscillation_period
-        frequency = 2.0 * math.pi / period
-        linear = response_to_normal_stress(scene, scene.log_load_rate, frequency)
+        linear = response_to_normal_stress(scene, scene.log_load_rate, 2.0 * math.pi / period)
         by_theory = {"linear_gain": abs(linear), "linear_phase_lead": _degrees(linear)}
         fold = 1.0 / decay / period
         # looked at once the transient would not be taken for a response, and until it is over
@@ -264,8 +260,8 @@ class NormalStressResponse(Recorded):
         values |= _errors(values, linear, last, again, moved, (scene, accuracy)) | by_theory
         values["response_period"] = float(repeats)
         values["settled"] = float(same == repeats and last.is_as(first))
-        shown = _shown(scene, last.events[:: instants // self.samples])
-        return Outcome(Status.OK, {**values, **shown})
+        shown = last.events[:: instants // self.samples]
+        return Outcome(Status.OK, {**values, **_shown(scene, shown)})
 
     def _repeats(
         self, scene: Scene, waits: int, accuracy: Accuracy, meter: Meter
@@ -283,10 +279,8 @@ class NormalStressResponse(Recorded):
             springs = [event.point.spring_stress for event in seen.events[:-1]]
             spring_stress = np.reshape(springs, (_LOOKED_AT, _INSTANTS))
             for count in range(1, _LONGEST + 1):
-                apart = np.abs(
-                    spring_stress[_LONGEST:] - spring_stress[_LONGEST - count : -count]
-                ).max()
-                if apart < _SAME * np.ptp(spring_stress):
+                apart = spring_stress[_LONGEST:] - spring_stress[_LONGEST - count : -count]
+                if np.abs(apart).max() < _SAME * np.ptp(spring_stress):
                     return point, count
         return point, 0
 
@@ -329,17 +323,14 @@ class NormalStressResponse(Recorded):
         events: list[Event] = []
         time = slip = 0.0
         stride = way.lasts / instants
-        for number in range(instants):
-            moving = list(follow(scene, accuracy, meter, start=start, until=stride))
-            if not number:
-                events.append(moving[0])
-            end = moving[-1]
+        for _ in range(instants):
+            begin, *_others, end = follow(scene, accuracy, meter, start=start, until=stride)
+            events = events or [begin]
             time, slip = time + end.time, slip + end.slip
             events.append(end._replace(time=time, slip=slip))
             start = end.point
-        springs, reliefs = zip(
-            *((e.point.spring_stress, e.point.psis[-1]) for e in events), strict=True
-        )
+        springs = [event.point.spring_stress for event in events]
+        reliefs = [event.point.psis[-1] for event in events]
         trend = springs[-1] - springs[0]
         spring_stress = np.array(springs[:-1]) - trend * np.arange(instants) / instants
         return _Record(events, spring_stress, -np.array(reliefs[:-1]), trend, way.periods)

@@ -1,0 +1,74 @@
+"""Numbers and rows that a fit of a record gives, with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rsfstudy.analysis.fitting.joint import plain
+from rsfstudy.analysis.fitting.model import PARAMETERS
+from rsfstudy.analysis.fitting.record import COLUMNS
+from rsfstudy.quantity import Output
+
+_NUMBERS = (
+    Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
+    Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
+    Output("noise_size", "", "1", "standard deviation of the noise"),
+    Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
+    Output("effective_samples", "", "1", "number of independent samples that tell as much"),
+    Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
+    Output("whiteness", "", "1", "chance of as much correlation in residuals freed of it"),
+    Output("criterion", "", "1", "Akaike's criterion, in which the noise counts; less is better"),
+    Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
+    Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Output("window_begins", "", "um", "load point displacement where the window begins"),
+    Output("window_ends", "", "um", "load point displacement where the window ends"),
+    Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
+    Output("rows_fitted", "", "1", "number of rows in the window"),
+    Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
+    *(
+        Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
+        for name in ("covariance", "correlation")
+    ),
+)
+_ROWS_OF = tuple(
+    Output(*about, dims=("row",))
+    for about in (
+        *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in COLUMNS[:3]),
+        ("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
+        ("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
+        ("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
+        ("residual", "", "1", "friction less that of the fit"),
+        ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+    )
+)
+_BESIDE = {
+    "stderr": "standard error",
+    "low": "lower end of the 95 % interval",
+    "high": "upper end of the 95 % interval",
+}
+_DRAWN = (
+    Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
+    Output(
+        "posterior",
+        "",
+        "1",
+        "draws of the parameters from their posterior",
+        dims=("draw", "parameter"),
+    ),
+)
+
+
+def outputs_of(parameters: Sequence[str], drawn: bool) -> tuple[Output, ...]:
+    """Each parameter with its errors, draws of all if there are any, numbers that go with them, and
+    the rows of the record.
+    """
+    found = [output for name in parameters for output in _of_parameter(name)]
+    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *_ROWS_OF)
+
+
+def _of_parameter(name: str) -> Iterator[Output]:
+    about = PARAMETERS[plain(name)]
+    yield Output(name, about.symbol, about.units, about.long_name, error=True)
+    for suffix, words in _BESIDE.items():
+        yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")
