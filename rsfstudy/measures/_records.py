@@ -78,14 +78,23 @@ def error_of(
 
     On a stiff machine stability limits the steps, so that the errors of two runs may agree at an
     instant by chance. What that hides is a part of the number, and of the friction that it is a
-    difference of: of a, by which friction changes where ln V does by 1.
+    difference of: of a, by which friction changes where ln V does by 1. So of y, of y' by the
+    refined run, and with eps the accuracy asked for, the error is ``3 |y - y'| + 0.01 eps |y| + 0.1
+    eps a |dy/dmu|``.
 
     Parameters
     ----------
     value, refined : float
         Results of the first run, and of the refined one.
     by_friction : float
-        Change of the number by that of a friction coefficient which it is read from.
+        Change of the number by that of a friction coefficient which it is read from, dy/dmu.
+    scene : Scene
+    accuracy : Accuracy
+
+    Returns
+    -------
+    float
+        In the units of the number.
     """
     friction = _AT_AN_INSTANT * accuracy.rtol * scene.a
     chance = _BY_CHANCE * accuracy.rtol

@@ -47,7 +47,7 @@ class Elasticities(Measure):
     times what is left out of a logarithm, or a power, that ends at a boundary and has the slope and
     curvature of ln y. Where only one side has a number, as at the critical stiffness, the
     difference is one-sided, and its error larger by that. There are two measurements of each number
-    and one more.
+    and one more. `elasticity` and `elasticity_error` are pure numbers of the shape (parameters,).
 
     Parameters
     ----------

@@ -49,11 +49,19 @@ class Fit(Measure):
     """Friction parameters by least squares, under the noise that the residuals tell.
 
     The model is the motion of the scene under the loading that the record tells, read as the rig
-    reads it, plus a trend of powers of load point displacement from the step. Errors are standard
-    errors ``<name>_stderr`` and the ends of 95 % intervals, ``<name>_low`` and ``<name>_high``;
-    ``<name>_error`` is numerical. A parameter that the record does not tell makes the outcome
-    `not_identified`; the message names it. The ends of its interval are then the bounds of the
-    search, or NaN where it has none: nothing is excluded.
+    reads it, plus a trend of powers of load point displacement from the step:
+
+        mu(t) = mu_* + a ln(V/V_0) + Theta + c_1 x + c_2 x^2 + ...,    dmu/dt = k (V_l - V)
+
+    with V_l the load point velocity, V_0 that before the step and k stiffness over normal stress;
+    Theta evolves by the law (dmu/dt is that of constant normal stress, without mass). Lengths are
+    in um, times in s, normal stress in Pa. What is given along the rows has the shape (rows,),
+    `covariance` and `correlation` (parameters, parameters).
+
+    Errors are standard errors ``<name>_stderr`` and the ends of 95 % intervals, ``<name>_low`` and
+    ``<name>_high``; ``<name>_error`` is numerical. A parameter that the record does not tell makes
+    the outcome `not_identified`; the message names it. The ends of its interval are then the bounds
+    of the search, or NaN where it has none: nothing is excluded.
 
     Parameters
     ----------
@@ -90,7 +98,9 @@ class Fit(Measure):
 
     References
     ----------
-    Patterson and Thompson (1971), Biometrika 58, 545-554, for errors under correlated noise.
+    Patterson and Thompson (1971), Biometrika 58, 545-554, for errors under correlated noise; Reinen
+    and Weeks (1993), J. Geophys. Res. 98, 15937-15950, and Marone (1998), Annu. Rev. Earth Planet.
+    Sci. 26, 643-696, for fits of velocity steps.
     """
 
     records: tuple[Record, ...]
@@ -238,7 +248,7 @@ class Fit(Measure):
         return tuple(dict.fromkeys(window.record for window in self._windows))
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Look for the parameters."""
+        """The parameters that leave the least, with their errors and intervals."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]

@@ -71,10 +71,14 @@ class _Record(NamedTuple):
 class Healing(Recorded):
     """Relaxation and healing by the first hold of a loading, by the definitions of the laboratory.
 
-    With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is
-    mu_h - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
-    Where a hold does not begin in steady sliding the message says so. A peak that stands above the
-    end of the record by no more than its own error is none.
+    With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is mu_h
+    - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
+    `peak_displacement` is that of the load point from reloading to the peak, in D_c. By the
+    slowness law and b > a, healing grows by b as the logarithm of a long hold's time by 1, at every
+    stiffness; by the slip law it falls with stiffness. Where a hold does not begin in steady
+    sliding the message says so. A peak that stands above the end of the record by no more than its
+    own error is none. The record, from the beginning of the hold on, has the shape (phases,), with
+    times in D_c/V_*.
 
     Parameters
     ----------
@@ -108,7 +112,7 @@ class Healing(Recorded):
         return {name: abs(values[name]) + scale for name, scale in least.items()}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion, and once more with smaller tolerances for the errors."""
+        """Numbers read off a motion, and once more with smaller tolerances for the errors."""
         hold = _hold(scene)
         first = _follow(scene, hold, accuracy, meter)
         said = _beginning(scene, hold, first.begin, max(_STEADY, accuracy.rtol))

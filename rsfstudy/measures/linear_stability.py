@@ -64,7 +64,8 @@ class LinearStability(Measure):
     G(p) = 0`` with K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical where p is imaginary
     (`rsfstudy.slider.stability`): at V_*, by the slip and the slowness law, quasi-statically and
     drained, ``K = (b - a)/[1 - (mu_* - alpha) cot(phi)]``, without cot(phi) where normal stress is
-    constant.
+    constant. Stiffnesses are over sigma_*/D_c, stresses over sigma_*; the relative one is over that
+    at V_*.
 
     References
     ----------
@@ -82,8 +83,8 @@ class LinearStability(Measure):
         return ("stiffness_ratio",)
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The critical stiffness, and the root of the growth in stiffness; their difference is the
-        error.
+        """The critical stiffness by the friction relation, and where growth changes its sign; their
+        difference is the error.
         """
         scene = scene.unforced
         load = scene.log_load_rate

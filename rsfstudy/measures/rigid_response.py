@@ -77,12 +77,27 @@ class RigidResponse(Measure):
     """Stress against slip of a rigid slider whose slip rate steps from V_* to V, the
     `load_velocity_ratio` of the scene.
 
+    At once stress changes by a sigma ln(V/V_*), the direct effect; then its state evolves over
+    slip. At constant normal stress, with r = V/V_* and x slip over D_c, friction less mu_* is
+
+        a ln r - b ln r [1 - exp(-x)]                       (slip law),
+        (a - b) ln r + b ln[1 + (r - 1) exp(-x)]            (slowness law).
+
+    `evolution_distance` is the slip in D_c at which 1/e of the change from just after the step to
+    steady sliding is left: 1 by the slip law. Stresses are over sigma_*. `shear_stress`,
+    `normal_stress_ratio` and `state_variable` have the shape (points,), along `slip`.
+
     Parameters
     ----------
     slip : float
         How far to follow it, in D_c.
     points : int
         Points of the response that are kept, evenly spaced along `slip`.
+
+    References
+    ----------
+    Section 2.3 and eqs. 16 and 17 of doi:10.1007/s11589-014-0098-4; Ruina (1983), J. Geophys. Res.
+    88, 10359-10370.
     """
 
     slip: float = 10.0
@@ -110,7 +125,7 @@ class RigidResponse(Measure):
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Integrate the one unknown over slip, twice at different tolerances for the error."""
+        """The response, followed over slip at two tolerances: their difference is the error."""
         log_slip_rate = scene.log_load_rate
         if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")

@@ -48,7 +48,11 @@ class StepResponse(Recorded):
     path between them.
 
     It is followed until it has so many peaks, or until ln V and the states are closer to steady
-    sliding than a thousandth of the farthest that they were.
+    sliding than a thousandth of the farthest that they were. `peak_ratio` is ln(V_2/V_0) over
+    ln(V_1/V_0), with V_1 and V_2 the slip rates of the first two peaks and V_0 that of the load
+    point: 1 where oscillations repeat, as small ones do at critical stiffness, and 0 where there is
+    no second peak. `peak_log10_slip_rate` has the shape (peaks,), NaN where there are fewer; the
+    path, in D_c, D_c/V_* and sigma_*, the shape (phases,).
 
     Parameters
     ----------
@@ -57,6 +61,11 @@ class StepResponse(Recorded):
     phases : int
         Points of the path that are kept along `phase`, spread over its slow parts and its
         ruptures.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; Figs. 8 and 12 of
+    doi:10.1007/s11589-014-0098-4.
     """
 
     peaks: int = 8

@@ -116,7 +116,12 @@ class VelocityStep(Recorded):
     the stiffness of the rig: what a soft spring does to the numbers is what is measured. Friction
     has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record.
     Where there is no extremum, or no more evolution than its own error, the measure is
-    `not_applicable`, with the numbers that there are.
+    `not_applicable`, with the numbers that there are. Distances are in D_c. The record, from the
+    step on, has the shape (phases,).
+
+    `closed_form_departure` is from what a rigid slider shows after so much slip, ``(a - b) ln r + b
+    g(ln r, x)``: g is ``ln r exp(-x)`` by the slip law and ``ln[1 + (r - 1) exp(-x)]`` by the
+    slowness law; NaN where normal stress or a fluid acts, or the law has no such form.
 
     Parameters
     ----------
@@ -162,8 +167,8 @@ class VelocityStep(Recorded):
         return sizes
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion, and from its peak on to where 1/e is left; and both once more with
-        smaller tolerances for the errors.
+        """Numbers read off a motion, and off that from its peak on to where 1/e is left; and once
+        more with smaller tolerances for the errors.
         """
         check_leaves_alone(scene)
         step = self._step(scene)

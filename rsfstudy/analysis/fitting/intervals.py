@@ -1,5 +1,14 @@
 """Intervals of parameters: of Student's t where the likelihood is nearly a parabola, else of the
 likelihood itself.
+
+The squared distance of a value is what the sum of squares of whitened residuals grows by, in
+variances of the noise, where the parameter has that value and all others are found anew (profile
+likelihood). The ends of an interval have the squared distance ``t^2``, t being the quantile of
+Student's distribution with the degrees of freedom of the fit: standard errors, for a parabola.
+
+References
+----------
+Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, Wiley, section 6.1.
 """
 
 from __future__ import annotations
@@ -24,8 +33,19 @@ def reach(found: Fitted, covers: float) -> float:
 
 
 def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
-    """Ends of the 95 % interval of a parameter: where the likelihood has fallen as far as Student's
-    t says, or the bounds of the search.
+    """Ends of the 95 % interval of a parameter, in its units: where the likelihood has fallen as
+    far as Student's t says, or the bounds of the search.
+
+    Parameters
+    ----------
+    search : Search
+    found : Fitted
+        Of that search.
+    name : str
+
+    Returns
+    -------
+    (float, float)
     """
     profile, far = Profile(search, found, name), reach(found, COVERS)
     low, high = (value_of(name, profile.end(sign, far)) for sign in (-1.0, 1.0))

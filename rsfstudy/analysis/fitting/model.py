@@ -13,7 +13,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.recording import READ, Recording
+from rsfstudy.motion.readings import friction_of
+from rsfstudy.motion.recording import Recording
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import assembly
 from rsfstudy.slider.history import of_samples
@@ -156,23 +157,36 @@ class Model:
         """Friction along the rows, without trend; NaN where there is no such motion, or where it
         takes far more work than those of records do.
 
+        It is spring stress over normal stress, as a rig reads it, of the motion that begins with
+        steady sliding before the first step, at the times of the rows less `step_time`.
+
         Parameters
         ----------
         values : mapping of str to float
+            All parameters, in the units of `PARAMETERS`.
         refined : bool
             At a tenth of all tolerances.
         checked : bool
             No motion is followed on a spring softer than the critical stiffness, nor with the
             longer of two slip distances first.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+
+        Raises
+        ------
+        Halt
+            Where the work budget of the meter is spent.
         """
-        budget = self.meter.budget
+        budget, nothing = self.meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
         most = _MOST + _MOST_EACH * len(self.loading) + int(min(stiff, _MOST_STIFF))
         try:
             scene = self.scene_of(values)
             swapped = values.get("slip_distance_2", math.inf) <= values["slip_distance"]
             if checked and (swapped or not scene.stiffness > scene.critical_stiffness):
-                return np.full(len(self.time), math.nan)
+                return nothing
             late = values.get("step_time", 0.0)
             scale = self.reference / values["slip_distance"]
             at = np.maximum(self.time - late - self.loading[0, 0], 0.0) * scale
@@ -184,27 +198,42 @@ class Model:
         except Halt as halt:
             if halt.status is Status.WORK_BUDGET_SPENT and self.meter.budget == budget:
                 raise
-            return np.full(len(self.time), math.nan)
+            return nothing
         except InvalidValue:
-            return np.full(len(self.time), math.nan)
+            return nothing
         finally:
             self.meter.budget = budget
-        found = recording.seen(scene)[:, READ.index("friction_coefficient")]
-        return found if len(found) == len(self.time) else np.full(len(self.time), math.nan)
+        found = friction_of(recording.seen(scene))
+        return found if len(found) == len(self.time) else nothing
 
     def trend(self, values: Values) -> np.ndarray:
-        """The trend along the rows: of displacement from the first step."""
+        """The trend along the rows, shape (rows,): ``c_1 x + c_2 x^2 + ...``, x being displacement
+        from the first step in um, and c_n in um^-n.
+        """
         powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
-        found = np.zeros(len(self.time))
-        for power, coefficient in powers:
-            found += coefficient * self.displacement**power
-        return found
+        return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
 
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = FINE
     ) -> np.ndarray:
         """Derivatives of friction along the rows by parameters, or by the logarithms of those in
-        `LOGARITHMIC`, shape (rows, parameters).
+        `LOGARITHMIC`.
+
+        Those by trends and, at constant normal stress, by `mu_star` are exact. All others are
+        central differences of motions, ``d(h) = [f(p + h) - f(p - h)]/(2 h)``, or of fourth order,
+        ``[4 d(h) - d(2 h)]/3``, whose step shrinks where d(h) and d(2 h) are not alike.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+        free : sequence of str
+        differences : (float, int)
+            Step over the size of a parameter, and order: `QUICK` or `FINE`.
+
+        Returns
+        -------
+        ndarray, shape (rows, parameters)
+            NaN where motions close by cannot be followed.
         """
         return np.column_stack([self._derivative(values, name, differences) for name in free])
 

@@ -9,6 +9,16 @@ n samples, REML minimises
 S being the sum of squares that generalised least squares leaves. Samples taken at other intervals
 have noise of their own, of another size and other correlations; where intervals change, the samples
 before still tell of those behind, by their sizes.
+
+The process is ``e_i = c_1 e_(i-1) + ... + c_m e_(i-m) + w_i`` with w white. Its partial
+autocorrelations lie between -1 and 1 where it is stationary, and are what is looked for.
+
+References
+----------
+Patterson and Thompson (1971), Biometrika 58, 545-554, for REML; Burg (1967), Proc. 37th Meeting of
+the Society of Exploration Geophysicists, for where the search begins; Barndorff-Nielsen and Schou
+(1973), J. Multivar. Anal. 3, 408-419, for partial autocorrelations; Ljung and Box (1978),
+Biometrika 65, 297-303.
 """
 
 from __future__ import annotations
@@ -90,8 +100,8 @@ class Noise:
         return int(self.partial.shape[1])
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
-        """Columns freed of correlation: shape (samples, columns), each sample less what those
-        before tell of it, over the standard deviation of what is left.
+        """Columns freed of correlation, shape (samples, columns), as those given: each sample less
+        what those before tell of it, over the standard deviation of what is left.
         """
         scaled = columns / self.sizes[_numbers(self.runs)][:, None]
         found = np.empty_like(columns)
@@ -120,7 +130,10 @@ class Noise:
 
     @property
     def effective_samples(self) -> float:
-        """Number of independent samples that tell a mean as well."""
+        """Number of independent samples that tell a mean as well: n over the power at zero
+        frequency, ``(1 - k_1^2)(1 - k_2^2).../(1 - c_1 - ... - c_m)^2`` with k the partial
+        autocorrelations; by AR(1) ``n (1 - rho)/(1 + rho)``.
+        """
         total = 0.0
         for run in self.runs:
             coefficients, variances = self.predictors[run.number]
@@ -159,6 +172,11 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
     residuals : ndarray, shape (samples,)
     jacobian : ndarray, shape (samples, parameters)
         Derivatives of the model.
+
+    Returns
+    -------
+    Noise
+        With a process for each sampling interval.
     """
     runs, count = _runs(time), _count(time)
     parts = [[residuals[r.first : r.last] for r in runs if r.number == n] for n in range(count)]
@@ -186,7 +204,16 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
 
 
 def whiteness(innovations: np.ndarray, order: int) -> float:
-    """The chance that residuals freed of correlation are white (Ljung and Box, 1978)."""
+    """The chance that white noise looks as correlated as residuals freed of correlation: of chi^2
+    as large as ``n (n + 2) sum r_k^2/(n - k)``, r_k being their autocorrelation at lag k (Ljung and
+    Box, 1978).
+
+    Parameters
+    ----------
+    innovations : ndarray, shape (samples,)
+    order : int
+        Coefficients that were found; by so many there are fewer degrees of freedom.
+    """
     count, seen = len(innovations), innovations - innovations.mean()
     lags = np.arange(1, min(_LAGS + order, count // 4) + 1)
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)

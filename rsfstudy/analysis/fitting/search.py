@@ -1,4 +1,16 @@
-"""The search for the parameters of a record: least squares under the noise that residuals tell."""
+"""The search for the parameters of a record: least squares under the noise that residuals tell.
+
+Parameters p are those that leave the least of ``|W (y - f(p))|^2``, generalised least squares: y is
+friction, f the model, and W whitens the noise (``W'W`` is the inverse R^-1 of its correlation).
+Noise and parameters are found in turn. Then the covariance of parameters is ``s^2 (J'R^-1 J)^-1``
+with J the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)`` of n rows and p parameters.
+
+References
+----------
+Seber and Wild (1989), Nonlinear Regression, Wiley, chapters 2 and 6, for least squares under
+autocorrelated noise; Patterson and Thompson (1971), Biometrika 58, 545-554, for noise by restricted
+maximum likelihood; Hurvich and Tsai (1989), Biometrika 76, 297-307, for the criterion.
+"""
 
 from __future__ import annotations
 
@@ -164,7 +176,7 @@ class Search:
         return np.array([coordinate(name, values[name]) for name in self.free])
 
     def residuals(self, values: Values, *, checked: bool = False) -> np.ndarray:
-        """What a model leaves of the record."""
+        """Friction of the record less that of the model with its trend, shape (rows,)."""
         curve = self.model.curve(values, checked=checked)
         return np.asarray(self.model.friction - curve - self.model.trend(values))
 
@@ -222,7 +234,8 @@ class Search:
         self, x: np.ndarray, noise: Noise, part: float = _FOUND
     ) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates that leave the least under a noise, to a part of it, and the derivatives
-        there.
+        there, shape (rows, parameters): by the trust region of `scipy.optimize.least_squares`,
+        within the bounds.
         """
         derivatives = {}
 
@@ -351,8 +364,9 @@ class Search:
 
 
 def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
-    """Minus twice the logarithm of the likelihood, and twice the number of parameters, those of the
-    noise too, corrected for few independent samples (Hurvich and Tsai, 1989).
+    """Akaike's criterion, corrected for few samples: ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k
+    - 1)`` of n rows with a sum of squares S of innovations, and k parameters, those of the noise
+    too (Hurvich and Tsai, 1989).
     """
     count, size = len(innovations), float(innovations @ innovations)
     every = parameters + noise.order * len(noise.sizes) + len(noise.sizes)

@@ -1,4 +1,13 @@
-"""Steps of load point velocity in a record: where straight pieces of displacement meet."""
+"""Steps of load point velocity in a record: where straight pieces of displacement meet.
+
+Rows i to j are parted at the k that leaves the least, ``S(i, k) + S(k, j)``, S being the sum of
+squares that a line leaves, where this is less than S(i, j) by ``12 ln(j - i)`` variances of the
+noise: by far more than chance does (binary segmentation).
+
+References
+----------
+Scott and Knott (1974), Biometrics 30, 507-512; Bai and Perron (1998), Econometrica 66, 47-78.
+"""
 
 from __future__ import annotations
 
@@ -55,8 +64,13 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
 
     Parameters
     ----------
-    time, displacement : ndarray
+    time, displacement : ndarray, shape (rows,)
         In s and um.
+
+    Returns
+    -------
+    tuple of Step
+        In their order; times in s, velocities in um/s.
     """
     every = max(1, math.ceil(len(time) / _ROWS))
     count = len(time) // every * every
@@ -114,7 +128,9 @@ class _Sums:
 
 
 def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
-    """Variance of the noise: of each sample about the line through its neighbours."""
+    """Variance of the noise of samples, in their units squared: of each about the line through its
+    neighbours, by the median, which steps do not move.
+    """
     share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
     off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
     off /= np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)

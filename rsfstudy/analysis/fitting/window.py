@@ -105,6 +105,17 @@ class Window:
     ) -> Model:
         """The model of its rows, with displacement from the step.
 
+        Parameters
+        ----------
+        scene : Scene
+            The law and what is not looked for.
+        free : collection of str
+        loading : {"steps", "recorded"}
+            The load point as its steps say, or row by row.
+        accuracy : Accuracy
+        meter : Meter
+            Charged with its motions.
+
         Raises
         ------
         Halt
@@ -138,11 +149,15 @@ def first_guess(
 ) -> dict[str, float]:
     """All parameters to begin with: what a record shows at a glance, else those of the scene.
 
+    With friction mu_0 before the step, by a factor r, mu_p at its extreme after it and mu_1 at the
+    end: ``a = (mu_p - mu_0)/ln r`` and ``b = (mu_p - mu_1)/ln r``.
+
     Parameters
     ----------
     model : Model
     step : Step
     free : sequence of str
+        What is looked for: the others are those of the scene.
     distances : (float, float)
         Slip distances in um, of the first state and of the second; the former is the unit of slip
         of the scene.
