@@ -4,14 +4,16 @@ has friction before its step, trends and the time of its step for itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
 
+T = TypeVar("T")
 #: What parameters that each window may have for itself begin with.
 _OWN = ("mu_star", "step_time", "trend")
 
@@ -68,44 +70,39 @@ class Joint:
 
     def check(self, values: Values) -> None:
         """Raise InvalidValue for parameters that make no scene."""
-        for number, part in enumerate(self.parts, start=1):
-            part.check(of_window(values, number))
+        for part, own in self._each(values):
+            part.check(own)
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows of all windows, without trends (see `Model.curve`)."""
-        return np.concatenate(
-            [
-                part.curve(of_window(values, number), refined=refined, checked=checked)
-                for number, part in enumerate(self.parts, start=1)
-            ]
-        )
+        told = {"refined": refined, "checked": checked}
+        return np.concatenate([part.curve(own, **told) for part, own in self._each(values)])
 
     def trend(self, values: Values) -> np.ndarray:
         """The trends along the rows of all windows."""
-        return np.concatenate(
-            [part.trend(of_window(values, n)) for n, part in enumerate(self.parts, start=1)]
-        )
+        return np.concatenate([part.trend(own) for part, own in self._each(values)])
 
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = FINE
     ) -> np.ndarray:
         """Derivatives along the rows of all windows (see `Model.jacobian`)."""
         blocks = []
-        for number, part in enumerate(self.parts, start=1):
+        places = {name: place for place, name in enumerate(free)}
+        for number, (part, own) in enumerate(self._each(values), start=1):
+            acting = of_window(places, number)
             block = np.zeros((len(part.time), len(free)))
-            acting = [
-                place
-                for place, name in enumerate(free)
-                if plain(name) == name or name.endswith(f"_{number}")
-            ]
-            names = [plain(free[place]) for place in acting]
-            block[:, acting] = part.jacobian(of_window(values, number), names, differences)
+            block[:, [*acting.values()]] = part.jacobian(own, [*acting], differences)
             blocks.append(block)
         return np.concatenate(blocks)
 
+    def _each(self, values: Values) -> Iterator[tuple[Model, dict[str, float]]]:
+        """The models, each with the parameters of its window."""
+        for number, part in enumerate(self.parts, start=1):
+            yield part, of_window(values, number)
 
-def of_window(values: Values, number: int) -> dict[str, float]:
-    """The parameters of one window, by their plain names."""
+
+def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
+    """What holds for the parameters of one window, by their plain names."""
     ending, found = f"_{number}", {}
     for name, value in values.items():
         if plain(name) == name:

@@ -134,12 +134,15 @@ class Noise:
         frequency, ``(1 - k_1^2)(1 - k_2^2).../(1 - c_1 - ... - c_m)^2`` with k the partial
         autocorrelations; by AR(1) ``n (1 - rho)/(1 + rho)``.
         """
-        total = 0.0
-        for run in self.runs:
-            coefficients, variances = self.predictors[run.number]
-            at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
-            total += max(1.0, (run.last - run.first) / max(at_rest, 1.0))
-        return total
+        at_rest = self._at_rest
+        lasts = ((run.last - run.first, run.number) for run in self.runs)
+        return sum(max(1.0, rows / max(at_rest[n], 1.0)) for rows, n in lasts)
+
+    @property
+    def _at_rest(self) -> list[float]:
+        """Power at zero frequency of each process, over its variance."""
+        told = ((c[-1], v[-1]) for c, v in self.predictors)
+        return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
     def degrees(self) -> float:
@@ -148,17 +151,17 @@ class Noise:
         """
         total = 0.0
         rows = np.bincount(_numbers(self.runs)).tolist()
-        for count, (coefficients, variances) in zip(rows, self.predictors, strict=True):
-            at_rest = variances[-1] / (1.0 - math.fsum(coefficients[-1])) ** 2
+        for count, told, at_rest in zip(rows, self.predictors, self._at_rest, strict=True):
             # coefficients have the covariance (variance left) R^-1/rows
-            ones = _innovations(np.ones((self.order, 1)), coefficients, variances)
+            ones = _innovations(np.ones((self.order, 1)), *told)
             total += count / (1.0 + 2.0 * at_rest * float(np.square(ones).sum()))
         return total
 
 
 def white(time: np.ndarray) -> Noise:
     """White noise of one size at samples taken at these times."""
-    return Noise(_runs(time), np.zeros((_count(time), 0)), np.ones(_count(time)))
+    runs = _runs(time)
+    return Noise(runs, np.zeros((_count(runs), 0)), np.ones(_count(runs)))
 
 
 def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndarray) -> Noise:
@@ -178,7 +181,8 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
     Noise
         With a process for each sampling interval.
     """
-    runs, count = _runs(time), _count(time)
+    runs = _runs(time)
+    count = _count(runs)
     parts = [[residuals[r.first : r.last] for r in runs if r.number == n] for n in range(count)]
     stated = name.removeprefix(AUTOREGRESSIVE)
     order = 0 if name == WHITE else int(stated) if stated else _order(parts)
@@ -191,7 +195,7 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
         partial = _LARGEST * np.tanh(x[: count * order]).reshape(count, order)
         return Noise(runs, partial, np.exp(np.append(0.0, x[count * order :])))
 
-    products = _Products(runs, count, np.column_stack([jacobian, residuals]), order)
+    products = _Products(runs, np.column_stack([jacobian, residuals]), order)
 
     def misfit(x: np.ndarray) -> float:
         return products.misfit(noise(x))
@@ -228,8 +232,6 @@ class _Products:
     Parameters
     ----------
     runs : tuple of Run
-    count : int
-        How many processes there are.
     columns : ndarray, shape (samples, columns)
         Derivatives, and residuals last.
     order : int
@@ -238,7 +240,6 @@ class _Products:
     def __init__(
         self,
         runs: Sequence[Run],
-        count: int,
         columns: np.ndarray,
         order: int,
     ) -> None:
@@ -248,7 +249,7 @@ class _Products:
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
-        self.sums = np.zeros((count, order + 1, order + 1, width, width))
+        self.sums = np.zeros((_count(runs), order + 1, order + 1, width, width))
         #: The first rows of each run with those before that tell of them: how many these are, and
         #: the processes of all.
         self.early: list[tuple[np.ndarray, int, np.ndarray]] = []
@@ -358,8 +359,9 @@ def _kinds(time: np.ndarray) -> np.ndarray:
     return np.asarray(np.unique(kinds[rows[nearest]], return_inverse=True)[1])
 
 
-def _count(time: np.ndarray) -> int:
-    return int(_kinds(time).max()) + 1
+def _count(runs: Sequence[Run]) -> int:
+    """How many processes there are."""
+    return 1 + max(run.number for run in runs)
 
 
 def _runs(time: np.ndarray) -> tuple[Run, ...]:
