@@ -70,7 +70,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(noise:
     rng = np.random.default_rng(1)
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
-    products = noises._Products(noise.runs, 2, np.column_stack([jacobian, residuals]), 3)
+    products = noises._Products(noise.runs, np.column_stack([jacobian, residuals]), 3)
 
     def exact(matrix: np.ndarray) -> float:
         told = jacobian.T @ np.linalg.solve(matrix, jacobian)
