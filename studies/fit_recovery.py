@@ -12,7 +12,13 @@ from scipy.special import lambertw
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC,
+    PARAMETERS,
+    Model,
+    Values,
+    parameters_of,
+)
 from rsfstudy.analysis.fitting.search import Search
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import Axes, Figure, Panel
@@ -112,7 +118,7 @@ class Recovered(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Make a record, and fit it."""
-        free, true = self.looked_for.split(), _true(scene)
+        free, true = self.looked_for.split(), parameters_of(scene, DISTANCE, math.nan)
         true |= {name: 0.0 for name in free if name not in true}
         smooth = replace(accuracy, rtol=min(accuracy.rtol, SMOOTH))
         model = self._model(scene, smooth, meter)
@@ -142,19 +148,6 @@ class Recovered(Measure):
         step = moved[np.argmax(begins > 0.0)]
         loading[0, 0] -= EARLIER
         return Model(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
-
-
-def _true(scene: Scene) -> dict[str, float]:
-    """The parameters of a scene, in um."""
-    stated = scene.as_dict()
-    true = {
-        "a": scene.a,
-        "b": scene.b,
-        "slip_distance": DISTANCE,
-        "mu_star": scene.mu_star,
-        "stiffness": scene.stiffness / DISTANCE,
-    }
-    return true | {n: stated[n] for n in BESIDE if stated.get(n) is not None}
 
 
 def _by_scipy(model: Model, true: Values) -> np.ndarray:
