@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
-from rsfstudy.analysis.fitting.intervals import Profile, reach
+from rsfstudy.analysis.fitting.intervals import Profile, half_width
 from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
 from rsfstudy.analysis.fitting.model import (
     LOGARITHMIC,
@@ -177,7 +177,9 @@ class SyntheticFit(Measure):
             **self._inside(found, self._squared_distances(search, found, true), ""),
             **self._inside(naive, np.square(self._off(naive, true) / naive.spread), "naive_"),
             "promised_spread": self._shown(self._promised(truth, true)),
-            "told": self._shown(np.array([n not in found.untold for n in self._free], dtype=float)),
+            "told": self._shown(
+                np.array([n not in found.unidentified for n in self._free], dtype=float)
+            ),
             "criterion": found.criterion,
             "noise_order": found.noise.order,
         }
@@ -245,7 +247,7 @@ class SyntheticFit(Measure):
     def _inside(self, found: Fitted, squared: np.ndarray, prefix: str) -> dict[str, np.ndarray]:
         """Whether the truth lies within the intervals."""
         return {
-            f"{prefix}inside_{words}": self._shown(squared <= reach(found, share) ** 2).astype(
+            f"{prefix}inside_{words}": self._shown(squared <= half_width(found, share) ** 2).astype(
                 float
             )
             for words, share in (("one", ONE), ("two", TWO))

@@ -82,7 +82,7 @@ def by_hand(model: Relaxation, b: float) -> float:
 
 def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     model, search, found = fit(25.0)
-    far = intervals.reach(found, intervals.COVERS)
+    far = intervals.half_width(found, intervals.COVERS)
     b = found.values["b"]
     low, high = intervals.interval(search, found, "b")
     # squared distances are off by a fifth, to first order, where a parabola is nearly one
@@ -95,7 +95,7 @@ def test_intervals_end_where_the_likelihood_has_fallen() -> None:
 def test_intervals_are_those_of_student_where_the_likelihood_is_a_parabola() -> None:
     _model, search, found = fit(4.0)
     for name in ("b", "mu_star"):
-        far = intervals.reach(found, intervals.COVERS) * found.stderr(name)
+        far = intervals.half_width(found, intervals.COVERS) * found.stderr(name)
         exact = found.values[name] - far, found.values[name] + far
         assert intervals.interval(search, found, name) == pytest.approx(exact, rel=1e-12)
     at = found.values["mu_star"] + 2.0 * found.stderr("mu_star")
@@ -109,7 +109,7 @@ def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
         for seed in range(20):
             model = Relaxation(first | {"b": size}, seed)
             search = Search(model, first, FREE, "ar")  # type: ignore[arg-type]
-            told[size] += not {"b", "slip_distance"} & set(search.run().untold)
+            told[size] += not {"b", "slip_distance"} & set(search.run().unidentified)
     # chance passes a difference of ten of criteria in some of a thousand records
     assert told[0.0] == 0
     assert told[4.0 * SIZE] > 15

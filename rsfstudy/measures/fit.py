@@ -262,19 +262,19 @@ class Fit(Measure):
         model = Joint(tuple(parts))
         search = Search(model, first, self.parameters, self.noise)
         found = search.run()
-        untold = self._untold(found, parts[0], windows[0].step)
+        unidentified = self._unidentified(found, parts[0], windows[0].step)
         rows = [window.rows + self._begins(window.record) for window in windows]
         values = self._told(found, np.concatenate(rows), model)
         values |= (place := _place(windows[0]))
         for name in self.parameters:
-            told = name not in untold
+            told = name not in unidentified
             ends = interval(search, found, name) if told else search.bounds(name)
             values[f"{name}_low"], values[f"{name}_high"] = ends
         if self.posterior:
             values |= self._drawn(search, found)
-        if untold:
-            text = f"{', '.join(untold)}: the record does not tell"
-            if "a" in untold and found.values["a"] < _LEAST * search.bounds("a")[0]:
+        if unidentified:
+            text = f"{', '.join(unidentified)}: the record does not tell"
+            if "a" in unidentified and found.values["a"] < _LEAST * search.bounds("a")[0]:
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
@@ -306,7 +306,7 @@ class Fit(Measure):
         """First row of a record among those that are fitted together."""
         return sum(map(len, self._involved[: self._involved.index(record)]))
 
-    def _untold(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
+    def _unidentified(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
         """Parameters that the record does not tell; those of too few rows a slip distance too."""
         apart = np.median(np.diff(model.displacement[model.time >= step.begins]))
         sparse = [
@@ -314,7 +314,7 @@ class Fit(Measure):
             for name in ("slip_distance", "slip_distance_2")
             if name in found.free and found.values[name] < _POINTS * apart
         ]
-        return tuple(n for n in found.free if n in (*found.untold, *sparse))
+        return tuple(n for n in found.free if n in (*found.unidentified, *sparse))
 
     def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
         """Numbers and rows of what was found."""

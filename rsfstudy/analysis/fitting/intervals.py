@@ -27,7 +27,7 @@ from rsfstudy.analysis.fitting.search import Fitted, Search
 COVERS, _PARABOLIC, _FOLLOWED, _CLOSE, _MISSED = 0.95, 0.2, 6, 0.05, 0.02
 
 
-def reach(found: Fitted, covers: float) -> float:
+def half_width(found: Fitted, covers: float) -> float:
     """Distance, in standard errors, to the ends of intervals that cover so much."""
     return float(student.isf(0.5 * (1.0 - covers), found.degrees))
 
@@ -47,7 +47,7 @@ def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
     -------
     (float, float)
     """
-    profile, far = Profile(search, found, name), reach(found, COVERS)
+    profile, far = Profile(search, found, name), half_width(found, COVERS)
     low, high = (value_of(name, profile.end(sign, far)) for sign in (-1.0, 1.0))
     return low, high
 
@@ -96,7 +96,7 @@ class Profile:
         """
         moved = coordinate - self.best[self.place]
         parabola = float(moved / self.spread) ** 2
-        if not parabola or self.found.untold:  # what is not told leads nowhere
+        if not parabola or self.found.unidentified:  # what is not told leads nowhere
             return parabola
         x = np.clip(self.best + moved * self.along, self.search.low, self.search.high)
         x[self.place] = coordinate

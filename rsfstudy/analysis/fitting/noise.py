@@ -134,12 +134,12 @@ class Noise:
         frequency, ``(1 - k_1^2)(1 - k_2^2).../(1 - c_1 - ... - c_m)^2`` with k the partial
         autocorrelations; by AR(1) ``n (1 - rho)/(1 + rho)``.
         """
-        at_rest = self._at_rest
+        power = self._power_at_zero
         lasts = ((run.last - run.first, run.number) for run in self.runs)
-        return sum(max(1.0, rows / max(at_rest[n], 1.0)) for rows, n in lasts)
+        return sum(max(1.0, rows / max(power[n], 1.0)) for rows, n in lasts)
 
     @property
-    def _at_rest(self) -> list[float]:
+    def _power_at_zero(self) -> list[float]:
         """Power at zero frequency of each process, over its variance."""
         told = ((c[-1], v[-1]) for c, v in self.predictors)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
@@ -151,10 +151,10 @@ class Noise:
         """
         total = 0.0
         rows = np.bincount(_numbers(self.runs)).tolist()
-        for count, told, at_rest in zip(rows, self.predictors, self._at_rest, strict=True):
+        for count, told, power in zip(rows, self.predictors, self._power_at_zero, strict=True):
             # coefficients have the covariance (variance left) R^-1/rows
             ones = _innovations(np.ones((self.order, 1)), *told)
-            total += count / (1.0 + 2.0 * at_rest * float(np.square(ones).sum()))
+            total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
         return total
 
 
@@ -208,7 +208,7 @@ def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndar
 
 
 def whiteness(innovations: np.ndarray, order: int) -> float:
-    """The chance that white noise looks as correlated as residuals freed of correlation: of chi^2
+    """Chance that white noise looks as correlated as residuals freed of correlation: of chi^2
     as large as ``n (n + 2) sum r_k^2/(n - k)``, r_k being their autocorrelation at lag k (Ljung and
     Box, 1978).
 

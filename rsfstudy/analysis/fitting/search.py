@@ -97,7 +97,7 @@ class Fitted:
         Derivatives of the curve with trend by the free parameters, or their logarithms.
     criterion : float
         Akaike's, of the likelihood of this record with this noise: less is better.
-    untold : tuple of str
+    unidentified : tuple of str
         Free parameters that the record does not tell.
     """
 
@@ -114,7 +114,7 @@ class Fitted:
     band: np.ndarray
     jacobian: np.ndarray
     criterion: float
-    untold: tuple[str, ...]
+    unidentified: tuple[str, ...]
 
     @property
     def slopes(self) -> np.ndarray:
@@ -148,7 +148,7 @@ class Search:
         self, model: Model | Joint, values: Values, free: Sequence[str], noise: str
     ) -> None:
         self.model, self.free, self.name = model, tuple(free), noise
-        self.first, self.has_ended = dict(values), True
+        self.first, self.has_converged = dict(values), True
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
@@ -194,21 +194,23 @@ class Search:
             Where no motion fits, the search does not end though the record tells all parameters, or
             the work budget is spent.
         """
-        x, noise = self._begin(), noises.white(self.model.time)
+        x, noise = self._initial(), noises.white(self.model.time)
         for number in range(1 if self.name == noises.WHITE and len(noise.sizes) == 1 else _PASSES):
             before = x
             x, jacobian = self.least_squares(x, noise)
             left = self.residuals(self.values(x))
-            if number and _is_still(x - before, noise.whitened(np.column_stack([jacobian, left]))):
+            if number and _has_converged(
+                x - before, noise.whitened(np.column_stack([jacobian, left]))
+            ):
                 break
             noise = noises.fitted(self.name, self.model.time, left, jacobian)
-        found = self._ended(x, noise)
-        if not (self.has_ended or found.untold):
+        found = self._result(x, noise)
+        if not (self.has_converged or found.unidentified):
             text = f"the search did not end within {_CURVES} curves"
             raise Halt(Status.ACCURACY_OUT_OF_REACH, text)
         return found
 
-    def _begin(self) -> np.ndarray:
+    def _initial(self) -> np.ndarray:
         """Coordinates to begin with: those of the slip distance with which the least is left."""
         self.model.check(self.first)  # whatever is wrong with it is said
         scales = _GRID if "slip_distance" in self.free else (1.0,)
@@ -251,7 +253,7 @@ class Search:
         inner = np.clip(x, self.low + 1e-9, self.high - 1e-9)
         scale = math.sqrt(float(np.square(left(inner)).mean())) or 1.0
         if not math.isfinite(scale):  # next to what can be followed: there is no better neighbour
-            self.has_ended = True
+            self.has_converged = True
             return x, self._jacobian(x, QUICK)
         found = least_squares(
             left,
@@ -264,10 +266,10 @@ class Search:
             gtol=1e-12,
             max_nfev=_CURVES,
         )
-        self.has_ended = found.status != 0
+        self.has_converged = found.status != 0
         return found.x, derivatives["last"]
 
-    def _ended(self, x: np.ndarray, noise: Noise) -> Fitted:
+    def _result(self, x: np.ndarray, noise: Noise) -> Fitted:
         """All that is told of the parameters with the least left."""
         moved = np.zeros(len(x))
         for number in range(_POLISHED[1]):
@@ -277,12 +279,12 @@ class Search:
             if not np.isfinite(whitened).all():
                 text = "the best motion cannot be followed"
                 raise Halt(Status.INTEGRATION_FAILED, text)
-            moved = _solved(whitened)
+            moved = _linear_solution(whitened)
             beyond = np.clip(x + moved, self.low, self.high)
             moved = beyond - x
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
                 x = beyond
-            if number + 1 >= _POLISHED[0] and _is_still(moved, whitened, _DONE):
+            if number + 1 >= _POLISHED[0] and _has_converged(moved, whitened, _DONE):
                 break
         values = self.values(x)
         curve, trend = self.model.curve(values), self.model.trend(values)
@@ -316,7 +318,7 @@ class Search:
             band=band,
             jacobian=jacobian,
             criterion=criterion,
-            untold=self._untold(x, values, covariance, steps),
+            unidentified=self._unidentified(x, values, covariance, steps),
         )
 
     def _criterion_without_steps(self, jacobian: np.ndarray, noise: Noise) -> float:
@@ -328,10 +330,10 @@ class Search:
         if not any(name.startswith("mu_star") for name in self.free):
             columns = np.insert(columns, 0, 1.0, axis=1)
         whitened = noise.whitened(columns)
-        innovations = whitened[:, -1] - whitened[:, :-1] @ _solved(whitened)
+        innovations = whitened[:, -1] - whitened[:, :-1] @ _linear_solution(whitened)
         return _criterion(innovations, noise, columns.shape[1] - 1)
 
-    def _untold(
+    def _unidentified(
         self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool
     ) -> tuple[str, ...]:
         """Free parameters that the record does not tell; all but trends where it has no steps."""
@@ -374,12 +376,12 @@ def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
     return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
-def _solved(columns: np.ndarray) -> np.ndarray:
+def _linear_solution(columns: np.ndarray) -> np.ndarray:
     """Least squares: factors of all columns but the last one, which they add up to."""
     return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
 
 
-def _is_still(moved: np.ndarray, whitened: np.ndarray, part: float = _STILL) -> bool:
+def _has_converged(moved: np.ndarray, whitened: np.ndarray, part: float = _STILL) -> bool:
     """True if parameters have moved by little of their standard errors; residuals come last."""
     size = np.linalg.norm(whitened[:, -1]) / math.sqrt(len(whitened))
     spread = size * np.sqrt(np.diag(_inverse(whitened[:, :-1])))
