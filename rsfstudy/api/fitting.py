@@ -122,7 +122,7 @@ def fit(
         the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
         the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
         record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
-        ``.rsf.plot()``, ``.rsf.scene`` and ``.rsf.draw()`` say more.
+        ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
+BY_CHANCE = 0.01
 #: Part of the same, times a, by which the friction coefficient of two runs may agree by chance at
 #: an instant: of 7,071 numbers of random holds 22 err by up to 22 times their estimates without it,
 #: and four by up to 1.7 times with it (study coverage).
@@ -97,7 +97,7 @@ def error_of(
         In the units of the number.
     """
     friction = _AT_AN_INSTANT * accuracy.rtol * scene.a
-    chance = _BY_CHANCE * accuracy.rtol
+    chance = BY_CHANCE * accuracy.rtol
     return error_between(value, refined, chance) + friction * abs(by_friction)
 
 

@@ -118,7 +118,7 @@ class Elasticities(Measure):
         }
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Measure once, and on both sides of each number."""
+        """The headline, and its elasticities by measurements on both sides of each number."""
         outcome = self.measure.charged(scene, accuracy, meter)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
@@ -130,9 +130,9 @@ class Elasticities(Measure):
         here = _level(y, error)
         step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
-        lacking = []
+        lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
-            if not scene.as_dict().get(name):
+            if not stated.get(name):
                 continue
             sides = [self._at(scene, name, by, accuracy, meter) for by in (-step, step)]
             found[place] = _derivative(here, sides, step)
@@ -158,9 +158,8 @@ class Elasticities(Measure):
             return None
         outcome = self.measure.charged(beside, accuracy, meter)
         if not outcome.status.is_answer:
-            raise Halt(
-                outcome.status, f"at {name} = {getattr(beside, name):.9g}: {outcome.message}"
-            )
+            where = f"at {name} = {getattr(beside, name):.9g}"
+            raise Halt(outcome.status, f"{where}: {outcome.message}")
         y, error = self._numbers(outcome) if outcome.status is Status.OK else (0.0, 0.0)
         return _level(y, error) if y else None
 

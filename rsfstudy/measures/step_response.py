@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, recorded
+from rsfstudy.measures._records import BY_CHANCE, Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
@@ -26,8 +26,6 @@ LN10 = math.log(10.0)
 
 #: Part of the largest distance from steady sliding at which an oscillation counts as over.
 _OVER = 1e-3
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.01
 
 _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
@@ -90,7 +88,7 @@ class StepResponse(Recorded):
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion, and once more with smaller tolerances for the error of its peaks."""
+        """Peaks and path of the motion, and of one with smaller tolerances for their error."""
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
@@ -106,7 +104,7 @@ class StepResponse(Recorded):
             {
                 "max_log10_slip_rate": float(peaks.max()),
                 "max_log10_slip_rate_error": error_between(
-                    peaks.max(), again.max(), _BY_CHANCE * accuracy.rtol
+                    peaks.max(), again.max(), BY_CHANCE * accuracy.rtol
                 )
                 + _left_out(scene, accuracy),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,

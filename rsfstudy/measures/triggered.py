@@ -37,7 +37,7 @@ class Triggered(Measure):
     clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion until the answer is certain, at two tolerances."""
+        """The answer, from motions followed at two tolerances until each is certain."""
         check_single_step(scene)
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
             return Outcome(
