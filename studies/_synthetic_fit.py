@@ -62,7 +62,7 @@ class _Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class SyntheticFit(Measure):
-    """What a fit makes of a record that was computed, with noise that was drawn.
+    """A fit of a record that was computed, with noise that was drawn, held to the truth.
 
     The record is that of the scene, whose unit of slip is `slip_distance`, under a protocol; rows
     are evenly spaced in load point displacement, in a hold in time.
@@ -198,7 +198,7 @@ class SyntheticFit(Measure):
         return {name: plainly[plain(name)] for name in names}
 
     def _first(self, scene: Scene, true: Values) -> dict[str, float]:
-        """Where the search begins: near the truth, and not at it."""
+        """Parameters that the search begins with: near the truth, and not at it."""
         first = {
             n: v * (_OFF if n in LOGARITHMIC and n in self.free else 1.0) for n, v in true.items()
         }
@@ -222,7 +222,7 @@ class SyntheticFit(Measure):
         return Joint(tuple(parts))
 
     def _off(self, found: Fitted, true: Values) -> np.ndarray:
-        """What is found less the truth."""
+        """Coordinates that are found, less the true ones."""
         pairs = ((n, found.values[n], true[n]) for n in self._free)
         return np.array([coordinate(n, ours) - coordinate(n, exact) for n, ours, exact in pairs])
 
@@ -245,7 +245,7 @@ class SyntheticFit(Measure):
         return np.array(distances)
 
     def _inside(self, found: Fitted, squared: np.ndarray, prefix: str) -> dict[str, np.ndarray]:
-        """Whether the truth lies within the intervals."""
+        """1 where the truth lies within the intervals, and 0 where it does not."""
         return {
             f"{prefix}inside_{words}": self._shown(squared <= half_width(found, share) ** 2).astype(
                 float

@@ -46,7 +46,7 @@ def recorded(*names: str) -> tuple[Output, ...]:
 
 
 def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What is kept of a record, with time and slip since its beginning."""
+    """Quantities of a record along its path, with time and slip since its beginning."""
     found = {name: path[name] for name in ("friction_coefficient", "log10_slip_rate")}
     return {"time": path["time"] - begin.time, "slip": path["slip"] - path["slip"][0], **found}
 
@@ -108,7 +108,7 @@ def errors_of(
     scene: Scene,
     accuracy: Accuracy,
 ) -> dict[str, float]:
-    """The same of several numbers, as `<name>_error`."""
+    """Error estimates of several numbers, as `<name>_error` (see `error_of`)."""
     return {
         f"{name}_error": error_of(value, refined[name], by_friction[name], scene, accuracy)
         for name, value in values.items()

@@ -281,7 +281,7 @@ class Fit(Measure):
         return Outcome(Status.OK, values, self._remark(found, place["load_point_noise"]))
 
     def _remark(self, found: Fitted, noise: float) -> str:
-        """What noise of a recorded load point does to the slip distance, where it matters."""
+        """Remark on what noise of a recorded load point does to the slip distance, or none."""
         if self.loading != "recorded" or "slip_distance" not in found.free:
             return ""
         # of second order: ln V of a stiff slider follows the load point by k x/a

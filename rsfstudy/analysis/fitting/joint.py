@@ -102,7 +102,7 @@ class Joint:
 
 
 def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
-    """What holds for the parameters of one window, by their plain names."""
+    """Values for the parameters of one window, by their plain names."""
     ending, found = f"_{number}", {}
     for name, value in values.items():
         if plain(name) == name:

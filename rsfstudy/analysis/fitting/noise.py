@@ -269,7 +269,7 @@ class _Products:
                         self.sums[run.number, j, i] += found.T
 
     def misfit(self, noise: Noise) -> float:
-        """What REML minimises, up to a constant; infinite where nothing is left."""
+        """Number that REML minimises, up to a constant; infinite where nothing is left."""
         total = np.zeros(self.sums.shape[-2:])
         for number, (coefficients, variances) in enumerate(noise.predictors):
             full = np.append(1.0, -np.array(coefficients[-1]))
@@ -360,7 +360,7 @@ def _kinds(time: np.ndarray) -> np.ndarray:
 
 
 def _count(runs: Sequence[Run]) -> int:
-    """How many processes there are."""
+    """Number of processes."""
     return 1 + max(run.number for run in runs)
 
 

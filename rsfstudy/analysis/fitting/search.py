@@ -70,7 +70,7 @@ _DECIDES = 10.0
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a fit has found.
+    """Findings of a fit.
 
     Attributes
     ----------

@@ -117,7 +117,7 @@ class _Sums:
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
     def left(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """What the line through rows i to j leaves of the sum of squares."""
+        """Sum of squares that the line through rows i to j leaves."""
         _mt, _mx, tt, tx, xx = self.between(i, j)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 

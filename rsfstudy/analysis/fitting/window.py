@@ -27,7 +27,7 @@ LOADINGS = ("steps", "recorded")
 
 @dataclass(frozen=True)
 class Window:
-    """What is fitted around a step.
+    """Part of a record that is fitted around a step.
 
     Attributes
     ----------
