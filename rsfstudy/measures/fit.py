@@ -208,7 +208,7 @@ class Fit(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters, and numbers of rows."""
         names = np.array(self.parameters, dtype=object)
-        together = sum(map(len, self._involved))
+        together = sum(map(len, self._first_rows))
         rows = np.arange(together if self.together else max(map(len, self.records)))
         draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
@@ -242,10 +242,11 @@ class Fit(Measure):
         remedy = "Fit them again: show FILE tells the command."
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
-    @property
-    def _involved(self) -> tuple[Record, ...]:
-        """The records that are fitted, each once."""
-        return tuple(dict.fromkeys(window.record for window in self._windows))
+    @cached_property
+    def _first_rows(self) -> dict[Record, int]:
+        """The records that are fitted, each with the number of its first row among all."""
+        records = [*dict.fromkeys(window.record for window in self._windows)]
+        return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """The parameters that leave the least, with their errors and intervals."""
@@ -263,7 +264,7 @@ class Fit(Measure):
         search = Search(model, first, self.parameters, self.noise)
         found = search.run()
         unidentified = self._unidentified(found, parts[0], windows[0].step)
-        rows = [window.rows + self._begins(window.record) for window in windows]
+        rows = [window.rows + self._first_rows[window.record] for window in windows]
         values = self._told(found, np.concatenate(rows), model)
         values |= (place := _place(windows[0]))
         for name in self.parameters:
@@ -301,10 +302,6 @@ class Fit(Measure):
         logs = [name in LOGARITHMIC for name in found.free]
         drawn[:, logs] = np.exp(drawn[:, logs])
         return {"posterior": drawn, "autocorrelation_time": time}
-
-    def _begins(self, record: Record) -> int:
-        """First row of a record among those that are fitted together."""
-        return sum(map(len, self._involved[: self._involved.index(record)]))
 
     def _unidentified(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
         """Parameters that the record does not tell; those of too few rows a slip distance too."""
@@ -353,7 +350,7 @@ class Fit(Measure):
             "innovation": found.innovations,
         }
         for name in (about.name for about in COLUMNS[:3]):
-            whole = [record.columns[name] for record in self._involved]
+            whole = [record.columns[name] for record in self._first_rows]
             along[f"record_{name}"] = np.concatenate(whole)
         for name, column in along.items():
             values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)
