@@ -64,14 +64,14 @@ class Joint:
         return all(part.is_linear(plain(name)) for part in self.parts)
 
     def latest(self, name: str) -> float:
-        """By how much the loading of a window may come late."""
+        """Time in s by which the loading of a window may come late."""
         number = name.rpartition("_")[2]
-        return self.parts[int(number) - 1 if number.isdecimal() else 0].latest(plain(name))
+        return self.parts[int(number) - 1 if number.isdecimal() else 0].latest
 
     def check(self, values: Values) -> None:
         """Raise InvalidValue for parameters that make no scene."""
         for part, own in self._each(values):
-            part.check(own)
+            part.scene_of(own)
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows of all windows, without trends (see `Model.curve`)."""

@@ -133,13 +133,10 @@ class Model:
         """True for a parameter in which friction is linear, whatever the others."""
         return name.startswith("trend") or (name == "mu_star" and not self.is_stressed)
 
-    def latest(self, _name: str) -> float:
-        """By how much loading may come late, in s."""
+    @property
+    def latest(self) -> float:
+        """Time in s by which loading may come late."""
         return float(self.time[0] - self.loading[0, 0])
-
-    def check(self, values: Values) -> None:
-        """Raise InvalidValue for parameters that make no scene."""
-        self.scene_of(values)
 
     def scene_of(self, values: Values) -> Scene:
         """The scene with parameters of a record, in units of its slip distance and velocity."""

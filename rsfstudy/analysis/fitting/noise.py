@@ -237,12 +237,7 @@ class _Products:
     order : int
     """
 
-    def __init__(
-        self,
-        runs: Sequence[Run],
-        columns: np.ndarray,
-        order: int,
-    ) -> None:
+    def __init__(self, runs: Sequence[Run], columns: np.ndarray, order: int) -> None:
         self.rows, self.parameters = len(columns), columns.shape[1] - 1
         # derivatives may be next to dependent: those of the same span are as good, up to a constant
         base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]

@@ -28,7 +28,6 @@ from rsfstudy.analysis.fitting.model import (
     LOGARITHMIC,
     QUICK,
     Differences,
-    Model,
     Values,
     coordinate,
     slope,
@@ -136,7 +135,7 @@ class Search:
 
     Parameters
     ----------
-    model : Model or Joint
+    model : Joint
     values : mapping of str to float
         All parameters; those that are free to begin with.
     free : sequence of str
@@ -144,9 +143,7 @@ class Search:
         As `noise.fitted` takes it.
     """
 
-    def __init__(
-        self, model: Model | Joint, values: Values, free: Sequence[str], noise: str
-    ) -> None:
+    def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
         self.model, self.free, self.name = model, tuple(free), noise
         self.first, self.has_converged = dict(values), True
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
@@ -339,10 +336,8 @@ class Search:
         """Free parameters that the record does not tell; all but trends where it has no steps."""
         spread = dict(zip(self.free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         bound = (x - self.low < 1e-6) | (self.high - x < 1e-6)
-        effects = {"slip_distance": "b", "slip_distance_2": "b2"}
-        if "b" not in values:
-            effects["slip_distance"] = "b1"
-        largest = max(abs(v) for n, v in values.items() if n in ("a", "b", "b1", "b2"))
+        effects = {"slip_distance": "b" if "b" in values else "b1", "slip_distance_2": "b2"}
+        largest = max(abs(values.get(n, 0.0)) for n in ("a", "b", "b1", "b2"))
         found = []
         for name, at_bound in zip(self.free, bound.tolist(), strict=True):
             told = math.isfinite(spread[name])
