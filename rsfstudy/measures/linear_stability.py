@@ -16,12 +16,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider import closed_forms
-from rsfstudy.slider.equations import (
-    Equations,
-    by_displacement,
-    by_inertial_time,
-    normal_stress_at,
-)
+from rsfstudy.slider.equations import Equations, by_displacement, by_inertial_time, normal_stress_at
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness, critical_stiffnesses
 from rsfstudy.slider.steady import Steady, steady_excess, steady_sliding
@@ -146,9 +141,7 @@ def _explicit(scene: Scene) -> float:
     """The published formula, for scenes it speaks of; NaN for others."""
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.steady_states or law.feels_stress or scene.parts.fluid.effects
-    if scene.imposed_normal_stress:
-        return math.nan
-    if coupling is None or others:
+    if coupling is None or others or scene.imposed_normal_stress:
         return math.nan
     return closed_forms.critical_stiffness(
         scene.log_load_rate, scene.mu_star, scene.a, scene.b, *coupling
@@ -165,12 +158,8 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
             equations = by_inertial_time(changed)
-            state = (
-                steady.spring_stress,
-                steady.log_slip_rate,
-                steady.spring_stress,
-                *steady.psis[1:],
-            )
+            stress = steady.spring_stress
+            state = (stress, steady.log_slip_rate, stress, *steady.psis[1:])
         else:
             equations = by_displacement(changed)
             state = (steady.spring_stress, *steady.psis)
