@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rsfstudy.slider.derived import once
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.system import Form, functions
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: The regime of the full equations of a scene with mass, and that of a rigid slider.
 IN_RUPTURE, RIGID = "inertial", "rigid"

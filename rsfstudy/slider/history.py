@@ -11,19 +11,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.slider.loading import Segment, ramp, refuse_fluid
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LOG_VELOCITY, RELIEF
 from rsfstudy.slider.protocol import Stated
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: Columns of samples: time from the first, load point velocity from then on, and by how much normal
 #: stress is below sigma_* then, and at which rate it rises from then on.

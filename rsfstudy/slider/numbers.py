@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Part, number
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Part, Scene, number
 
 _POSITIVE = "must be greater than 0"
 

@@ -26,7 +26,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 
 if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+    from rsfstudy.slider.scene import Scene as Scene
+else:  # parts name it in annotations only, and a scene is made of them
+    Scene = Any
 
 #: Names that members of a user's own part may still bear.
 _FORMER_NAMES = {

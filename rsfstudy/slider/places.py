@@ -11,11 +11,10 @@ import math
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Numbers, Part
+from rsfstudy.slider.parts import Numbers, Part, Scene
 
 if TYPE_CHECKING:
     from rsfstudy.slider.fluid._recharged import Recharged
-    from rsfstudy.slider.scene import Scene
 
 #: Direct effect parameter a; how far ln V moves the states, which is b for one; mu_*, K = k
 #: D_c/sigma_*, V_0/V_*, its logarithm, the effect c of shear stress on the state, and by how much

@@ -10,17 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parts import Scene
 from rsfstudy.slider.places import VELOCITY
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: What a segment of a protocol may state.
 KEYS = ("velocity", "duration", "distance", "step", "normal_stress")

@@ -28,15 +28,13 @@ import math
 from collections.abc import Sequence
 from itertools import zip_longest
 from operator import mul
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.parts import Scene
 from rsfstudy.slider.steady import Steady, steady_sliding
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
 #: States take a part of it over b; each of several, over what ln V moves it by, if it does.

@@ -13,16 +13,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from scipy.optimize import brentq
 
 from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import relation_of, steady_states_of
-from rsfstudy.slider.parts import Numbers
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Numbers, Scene
 
 #: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
 _STRONGEST = 1e9

@@ -30,14 +30,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rsfstudy.slider import friction
 from rsfstudy.slider.friction import Friction, friction_of
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, STIFFNESS, A
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.states import scaled
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
-    from rsfstudy.slider.scene import Scene
 
 #: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
 SLOWEST = -290.0 * math.log(10.0)

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import Friction
-from rsfstudy.slider.parts import Function, Numbers, flag
+from rsfstudy.slider.parts import Function, Numbers, Scene, flag
 from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, LOAD_VELOCITY, STIFFNESS, A
 from rsfstudy.slider.states import moved
 from rsfstudy.slider.system import velocity_ratios
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import Friction
-from rsfstudy.slider.parts import Function, Numbers, number
+from rsfstudy.slider.parts import Function, Numbers, Scene, number
 from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 _MOST_ITERATIONS = 200
 _SETTLED = 1e-15

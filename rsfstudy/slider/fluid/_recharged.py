@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.places import DYNAMICS, FLUID, LARGEST_SLOWNESS, RECHARGE
 
 if TYPE_CHECKING:
     from rsfstudy.slider.loading import Loading
-    from rsfstudy.slider.scene import Scene
 
 
 @cache

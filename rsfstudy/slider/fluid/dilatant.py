@@ -6,16 +6,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_threshold
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:

@@ -12,13 +12,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-from rsfstudy.slider.parts import Function, Numbers, Part, flag, found_in, number
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
-
+from rsfstudy.slider.parts import Function, Numbers, Part, Scene, flag, found_in, number
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.laws import GIVE_STIFFNESS, LawOfStates, lacks_threshold
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import LAW
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: Places of the numbers of the law: b of each state, the part each has in what stress takes from
 #: the state variable, and L_1/L_2.

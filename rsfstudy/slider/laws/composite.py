@@ -6,14 +6,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LAW
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 #: Steps of third order that take Lambert's W to rounding from the guess below.
 STEPS = 4

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity, exp_less_one
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LAW
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:

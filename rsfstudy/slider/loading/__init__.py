@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.parts import Function, Numbers, Part, found_in, number
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Function, Numbers, Part, Scene, found_in, number
 
 #: Most segments of a history that is stated by their number.
 MOST_SEGMENTS = 100_000

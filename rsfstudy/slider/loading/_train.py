@@ -10,11 +10,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def period() -> Any:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import _train, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, number
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Numbers, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import number
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)

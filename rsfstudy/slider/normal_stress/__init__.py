@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from rsfstudy.slider.parts import Function, Part, found_in
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Function, Part, Scene, found_in
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.parts import Scene
 
 
 @dataclass(frozen=True, kw_only=True)

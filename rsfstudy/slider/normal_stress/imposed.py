@@ -5,14 +5,10 @@ of its own; a rise of it lowers the state variable.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import IMPOSED
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:

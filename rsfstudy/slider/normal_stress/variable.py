@@ -6,14 +6,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
-from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
