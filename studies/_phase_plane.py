@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.declare.figure import Axes
-from rsfstudy.slider.registry import kinds_with, own_named, without_meaning
+from rsfstudy.slider.assembly import without_meaning
+from rsfstudy.slider.registry import kinds_with, own_named
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess, stress_at
 

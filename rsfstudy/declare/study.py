@@ -32,6 +32,7 @@ from rsfstudy.rig.axes import axis as axis_in_units
 from rsfstudy.rig.axes import in_units
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import ALSO, FULL
+from rsfstudy.slider.assembly import without_meaning
 from rsfstudy.slider.registry import (
     CALLERS,
     FIELDS,
@@ -41,7 +42,6 @@ from rsfstudy.slider.registry import (
     fields_with,
     own_named,
     quantities_with,
-    without_meaning,
 )
 from rsfstudy.slider.scene import Scene
 

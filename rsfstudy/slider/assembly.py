@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
-from rsfstudy.slider.numbers import Slider, with_spring
+from rsfstudy.slider.numbers import SPRING, Slider, with_spring
 from rsfstudy.slider.parts import Part, checked, names_of
 from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.registry import (
-    FIELDS,
+    CALLERS,
     NAMED,
     OWNERS,
-    PLAIN_FIELDS,
-    SLOT_FIELDS,
     SLOT_NAMES,
     SLOTS,
     Own,
@@ -51,22 +49,12 @@ def parts_of(given: Mapping[str, Any]) -> Parts:
     """
     chosen = tuple(_chosen(slot, given) for slot in SLOTS)
     layout = layout_of(tuple(map(kind_of, chosen)))
-    values: tuple[dict[str, Any], ...] = tuple({} for _part in layout.kinds)
-    for name, value in given.items():
-        if name not in layout.fields and name not in SLOT_NAMES:
-            raise _unknown_field(name, value, layout)
-        if value is None or name in SLOT_NAMES:
-            continue
-        place = layout.places.get(name)
-        if place is None:
-            _refuse_unless_idle(name, value, layout.refusing[name])
-        else:
-            values[place][name] = checked(layout.kinds[place], name, value)
-    made = [
-        part(**own) if isinstance(part, type) else part
-        for part, own in zip(chosen, values[1:], strict=True)
+    values = _by_place(given, layout)
+    made: list[Any] = [
+        part(**values.get(place, {})) if isinstance(part, type) else part
+        for place, part in enumerate(chosen, start=1)
     ]
-    return Parts(Slider(**with_spring(values[0])), *made)  # type: ignore[arg-type]
+    return Parts(Slider(**with_spring(values.get(0, {}))), *made)
 
 
 def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
@@ -77,17 +65,25 @@ def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
     InvalidValue
         For a value that breaks its rule or has no meaning for these parts.
     """
-    layout = layout_of(tuple(map(type, parts[1:])))
-    changed: dict[int, dict[str, Any]] = {}
-    for name, value in changes.items():
-        place = layout.places.get(name)
-        if place is None:
-            raise layout.refusing[name].refuse(name, value)
-        changed.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
     made: list[Any] = list(parts)
-    for place, values in changed.items():
+    for place, values in _by_place(changes, layout_of(tuple(map(type, parts[1:])))).items():
         made[place] = replace(made[place], **values)
     return Parts._make(made)
+
+
+def _by_place(given: Mapping[str, Any], layout: Layout) -> dict[int, dict[str, Any]]:
+    """What fields hold, by the place of the part that owns them; not what is None."""
+    values: dict[int, dict[str, Any]] = {}
+    for name, value in given.items():
+        place = layout.places.get(name)
+        if place is None and name in layout.refusing:
+            if value is not None:
+                _refuse_unless_idle(name, value, layout.refusing[name])
+        elif place is not None and value is not None:
+            values.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
+        elif place is None and name not in SLOT_NAMES:
+            raise _unknown_field(name, value, layout)
+    return values
 
 
 def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
@@ -97,7 +93,7 @@ def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
         return resolve(slot, value)
     if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
-    if slot.name in SLOT_FIELDS:
+    if slot in NAMED:
         name = name_of(slot.name, given.get(slot.name, slot.default))
         if not isinstance(name, str) or name not in slot.choices:
             choices = (*slot.choices, *slot.own)
@@ -128,6 +124,9 @@ class Layout(NamedTuple):
         The part that refuses each of the others,
     idle : mapping of str to value
         and what those hold.
+    foreign : frozenset of str
+        Those of them without meaning, whatever they hold: all but the idle ones that call for a
+        part by their values.
     named : tuple of str
         The slots whose parts are fields of the scene by their names.
     fields : tuple of str
@@ -140,6 +139,7 @@ class Layout(NamedTuple):
     places: Mapping[str, int]
     refusing: Mapping[str, type[Part]]
     idle: Mapping[str, Any]
+    foreign: frozenset[str]
     named: tuple[str, ...]
     fields: tuple[str, ...]
     plain: frozenset[str]
@@ -157,16 +157,36 @@ def layout_of(chosen: tuple[type[Part], ...]) -> Layout:
         raise InvalidValue("parts", names, "have a field of one name", remedy="Rename one.")
     refusing: dict[str, type[Part]] = {}
     idle: dict[str, Any] = {}
+    foreign: set[str] = set()
     for slot, part in filled:
         for other in slot.choices.values():
             for name in set(names_of(other)) - set(places):
                 refusing[name] = part
                 calls = name == other.called_by
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
-    named = tuple(slot.name for slot in SLOTS if slot.name in (*SLOT_FIELDS, *owned))
+                if not calls or slot.name in owned:
+                    foreign.add(name)
+    named = tuple(slot.name for slot in SLOTS if slot in NAMED or slot.name in owned)
     fields = fields_with(owned.values())
-    plain = PLAIN_FIELDS | (set(fields) - {*FIELDS, *SLOT_NAMES})
-    return Layout(kinds, places, refusing, idle, named, fields, plain)
+    plain = frozenset(fields) - {*SLOT_NAMES, *CALLERS, *SPRING}
+    return Layout(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
+
+
+def without_meaning(values: Mapping[str, Any], parts: Iterable[Own] = ()) -> frozenset[str]:
+    """Fields that belong to other parts than those that values name; none where these name no part.
+
+    Parameters
+    ----------
+    values : mapping of str to value
+    parts : iterable of type or Stated
+        Parts of the user's own that may be among those.
+    """
+    try:
+        layout = layout_of(tuple(kind_of(_chosen(slot, values)) for slot in SLOTS))
+    except InvalidValue:
+        return frozenset()
+    of_others = {name for part in parts for name in names_of(kind_of(part))}
+    return layout.foreign | (of_others - set(layout.places))
 
 
 def own_parts(parts: Parts) -> dict[str, Own]:

@@ -6,39 +6,37 @@ from dataclasses import dataclass
 from typing import Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Part, Scene, number
-
-_POSITIVE = "must be greater than 0"
+from rsfstudy.slider.parts import POSITIVE, Part, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slider(Part):
     """The numbers that every slider has."""
 
-    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=_POSITIVE)
+    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=POSITIVE)
     mu_star: float = number(
         0.76,
         r"$\mu_*$",
         "1",
         "steady-state friction coefficient at the reference rate",
-        rule=_POSITIVE,
+        rule=POSITIVE,
     )
     stiffness_ratio: float | None = number(
         None,
         r"$k/k_{cr}(V_*)$",
         "1",
         "stiffness over critical stiffness at V_star without radiation damping",
-        rule=_POSITIVE,
+        rule=POSITIVE,
     )
     stiffness: float | None = number(
-        None, r"$k D_c/\sigma_*$", "1", "stiffness", rule=_POSITIVE, scale="sigma_*/D_c"
+        None, r"$k D_c/\sigma_*$", "1", "stiffness", "sigma_*/D_c", rule=POSITIVE
     )
-    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=_POSITIVE)
+    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=POSITIVE)
     reference_rate: float = number(
-        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=_POSITIVE
+        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=POSITIVE
     )
     instability_norm: float = number(
-        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=_POSITIVE
+        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=POSITIVE
     )
 
     initial_stress: float = number(
@@ -46,7 +44,7 @@ class Slider(Part):
         r"$(\tau_0-\tau_*)/\sigma_*$",
         "1",
         "shear stress at the beginning, above that of steady sliding at V_star",
-        scale="sigma_*",
+        "sigma_*",
     )
     initial_state: float = number(
         0.0, r"$\Theta_0$", "1", "state variable at the beginning; 0 in steady sliding at V_star"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
-from rsfstudy.slider.parts import Part, has_meaning
+from rsfstudy.slider.parts import Part
 
 if TYPE_CHECKING:
     from rsfstudy.slider.registry import Slot
@@ -37,13 +37,17 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
     owners : mapping of str to type
         The parts of rsfstudy, by the fields of a scene that they own.
     """
-    _check_kind(slot, part)
+    if not isinstance(part, type) or not issubclass(part, slot.base):
+        is_part = issubclass(part if isinstance(part, type) else type(part), Part)
+        rule = "fills another slot" if is_part else "is no part of a slider"
+        remedy = f"Derive a class from {slot.base.__module__}.{slot.base.__name__}."
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    params = vars(part).get("__dataclass_params__")
+    if params is None or not params.frozen:
+        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
+        raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
     check_name(slot, part, slots)
-    taken = RESERVED | {slot.name for slot in slots}
-    for stated in fields(part):
-        _check_field(slot, part, stated.name, owners)
-        if stated.name in taken - set(owners):
-            raise _taken(part, stated.name, "every scene")
+    _check_fields(slot, part, RESERVED | {slot.name for slot in slots}, owners)
     for name in part.functions():
         function = inspect.getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
@@ -51,32 +55,18 @@ def check(slot: Slot, part: Any, slots: Iterable[Slot], owners: Mapping[str, typ
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _check_kind(slot: Slot, part: Any) -> None:
-    base = f"{slot.base.__module__}.{slot.base.__name__}"
-    if not isinstance(part, type) or not issubclass(part, slot.base):
-        is_part = isinstance(part, Part) or (isinstance(part, type) and issubclass(part, Part))
-        rule = "fills another slot" if is_part else "is no part of a slider"
-        raise InvalidValue(slot.name, part, rule, remedy=f"Derive a class from {base}.")
-    params = vars(part).get("__dataclass_params__")
-    if params is None or not params.frozen:
-        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
-        raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
-
-
 def check_name(slot: Slot, part: type[Part] | Part, slots: Iterable[Slot]) -> None:
     """Raise InvalidValue for a name that no part may have, or that something else has."""
     name: object = getattr(part, "name", None)
-    remedy = f'Write name = "..." in {origin(part)[1]}.'
-    if not isinstance(name, str) or not is_name(name):
-        rule = f"must be named by a Python identifier, not {name!r}"
-        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    rule = "" if is_name(name) else f"must be named by a Python identifier, not {name!r}"
     for other in slots:
         if name in other.choices:
             rule = f"takes the name of a part of rsfstudy, {name!r}"
-            raise InvalidValue(slot.name, part, rule, remedy=remedy)
-        if name in other.own and origin(other.own[name]) != origin(part):
+        elif name in other.own and origin(other.own[name]) != origin(part):
             rule = f"takes the name {name!r} of {'.'.join(origin(other.own[name]))}"
-            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    if rule:
+        remedy = f'Write name = "..." in {origin(part)[1]}.'
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
 def origin(part: type[Part] | Part) -> tuple[str, str]:
@@ -85,27 +75,26 @@ def origin(part: type[Part] | Part) -> tuple[str, str]:
     return kind.__module__, kind.__qualname__
 
 
-def _check_field(slot: Slot, part: type[Part], name: str, owners: Mapping[str, type[Part]]) -> None:
-    stated = part.__dataclass_fields__[name]
-    if not has_meaning(stated):
-        rule, remedy = "says neither what it is nor its rule", "State it by number() or flag()."
-        raise InvalidValue(_field_of(part), name, rule, remedy=remedy)
-    if not is_name(name):
-        rule = "must be a Python identifier, its accents composed (NFC)"
-        raise InvalidValue(_field_of(part), name, rule)
-    owner = owners.get(name)
-    if owner is not None:
-        # a part of one's own may rule out more
-        same = stated.metadata["about"] == owner.__dataclass_fields__[name].metadata["about"]
-        if not same or owner not in slot.choices.values():
-            common = name in slot.base.__dataclass_fields__
-            raise _taken(part, name, f"every {slot.long_name}" if common else owner.name)
-
-
-def _field_of(part: type[Part]) -> str:
-    return f"field of {part.__qualname__}"
-
-
-def _taken(part: type[Part], name: str, whose: str) -> InvalidValue:
-    rule = f"is the name of something else, of {whose}"
-    return InvalidValue(_field_of(part), name, rule, remedy="Give it another name.")
+def _check_fields(
+    slot: Slot, part: type[Part], taken: set[str], owners: Mapping[str, type[Part]]
+) -> None:
+    """Refuse fields that say nothing of themselves, or have the name of something else."""
+    what, remedy = f"field of {part.__qualname__}", "Give it another name."
+    for stated in fields(part):
+        name, about, owner = stated.name, stated.metadata.get("about"), owners.get(stated.name)
+        if about is None:
+            rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
+            raise InvalidValue(what, name, rule, remedy=state)
+        if not is_name(name):
+            rule = "must be a Python identifier, its accents composed (NFC)"
+            raise InvalidValue(what, name, rule)
+        whose = "every scene" if owner is None and name in taken else ""
+        if owner is not None:
+            # a part of one's own may rule out more
+            same = about == owner.__dataclass_fields__[name].metadata["about"]
+            if not same or owner not in slot.choices.values():
+                common = name in slot.base.__dataclass_fields__
+                whose = f"every {slot.long_name}" if common else owner.name
+        if whose:
+            rule = f"is the name of something else, of {whose}"
+            raise InvalidValue(what, name, rule, remedy=remedy)

@@ -18,7 +18,7 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 else:  # parts name it in annotations only, and a scene is made of them
     Scene = Any
 
+#: Rules of most fields.
+POSITIVE, NOT_NEGATIVE, _FLAG = (
+    "must be greater than 0",
+    "must be 0 or greater",
+    "must be true or false",
+)
 #: Names that members of a user's own part may still bear.
 _FORMER_NAMES = {
     "resting": "steady_states",
@@ -109,16 +115,18 @@ def number(
     symbol: str,
     units: str,
     long_name: str,
+    scale: str = "",
     *,
     rule: str = "",
     remedy: str = "",
-    scale: str = "",
     if_stated: bool = False,
 ) -> Any:
     """A field that holds a number: its default, what it means, and its rule, a key of `RULES`; and
     whether it is among the values of a scene only if it was stated. What came later than files that
     are to keep their names is so.
     """
+    if rule not in RULES:
+        raise InvalidValue("rule", rule, "is unknown", choices=RULES)
     about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
     metadata = {"about": about, "rule": rule, "remedy": remedy, "if_stated": if_stated}
     return field(default=default, metadata=metadata)
@@ -130,21 +138,15 @@ def flag(default: bool, long_name: str) -> Any:
     return field(default=default, metadata={"about": about, "rule": _FLAG, "remedy": ""})
 
 
-_FLAG = "must be true or false"
 #: What numbers may have to be.
 RULES: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
-    "must be greater than 0": lambda value: value > 0.0,
-    "must be 0 or greater": lambda value: value >= 0.0,
+    POSITIVE: lambda value: value > 0.0,
+    NOT_NEGATIVE: lambda value: value >= 0.0,
     "must be greater than -1": lambda value: value > -1.0,
     "must be -1 or greater": lambda value: value >= -1.0,
     "must lie between 0 and 1": lambda value: 0.0 <= value <= 1.0,
 }
-
-
-def has_meaning(stated: Field[Any]) -> bool:
-    """True if a field was made by `number` or `flag`."""
-    return "about" in stated.metadata and stated.metadata["rule"] in (*RULES, _FLAG)
 
 
 def is_flag(part: type[Part], name: str) -> bool:
@@ -153,9 +155,12 @@ def is_flag(part: type[Part], name: str) -> bool:
 
 
 def names_of(part: type[Part]) -> tuple[str, ...]:
-    """Names of the fields that a part brings to a scene: those made by `number` or `flag`."""
+    """Names of the fields that a part brings to a scene, made by `number` or `flag`: first that
+    which calls for it, if one does. Cells of journals are known by their fields in this order.
+    """
     if part not in _NAMES:
-        _NAMES[part] = tuple(f.name for f in fields(part) if "about" in f.metadata)
+        names = (f.name for f in fields(part) if "about" in f.metadata)
+        _NAMES[part] = tuple(sorted(names, key=lambda name: name != part.called_by))
     return _NAMES[part]
 
 

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from inspect import Parameter, signature
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
-from rsfstudy.slider.numbers import SPRING, Slider
+from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.synonyms import law_name
@@ -50,6 +50,10 @@ class Slot:
     default: str
     long_name: str
     own: dict[str, Own] = field(default_factory=dict)
+
+    def takes(self, kind: type[Part]) -> bool:
+        """True if a class is one of parts that fill it."""
+        return issubclass(kind, self.base)
 
     @cached_property
     def callers(self) -> Mapping[str, type[Part]]:
@@ -98,14 +102,10 @@ IF_STATED: frozenset[str] = frozenset(
     for name, part in OWNERS.items()
     if part.__dataclass_fields__[name].metadata.get("if_stated")
 )
-#: Those that name what fills a slot.
-SLOT_FIELDS: frozenset[str] = frozenset(slot.name for slot in NAMED)
 #: What names a part of the user's own in each slot.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Those that call for a part by their values.
 CALLERS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.callers)
-#: Those that decide neither what fills a slot nor which of two fields sets the spring.
-PLAIN_FIELDS: frozenset[str] = frozenset(FIELDS) - {*SLOT_FIELDS, *CALLERS, *SPRING}
 #: What they mean.
 QUANTITIES: tuple[Quantity, ...] = (
     *(Quantity(slot.name, "", "", slot.long_name) for slot in NAMED),
@@ -113,35 +113,11 @@ QUANTITIES: tuple[Quantity, ...] = (
 )
 
 
-def _kind(name: str) -> Any:
-    """Type of a field of a scene; with None where the part that owns it was not chosen."""
-    part = OWNERS[name]
-    kind = get_type_hints(part)[name]
-    chosen = (
-        part is Slider
-        or name == part.called_by
-        or all(
-            name in names_of(choice)
-            for slot in SLOTS
-            for choice in slot.choices.values()
-            if part in slot.choices.values()
-        )
-    )
-    return kind if chosen else kind | None
-
-
-#: What the fields hold.
-KINDS: Mapping[str, Any] = {slot.name: str for slot in NAMED} | {n: _kind(n) for n in OWNERS}
-
-
 def defaults() -> dict[str, Any]:
     """What a scene may state, and what is meant where it does not."""
-    choices = {slot.name: slot.default for slot in NAMED}
-    fields = ((name, OWNERS.get(name)) for name in FIELDS)
-    return {
-        name: choices[name] if part is None else part.__dataclass_fields__[name].default
-        for name, part in fields
-    } | {slot.name: None for slot in SLOTS if slot not in NAMED}
+    choices = {slot.name: slot.default if slot in NAMED else None for slot in SLOTS}
+    fields = {name: part.__dataclass_fields__[name].default for name, part in OWNERS.items()}
+    return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELDS, *choices))}
 
 
 def completed(*more: str) -> Callable[[F], F]:
@@ -173,7 +149,7 @@ def kind_of(part: Own) -> type[Part]:
 
 def slot_of(kind: type[Part]) -> Slot:
     """The slot that parts of a class fill."""
-    return next(slot for slot in SLOTS if issubclass(kind, slot.base))
+    return next(slot for slot in SLOTS if slot.takes(kind))
 
 
 def resolve(slot: Slot, part: Any) -> Own:
@@ -185,7 +161,7 @@ def resolve(slot: Slot, part: Any) -> Own:
         Where it cannot fill the slot.
     """
     found: Own = part
-    if part in slot.choices.values() and slot.name in SLOT_FIELDS:
+    if part in slot.choices.values() and slot in NAMED:
         return found
     if isinstance(part, Stated) and slot.base is loading.Loading:
         own.check_name(slot, part, SLOTS)
@@ -202,7 +178,6 @@ def register(parts: Iterable[Own]) -> None:
         if slot.own.get(part.name) is not part:
             slot.own[part.name] = part
             _CHECKED.add(kind_of(part))
-            _without_meaning.cache_clear()
 
 
 def name_of(field: str, value: Any) -> Any:
@@ -265,16 +240,23 @@ def quantities_with(parts: Iterable[Own]) -> Iterator[Quantity]:
 
 
 def kinds_with(parts: Iterable[Own]) -> Mapping[str, Any]:
-    """Types of those fields; with None, where the part stands for another that owns them."""
-    kinds: dict[str, Any] = {**dict.fromkeys(SLOT_NAMES, str), **KINDS}
+    """Types of those fields; with None, where a part that fills the slot does without."""
+    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
     classes = tuple(map(kind_of, parts))
-    for part in classes:
-        others = slot_of(part).choices.values()
-        kinds |= {n: KINDS[n] | None for other in others for n in names_of(other)}
-        for name in names_of(part):
-            own_kind = (bool if is_flag(part, name) else float) | None
-            kinds[name] = KINDS.get(name, own_kind)
+    filling: list[tuple[type[Part], ...]] = [(Slider,)]
+    filling += [(*slot.choices.values(), *filter(slot.takes, classes)) for slot in SLOTS]
+    for every in filling:
+        for part in every:
+            for name in names_of(part):
+                kind: Any = bool if is_flag(part, name) else float
+                stated = name == part.called_by or all(name in names_of(one) for one in every)
+                default = part.__dataclass_fields__[name].default
+                kinds[name] = kind if stated and default is not None else kind | None
     return {name: kinds[name] for name in fields_with(classes)}
+
+
+#: What the fields of scenes without such parts hold.
+KINDS = kinds_with(())
 
 
 def shown(
@@ -292,44 +274,3 @@ def shown(
     for name, value in values.items():
         if value is not None:
             yield about.get(name, Quantity(name, "", "", "")), value
-
-
-# ---- which fields have a meaning -----------------------------------------------------------------
-
-
-def without_meaning(values: Mapping[str, Any], parts: Iterable[Own] = ()) -> frozenset[str]:
-    """Fields that belong to other parts than those that values name.
-
-    Parameters
-    ----------
-    values : mapping of str to value
-    parts : iterable of type or Stated
-        Parts of the user's own that may be among those.
-    """
-    try:
-        calling = tuple(name for name in CALLERS if values.get(name))
-        return _without_meaning(
-            tuple(values.get(slot.name) for slot in SLOTS), calling, tuple(map(kind_of, parts))
-        )
-    except (TypeError, ValueError):  # what is no name or number, and cannot be looked up as one
-        return frozenset()
-
-
-@cache
-def _without_meaning(
-    named: tuple[Any, ...], calling: tuple[str, ...], parts: tuple[type[Part], ...]
-) -> frozenset[str]:
-    names: set[str] = set()
-    for slot, name in zip(SLOTS, named, strict=True):
-        text = isinstance(name, str)
-        part = (slot.choices.get(name) or slot.own.get(name)) if text else name
-        meant, every = (FIELDS if part is None else names_of(kind_of(part))), part is not None
-        if name is None and slot.callers:
-            called = [slot.callers[caller] for caller in calling if caller in slot.callers]
-            # of two that are called for, one is refused
-            meant = (*names_of([*called, slot.choices[slot.default]][0]), *slot.callers)
-            every = True
-        others = [other for other in parts if slot_of(other) is slot]
-        others += slot.choices.values() if every else []
-        names |= {name for other in others for name in names_of(other)} - set(meant)
-    return frozenset(names)

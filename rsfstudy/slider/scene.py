@@ -264,7 +264,7 @@ class Scene(ShownAsTable):
             return self.with_numbers(changes)
         theirs = assembly.own_parts(self.parts)
         kept = {**self.as_dict(), **theirs}
-        for name in registry.without_meaning({**kept, **changes}, theirs.values()):
+        for name in assembly.without_meaning({**kept, **changes}, theirs.values()):
             kept.pop(name, None)
         if any(changes.get(name) is not None for name in SPRING):
             kept |= dict.fromkeys(SPRING)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import Friction
-from rsfstudy.slider.parts import Function, Numbers, Scene, number
+from rsfstudy.slider.parts import NOT_NEGATIVE, Function, Numbers, Scene, number
 from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
 
 _MOST_ITERATIONS = 200
@@ -100,8 +100,8 @@ class RadiationDamping(Dynamics):
         r"$\eta V_*/\sigma_*$",
         "1",
         "stress that waves carry away at V_star",
-        rule="must be 0 or greater",
-        scale="sigma_*",
+        "sigma_*",
+        rule=NOT_NEGATIVE,
     )
 
     name = "radiation_damping"

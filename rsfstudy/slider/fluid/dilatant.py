@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_threshold
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
 
 
@@ -58,17 +58,17 @@ class Dilatant(Fluid):
         r"$\epsilon/(\beta\sigma_*)$",
         "1",
         "pore pressure that undrained dilatancy takes for each unit of ln V",
-        rule="must be 0 or greater",
-        scale="sigma_*",
+        "sigma_*",
+        rule=NOT_NEGATIVE,
     )
     drainage: float = number(
         1.0,
         "$c^*D_c/V_*$",
         "1",
         "rate at which pore pressure drains",
-        rule="must be greater than 0",
+        "V_*/D_c",
+        rule=POSITIVE,
         remedy="Nearly undrained is a small number, and without drainage there is no steady state.",
-        scale="V_*/D_c",
     )
 
     name = "dilatant"

@@ -14,7 +14,17 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from rsfstudy.slider.parts import Function, Numbers, Part, Scene, flag, found_in, number
+from rsfstudy.slider.parts import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Function,
+    Numbers,
+    Part,
+    Scene,
+    flag,
+    found_in,
+    number,
+)
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.
@@ -33,7 +43,7 @@ def cutoff_velocity() -> Any:
         "$V_c/V_*$",
         "1",
         "cut-off velocity of the evolution effect",
-        rule="must be greater than 0",
+        rule=POSITIVE,
         remedy="For a law without a cut-off, set law.",
     )
 
@@ -59,7 +69,7 @@ class LawOfStates(Part):
         "$c$",
         "1",
         "effect of shear stress on the state variable",
-        rule="must be 0 or greater",
+        rule=NOT_NEGATIVE,
         remedy="Zero leaves the effect out.",
     )
     regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
@@ -151,12 +161,7 @@ class Law(LawOfStates):
     is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`.
     """
 
-    b_over_a: float = number(
-        2.0,
-        "$b/a$",
-        "1",
-        "ratio of evolution effect to direct effect",
-    )
+    b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
     def numbers(self, scene: Scene) -> Numbers:
         """b; of no effect at all, one that nothing feels, because equations divide by it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.laws import GIVE_STIFFNESS, LawOfStates, lacks_threshold
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LAW
 
 #: Places of the numbers of the law: b of each state, the part each has in what stress takes from
@@ -49,7 +49,7 @@ class TwoStates(LawOfStates):
         "$L_2/D_c$",
         "1",
         "slip distance of the second state over that of the first",
-        rule="must be greater than 0",
+        rule=POSITIVE,
     )
 
     states = 2

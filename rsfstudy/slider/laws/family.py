@@ -52,7 +52,6 @@ class Family(Law):
         "1",
         "exponent of the law: 0 is the slip law, 1 the slowness law",
         rule="must lie between 0 and 1",
-        remedy="0 is the slip law, 1 the slowness law.",
     )
 
     name = "family"

@@ -7,11 +7,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.parts import Function, Numbers, Part, Scene, found_in, number
+from rsfstudy.slider.parts import (
+    NOT_NEGATIVE,
+    Function,
+    Numbers,
+    Part,
+    Scene,
+    found_in,
+    number,
+)
 
 #: Most segments of a history that is stated by their number.
 MOST_SEGMENTS = 100_000
@@ -170,19 +178,32 @@ class Loading(Part):
         return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy=remedy)
 
 
-def last_velocity() -> Any:
-    """The field of the load point velocity that a history of several segments ends with, or that a
-    step leads to.
-    """
+def velocity_ratio() -> Any:
+    """The field of the load point velocity that a history ends with, or is of."""
     return number(
         None,
         "$V_0/V_*$",
         "1",
         "load point velocity after the step",
-        rule="must be 0 or greater",
+        "V_*",
+        rule=NOT_NEGATIVE,
         remedy="0 holds the load point.",
-        scale="V_*",
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtVelocity(Loading):
+    """Base of the histories that end with a load point velocity, or are of one: V_* unless
+    stated.
+    """
+
+    if TYPE_CHECKING:  # each states it, so that fields stay in the order that files know
+        load_velocity_ratio: float | None
+
+    @property
+    def load_velocity(self) -> float:
+        """V_0/V_*, but for what oscillates."""
+        return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 
 
 def refuse_fluid(scene: Scene, name: str, value: object) -> None:

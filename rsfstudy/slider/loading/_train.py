@@ -7,56 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
-from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.loading import AtVelocity, Loading, Segment, velocity_ratio
+from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
-
-
-def period() -> Any:
-    """The field of the period."""
-    return number(
-        10.0,
-        r"$T_o V_*/D_c$",
-        "1",
-        "period of the oscillation of imposed normal stress",
-        rule="must be greater than 0",
-        scale="D_c/V_*",
-    )
-
-
-def begin() -> Any:
-    """The field of the time at which it begins."""
-    return number(
-        None,
-        r"$t_b V_*/D_c$",
-        "1",
-        "time at which the oscillation begins",
-        rule="must be 0 or greater",
-        remedy="0 is at once.",
-        scale="D_c/V_*",
-        if_stated=True,
-    )
-
-
-def phase() -> Any:
-    """The field of the phase."""
-    about = "angle by which the oscillation is ahead of a sine where it begins"
-    return number(None, r"$\phi_o$", "degree", about, if_stated=True)
-
-
-def cycles() -> Any:
-    """The field of the number of cycles."""
-    return number(
-        None,
-        "$N_o$",
-        "1",
-        "number of cycles after which the oscillation ends",
-        rule="must be greater than 0",
-        remedy="Leave it out for one that goes on for ever.",
-        if_stated=True,
-    )
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
@@ -90,20 +44,48 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train(Loading):
+class Train(AtVelocity):
     """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated: a
     harmonic pair of unknowns.
     """
 
+    oscillation_period: float = number(
+        10.0,
+        r"$T_o V_*/D_c$",
+        "1",
+        "period of the oscillation of imposed normal stress",
+        "D_c/V_*",
+        rule=POSITIVE,
+    )
+    load_velocity_ratio: float | None = velocity_ratio()
+    oscillation_begin: float | None = number(
+        None,
+        r"$t_b V_*/D_c$",
+        "1",
+        "time at which the oscillation begins",
+        "D_c/V_*",
+        rule=NOT_NEGATIVE,
+        if_stated=True,
+    )
+    oscillation_phase: float | None = number(
+        None,
+        r"$\phi_o$",
+        "degree",
+        "angle by which the oscillation is ahead of a sine where it begins",
+        if_stated=True,
+    )
+    oscillation_cycles: float | None = number(
+        None,
+        "$N_o$",
+        "1",
+        "number of cycles after which the oscillation ends",
+        rule=POSITIVE,
+        remedy="Leave it out for one that goes on for ever.",
+        if_stated=True,
+    )
+
     auxiliary_rates = staticmethod(auxiliary_rates)
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
-
-    if TYPE_CHECKING:
-        oscillation_period: float
-        oscillation_begin: float | None
-        oscillation_phase: float | None
-        oscillation_cycles: float | None
-        load_velocity_ratio: float | None
 
     def check(self, scene: Scene) -> None:
         """Slow enough where there is no mass."""
@@ -112,11 +94,6 @@ class Train(Loading):
             rule = f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters"
             remedy = "Set inertia=True, or give a longer one."
             raise self.invalid("oscillation_period", rule, remedy)
-
-    @property
-    def mean_velocity(self) -> float:
-        """V_0/V_*, but for what oscillates."""
-        return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 
     @property
     def angle(self) -> float:
@@ -137,7 +114,7 @@ class Train(Loading):
     @property
     def segments(self) -> tuple[Segment, ...]:
         """What is before it, itself, and what follows."""
-        steady, begin = Segment(self.mean_velocity), self.oscillation_begin
+        steady, begin = Segment(self.load_velocity), self.oscillation_begin
         before = [steady._replace(duration=begin)] if begin else []
         after = [steady] if self.lasts < math.inf else []
         return (*before, steady._replace(duration=self.lasts), *after)

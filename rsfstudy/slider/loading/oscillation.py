@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.loading import _train, refuse_fluid
+from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,15 +23,9 @@ class Oscillation(_train.Train):
         r"$A$",
         "1",
         "amplitude of an oscillation of imposed normal stress",
-        rule="must be 0 or greater",
-        remedy="0 is no oscillation.",
-        scale="sigma_*",
+        "sigma_*",
+        rule=NOT_NEGATIVE,
     )
-    oscillation_period: float = _train.period()
-    load_velocity_ratio: float | None = last_velocity()
-    oscillation_begin: float | None = _train.begin()
-    oscillation_phase: float | None = _train.phase()
-    oscillation_cycles: float | None = _train.cycles()
 
     name = "oscillation"
     called_by = "oscillation_amplitude"

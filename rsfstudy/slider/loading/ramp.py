@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import Loading, Segment, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.loading import AtVelocity, Segment, refuse_fluid, velocity_ratio
+from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 
@@ -35,7 +35,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ramp(Loading):
+class Ramp(AtVelocity):
     """Change of imposed normal stress from steady sliding on, how long it takes, and load point
     velocity (V_* unless stated).
     """
@@ -45,20 +45,20 @@ class Ramp(Loading):
         r"$\Delta\sigma/\sigma_*$",
         "1",
         "change of imposed normal stress at a steady rate",
+        "sigma_*",
         rule="must be greater than -1",
         remedy="Normal stress stays positive: a fall is by less than all of it.",
-        scale="sigma_*",
     )
     ramp_duration: float = number(
         1.0,
         r"$t_r V_*/D_c$",
         "1",
         "time for which imposed normal stress changes",
-        rule="must be greater than 0",
+        "D_c/V_*",
+        rule=POSITIVE,
         remedy="A sudden change is normal_stress_step.",
-        scale="D_c/V_*",
     )
-    load_velocity_ratio: float | None = last_velocity()
+    load_velocity_ratio: float | None = velocity_ratio()
 
     name = "ramp"
     called_by = "normal_stress_ramp"
@@ -75,8 +75,7 @@ class Ramp(Loading):
     @property
     def segments(self) -> tuple[Segment, ...]:
         """The ramp, and what follows it."""
-        velocity = 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
-        last = Segment(velocity, normal_stress=self.normal_stress_ramp)
+        last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
     @property

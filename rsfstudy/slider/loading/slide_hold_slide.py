@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.loading import Loading, Segment, last_velocity
-from rsfstudy.slider.parts import number
+from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
+from rsfstudy.slider.parts import NOT_NEGATIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlideHoldSlide(Loading):
+class SlideHoldSlide(AtVelocity):
     """Hold time, and load point velocity on reloading (V_* unless stated)."""
 
     hold_time: float = number(
@@ -17,11 +17,10 @@ class SlideHoldSlide(Loading):
         "$t_h V_*/D_c$",
         "1",
         "time for which the load point is held",
-        rule="must be 0 or greater",
-        remedy="0 is no hold.",
-        scale="D_c/V_*",
+        "D_c/V_*",
+        rule=NOT_NEGATIVE,
     )
-    load_velocity_ratio: float | None = last_velocity()
+    load_velocity_ratio: float | None = velocity_ratio()
 
     name = "slide_hold_slide"
     called_by = "hold_time"
@@ -29,5 +28,4 @@ class SlideHoldSlide(Loading):
     @property
     def segments(self) -> tuple[Segment, ...]:
         """The hold, and the reloading."""
-        reload = 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
-        return Segment(0.0, duration=self.hold_time), Segment(reload)
+        return Segment(0.0, duration=self.hold_time), Segment(self.load_velocity)

@@ -6,28 +6,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.loading import Loading, Segment, last_velocity
+from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
 from rsfstudy.slider.parts import number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step(Loading):
+class Step(AtVelocity):
     """Load point velocity ``V_0(t) = V_0`` for t > 0, and change of displacement and normal stress
     in the step.
     """
 
-    load_velocity_ratio: float | None = last_velocity()
+    load_velocity_ratio: float | None = velocity_ratio()
     displacement_step: float = number(
-        0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", scale="D_c"
+        0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
     )
     normal_stress_step: float = number(
         0.0,
         r"$\Delta\sigma/\sigma_*$",
         "1",
         "sudden change of imposed normal stress",
+        "sigma_*",
         rule="must be greater than -1",
         remedy="Normal stress stays positive: a fall is by less than all of it.",
-        scale="sigma_*",
     )
 
     name = "step"
@@ -39,9 +39,9 @@ class Step(Loading):
         A scene that does not say otherwise holds its load point after a step of displacement or of
         normal stress (V_0 = 0) and otherwise goes on at the reference rate (V_0 = V_*).
         """
-        if self.load_velocity_ratio is None:
-            return 0.0 if self.displacement_step or self.normal_stress_step else 1.0
-        return self.load_velocity_ratio
+        if self.load_velocity_ratio is None and (self.displacement_step or self.normal_stress_step):
+            return 0.0
+        return super().load_velocity
 
     @property
     def imposes(self) -> bool:

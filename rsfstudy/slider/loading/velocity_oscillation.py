@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train, last_velocity, refuse_fluid
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.loading import _train, refuse_fluid
+from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,15 +24,9 @@ class VelocityOscillation(_train.Train):
         "$A_V$",
         "1",
         "amplitude of an oscillation of load point velocity, over its mean",
-        rule="must be 0 or greater",
-        remedy="0 is no oscillation.",
+        rule=NOT_NEGATIVE,
         if_stated=True,
     )
-    oscillation_period: float = _train.period()
-    load_velocity_ratio: float | None = last_velocity()
-    oscillation_begin: float | None = _train.begin()
-    oscillation_phase: float | None = _train.phase()
-    oscillation_cycles: float | None = _train.cycles()
 
     name = "velocity_oscillation"
     called_by = "velocity_oscillation"
@@ -49,10 +42,10 @@ class VelocityOscillation(_train.Train):
         if amplitude > 1.0 and not scene.parts.law.regularised:
             rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
-            raise InvalidValue("velocity_oscillation", amplitude, rule, remedy=remedy)
-        if self.mean_velocity == 0.0:
+            raise self.invalid("velocity_oscillation", rule, remedy)
+        if self.load_velocity == 0.0:
             rule = "must be greater than 0: velocity_oscillation is over it"
-            raise InvalidValue("load_velocity_ratio", self.mean_velocity, rule)
+            raise self.invalid("load_velocity_ratio", rule)
         refuse_fluid(scene, "velocity_oscillation", amplitude)
         super().check(scene)
 
@@ -67,5 +60,5 @@ class VelocityOscillation(_train.Train):
 
     def stress(self, scene: Scene) -> float:
         """K R."""
-        amplitude = (self.velocity_oscillation or 0.0) * self.mean_velocity
+        amplitude = (self.velocity_oscillation or 0.0) * self.load_velocity
         return scene.stiffness * amplitude / self.frequency

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import Scene, number
+from rsfstudy.slider.parts import POSITIVE, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,24 +21,24 @@ class VelocityRamp(Loading):
         r"$\Delta V_0/V_*$",
         "1",
         "change of load point velocity at a steady rate",
+        "V_*",
         rule="must be -1 or greater",
         remedy="-1 ends with a load point at rest.",
-        scale="V_*",
     )
     velocity_ramp_duration: float = number(
         10.0,
         r"$t_r V_*/D_c$",
         "1",
         "time for which load point velocity changes",
-        rule="must be greater than 0",
-        scale="D_c/V_*",
+        "D_c/V_*",
+        rule=POSITIVE,
     )
     velocity_ramp_stairs: float = number(
         64.0,
         "",
         "1",
         "number of stairs that stand for a ramp of load point velocity",
-        rule="must be greater than 0",
+        rule=POSITIVE,
     )
 
     name = "velocity_ramp"

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import Scene, number
+from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,15 +22,14 @@ class VelocitySteps(Loading):
         "",
         "1",
         "number of steps of load point velocity, there and back in turn",
-        rule="must be 0 or greater",
-        remedy="0 is no step.",
+        rule=NOT_NEGATIVE,
     )
     velocity_ratio: float = number(
         10.0,
         "$r$",
         "1",
         "load point velocity after the first step over V_star",
-        rule="must be greater than 0",
+        rule=POSITIVE,
         remedy="Below 1 the first step is down; hold_time holds the load point.",
     )
     displacement_between_steps: float = number(
@@ -38,8 +37,8 @@ class VelocitySteps(Loading):
         r"$\Delta\delta_0/D_c$",
         "1",
         "load point displacement from one step to the next",
-        rule="must be greater than 0",
-        scale="D_c",
+        "D_c",
+        rule=POSITIVE,
     )
 
     name = "velocity_steps"

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import Function, Numbers, number
+from rsfstudy.slider.parts import NOT_NEGATIVE, Function, Numbers, number
 from rsfstudy.slider.places import NORMAL_STRESS
 
 
@@ -42,11 +42,7 @@ class StateEffect(NormalStress):
     """Base of the cases in which normal stress changes: the strength `alpha` of the effect."""
 
     alpha: float = number(
-        0.56,
-        r"$\alpha$",
-        "1",
-        "normal stress effect on the state variable",
-        rule="must be 0 or greater",
+        0.56, r"$\alpha$", "1", "normal stress effect on the state variable", rule=NOT_NEGATIVE
     )
 
     @property

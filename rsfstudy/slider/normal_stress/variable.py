@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
-from rsfstudy.slider.parts import Numbers, Scene, number
+from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
 
 
@@ -41,7 +41,7 @@ class Variable(StateEffect):
         r"$\phi$",
         "degree",
         "angle between the driving stress and the fault normal",
-        rule="must be greater than 0",
+        rule=POSITIVE,
     )
 
     name = "variable"
