@@ -180,65 +180,45 @@ def rate_of_rigid(made: Friction) -> Function:
 # ---- points --------------------------------------------------------------------------------------
 
 
-def reading_of(made: Friction) -> Function:
-    """The friction coefficient ``(mu_* + f)/s`` that a rig reads, s outside the fault, and its
-    derivative, where f, g and the states change so.
+def point_of(made: Friction) -> Function:
+    """``(x, growth, forces, states, p) -> Point`` at x = ln(V/V_*), which grows so: of forces, f
+    and its change, g and its change, and of states, Psi and their changes.
+
+    A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
     """
+    strength, effective_stress = made.strength, made.effective_stress
+    steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
     stress, pressure = made.outer_stress, made.outer_pressure
     imposed, imposed_change = made.imposed, made.imposed_change
 
-    def reading(
-        spring_stress: float,
-        spring_change: float,
-        g: float,
-        g_change: float,
-        psis: Numbers,
-        changes: Numbers,
-        p: Numbers,
-    ) -> tuple[float, float]:
-        excess, slope = stress(g, psis, p)
-        pushed = imposed_change(changes)
-        ratio, ratio_change = 1.0 + excess, slope * (g_change + pushed) - pressure(changes)
-        read = (p[MU_STAR] + spring_stress + imposed(psis, p)) / ratio
-        return read, (spring_change + pushed - read * ratio_change) / ratio
-
-    return reading
-
-
-def point_of(made: Friction) -> Function:
-    """The point at x = ln(V/V_*), with its growth, f, g, the states, and what a rig reads."""
-    strength, effective_stress = made.strength, made.effective_stress
-    steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
-    imposed = made.imposed
-
     def point_at(
-        x: float,
-        growth: float,
-        spring_stress: float,
-        g: float,
-        psis: Numbers,
-        reading: tuple[float, float],
-        p: Numbers,
+        x: float, growth: float, forces: Numbers, psis: Numbers, changes: Numbers, p: Numbers
     ) -> Point:
+        f, f_change, g, g_change = forces
         _value, _slope, shift, _shift_slope = strength(g, psis, p)
-        ratio = 1.0 + effective_stress(g, psis, p)[0]
         steady = steady_states(x, shift, p)
         psi, distance = state_sum(psis), 0.0
         for i in range(count):
             distance = max(distance, abs(psis[i] - steady[i]))
+        ratio = 1.0 + effective_stress(g, psis, p)[0]
+        excess, slope = stress(g, psis, p)
+        pushed, pushed_change = imposed(psis, p), imposed_change(changes)
+        outside = 1.0 + excess
+        outside_change = slope * (g_change + pushed_change) - pressure(changes)
+        reading = (p[MU_STAR] + f + pushed) / outside
         return Point(
             x,
             growth,
-            spring_stress,
+            f,
             g,
             psi,
             psi - shift,
             psi - state_sum(steady),
             distance,
-            (p[MU_STAR] + g + imposed(psis, p)) / ratio,
+            (p[MU_STAR] + g + pushed) / ratio,
             ratio,
-            reading[0],
-            reading[1],
+            reading,
+            (f_change + pushed_change - reading * outside_change) / outside,
             psis,
         )
 
@@ -246,7 +226,7 @@ def point_of(made: Friction) -> Function:
 
 
 def point_between_ruptures(
-    made: Friction, balance: Function, growth: Function, reading: Function, point_at: Function
+    made: Friction, balance: Function, growth: Function, point_at: Function
 ) -> Function:
     """``(state, rates, p) -> Point`` between ruptures, where ``a dx = strength'(g) dg -
     contribution`` says how g changes.
@@ -255,41 +235,39 @@ def point_between_ruptures(
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         unknowns, changes = state[:end], rates[1:end]
-        spring_stress, psis = unknowns[0], unknowns[1:]
-        x, g, _shift = balance(spring_stress, psis, p)
+        f, psis = unknowns[0], unknowns[1:]
+        x, g, _shift = balance(f, psis, p)
         x_change = growth(unknowns, rates[:end], x, g, p)
         slope = strength(g, psis, p)[1]
         g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
-        read = reading(spring_stress, rates[0], g, g_change, psis, changes, p)
-        now: Point = point_at(x, x_change, spring_stress, g, psis, read, p)
+        now: Point = point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, p)
         return now
 
     return point
 
 
-def point_in_rupture(made: Friction, reading: Function, point_at: Function) -> Function:
+def point_in_rupture(made: Friction, point_at: Function) -> Function:
     """``(state, rates, p) -> Point`` of the full equations."""
     strength, states_at, end = made.strength, made.states_at, 2 + made.states
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
-        spring_stress, x, g, others = state[0], state[1], state[2], state[3:end]
+        f, x, g, others = state[0], state[1], state[2], state[3:end]
         psis = states_at(strength(g, others, p)[0], x, others, p)
-        read = reading(spring_stress, rates[0], g, rates[2], psis, rates[:end], p)
-        now: Point = point_at(x, rates[1], spring_stress, g, psis, read, p)
+        forces = f, rates[0], g, rates[2]
+        now: Point = point_at(x, rates[1], forces, psis, rates[:end], p)
         return now
 
     return point
 
 
-def point_of_rigid(made: Friction, reading: Function, point_at: Function) -> Function:
+def point_of_rigid(made: Friction, point_at: Function) -> Function:
     """``(state, rates, p) -> Point`` of a rigid slider, whose f is g."""
     strength, states_at = made.strength, made.states_at
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         g, others, x = state[0], state[1:], p[-1]
         psis = states_at(strength(g, others, p)[0], x, others, p)
-        read = reading(g, rates[0], g, rates[0], psis, rates, p)
-        now: Point = point_at(x, 0.0, g, g, psis, read, p)
+        now: Point = point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, p)
         return now
 
     return point
@@ -351,13 +329,13 @@ def system_of(
     made = friction_of(parts)
     balance, growth = slip_rate(made)
     against = against_displacement(made, balance, reverses=parts.regularised)
-    reading, point_at = reading_of(made), point_of(made)
-    point = point_between_ruptures(made, balance, growth, reading, point_at)
+    point_at = point_of(made)
+    point = point_between_ruptures(made, balance, growth, point_at)
     slow, full = Form(*rates_between_ruptures(made, against), point), None
     if rupture_rate is not None:
         rates = rates_in_rupture(made, rupture_rate(made))
-        full = Form(*rates, point_in_rupture(made, reading, point_at))
-    of_rigid = rate_of_rigid(made), point_of_rigid(made, reading, point_at)
+        full = Form(*rates, point_in_rupture(made, point_at))
+    of_rigid = rate_of_rigid(made), point_of_rigid(made, point_at)
     return System(made, balance, slow, full, *of_rigid)
 
 
