@@ -136,37 +136,29 @@ def _segment(stated: Any, normal_stress: float, place: str) -> Segment:
             if key not in KEYS:
                 raise InvalidValue("segment", key, "is unknown", choices=KEYS)
         if "normal_stress" in stated:
-            normal_stress = _excess(stated["normal_stress"])
-        return _checked(
-            _velocity(stated), stated.get("step", 0.0), _duration(stated), normal_stress
-        )
+            normal_stress = _positive(stated, "normal_stress", "greater than 0, and finite") - 1.0
+        velocity, duration = stated.get("velocity"), stated.get("duration", math.inf)
+        if velocity is None:
+            raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
+        if "distance" in stated:
+            distance = stated["distance"]
+            if "duration" in stated:
+                rule = f"give duration or distance (here {distance!r}), not both"
+                raise InvalidValue("duration", duration, rule)
+            distance = _positive(stated, "distance", "positive and finite")
+            duration = distance / _positive(
+                stated, "velocity", "positive where a distance is stated"
+            )
+        return _checked(velocity, stated.get("step", 0.0), duration, normal_stress)
     except InvalidValue as error:
         raise error.at(place) from error
 
 
-def _velocity(stated: Mapping[str, Any]) -> Any:
-    if "velocity" not in stated:
-        raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
-    return stated["velocity"]
-
-
-def _duration(stated: Mapping[str, Any]) -> Any:
-    if "distance" not in stated:
-        return stated.get("duration", math.inf)
-    distance, velocity = stated["distance"], stated["velocity"]
-    if "duration" in stated:
-        rule = f"give duration or distance (here {distance!r}), not both"
-        raise InvalidValue("duration", stated["duration"], rule)
-    _check("distance", distance, "must be positive and finite")
-    _check("velocity", velocity, "must be positive where a distance is stated")
-    return distance / velocity
-
-
-def _excess(normal_stress: Any) -> float:
-    """Imposed normal stress less its reference value, over that."""
-    rule = "must be greater than 0, and finite"
-    _check("normal_stress", normal_stress, rule)
-    return float(normal_stress) - 1.0
+def _positive(stated: Mapping[str, Any], name: str, what: str) -> float:
+    value = stated[name]
+    if not (_is_number(value) and 0.0 < value < math.inf):
+        raise InvalidValue(name, value, f"must be {what}")
+    return float(value)
 
 
 def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
@@ -182,11 +174,6 @@ def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Seg
         rule = "must be greater than -1: it is what imposed normal stress exceeds sigma_* by"
         raise InvalidValue("normal_stress", normal_stress, rule)
     return Segment(float(velocity), float(step), float(duration), float(normal_stress))
-
-
-def _check(name: str, value: Any, rule: str) -> None:
-    if not (_is_number(value) and math.isfinite(value) and value > 0.0):
-        raise InvalidValue(name, value, rule)
 
 
 def _is_number(value: Any) -> bool:
