@@ -129,7 +129,7 @@ def test_what_takes_fields_completes_them():
 def test_copies_share_a_critical_stiffness_only_where_friction_is_the_same(changes):
     scene = Scene(normal_stress="variable", stiffness_ratio=0.8)
     assert scene.critical_stiffness > 0.0
-    copy = scene.with_numbers(changes)
+    copy = scene.with_(**changes)
     anew = Scene(**{"normal_stress": "variable", "stiffness_ratio": 0.8, **changes})
     assert copy.critical_stiffness == anew.critical_stiffness
     assert copy.stiffness == anew.stiffness

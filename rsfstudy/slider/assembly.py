@@ -72,16 +72,17 @@ def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
 
 
 def _by_place(given: Mapping[str, Any], layout: Layout) -> dict[int, dict[str, Any]]:
-    """What fields hold, by the place of the part that owns them; not what is None."""
+    """What fields hold that are not None, by the place of the part that owns them."""
     values: dict[int, dict[str, Any]] = {}
     for name, value in given.items():
         place = layout.places.get(name)
-        if place is None and name in layout.refusing:
+        if place is not None:
+            if value is not None:
+                values.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
+        elif name in layout.refusing:
             if value is not None:
                 _refuse_unless_idle(name, value, layout.refusing[name])
-        elif place is not None and value is not None:
-            values.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
-        elif place is None and name not in SLOT_NAMES:
+        elif name not in SLOT_NAMES:
             raise _unknown_field(name, value, layout)
     return values
 
@@ -93,7 +94,7 @@ def _chosen(slot: Slot, given: Mapping[str, Any]) -> Own:
         return resolve(slot, value)
     if isinstance(value, str) and value in slot.own and value not in slot.choices:
         return slot.own[value]
-    if slot in NAMED:
+    if not slot.callers:
         name = name_of(slot.name, given.get(slot.name, slot.default))
         if not isinstance(name, str) or name not in slot.choices:
             choices = (*slot.choices, *slot.own)

@@ -5,7 +5,7 @@ checked when made.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import Parameter, Signature
@@ -209,7 +209,7 @@ class Scene(ShownAsTable):
         # what is not stated may follow from other fields
         stated = {name for name, value in self.as_dict().items() if value is not None}
         names = {*super().__dir__(), *stated} - _INNER
-        return sorted(name for name in names if not name.startswith("_"))
+        return [name for name in names if not name.startswith("_")]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Scene, (self.parts,)
@@ -261,18 +261,13 @@ class Scene(ShownAsTable):
         the place of its ratio, and the other way round.
         """
         if all(n in self.layout.plain and value is not None for n, value in changes.items()):
-            return self.with_numbers(changes)
+            return Scene(assembly.with_numbers(self.parts, changes))
         theirs = assembly.own_parts(self.parts)
         kept = {**self.as_dict(), **theirs}
-        for name in assembly.without_meaning({**kept, **changes}, theirs.values()):
-            kept.pop(name, None)
+        dropped = assembly.without_meaning({**kept, **changes}, theirs.values())
         if any(changes.get(name) is not None for name in SPRING):
-            kept |= dict.fromkeys(SPRING)
-        return Scene(**kept | changes)
-
-    def with_numbers(self, changes: Mapping[str, Any]) -> Scene:
-        """A copy with other numbers in fields of the parts it has, checked anew."""
-        return Scene(assembly.with_numbers(self.parts, changes))
+            dropped |= {*SPRING}
+        return Scene(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
     def without_mass(self) -> Scene:
         """This slider in quasi-static motion, if it has mass."""

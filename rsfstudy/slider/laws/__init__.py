@@ -206,7 +206,8 @@ def lacks_threshold(scene: Scene) -> bool:
     """True if the spring is given by its ratio to a critical stiffness that there is not: stable or
     unstable is then every spring.
     """
-    return scene.as_dict()["stiffness"] is None and not 0.0 < scene.critical_stiffness < math.inf
+    stated = scene.parts.slider.stiffness is not None
+    return not stated and not 0.0 < scene.critical_stiffness < math.inf
 
 
 PARTS = found_in(__name__, __path__)
