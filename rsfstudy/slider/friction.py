@@ -40,10 +40,8 @@ from rsfstudy.slider.places import (
 )
 from rsfstudy.slider.states import (
     contribution_of,
-    only,
     states_at_of,
     sum_of,
-    usual_steady_state,
     with_auxiliary,
     with_auxiliary_at_rest,
 )
@@ -323,8 +321,8 @@ class Parts(NamedTuple):
     ----------
     states : int
         How many states the law has.
-    evolution, evolutions, steady_states : callable or None
-        Of the law; either the first or the second.
+    evolutions, steady_states : callable
+        Of the law.
     state_effects : tuple of callable
         By how much stress lowers the state: of normal stress, of the law, of shear stress.
     regularised : bool
@@ -343,9 +341,8 @@ class Parts(NamedTuple):
     """
 
     states: int
-    evolution: Function | None
-    evolutions: Function | None
-    steady_states: Function | None
+    evolutions: Function
+    steady_states: Function
     state_effects: tuple[Function, ...]
     regularised: bool
     normal_stress: Function | None
@@ -367,10 +364,7 @@ def friction_of(parts: Parts) -> Friction:
     strength = strength_of(None if wet is constant_stress else wet, effect)
     if parts.regularised:
         strength = reversible(strength)
-    evolutions, steady_states = parts.evolutions, parts.steady_states or usual_steady_state
-    if evolutions is None:
-        assert parts.evolution is not None
-        evolutions = only(parts.evolution)
+    evolutions, steady_states = parts.evolutions, parts.steady_states
     if parts.auxiliary_rates is not None and parts.auxiliary_steady_states is not None:
         evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
         steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)

@@ -12,6 +12,7 @@ from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.places import A, B
 
 
+@cache
 def only(evolution: Function) -> Function:
     """``dPsi/d(delta)`` times a fraction, of a law of one state."""
 
