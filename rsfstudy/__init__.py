@@ -27,7 +27,11 @@ if TYPE_CHECKING:
     from rsfstudy.api.runs import studies as studies
     from rsfstudy.api.trajectory import simulate as simulate
     from rsfstudy.declare.axis import Axis as Axis
+    from rsfstudy.declare.claims import Claim as Claim
+    from rsfstudy.declare.figure import Figure as Figure
+    from rsfstudy.declare.figure import Panel as Panel
     from rsfstudy.declare.study import Study as Study
+    from rsfstudy.motion.accuracy import Accuracy as Accuracy
     from rsfstudy.plots._motion import picture as picture
     from rsfstudy.rig.history import history as history
     from rsfstudy.rig.laboratory import Laboratory as Laboratory
@@ -53,6 +57,9 @@ _GIVEN = {
     "plots._motion": ("picture",),
     "declare.study": ("Study",),
     "declare.axis": ("Axis",),
+    "declare.claims": ("Claim",),
+    "declare.figure": ("Figure", "Panel"),
+    "motion.accuracy": ("Accuracy",),
     "api.runs": ("run", "rerun", "cell", "open", "check", "compare", "plot", "studies"),
     "api.report": ("report",),
     "api.trajectory": ("simulate",),

@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy import Scene
+from rsfstudy import Accuracy, Scene
 from rsfstudy.analysis.after_step import settles
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.closed_forms import effective_friction

@@ -9,9 +9,8 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, level, reference_line
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, level, reference_line
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
@@ -305,13 +304,12 @@ def proportional(label: str) -> Claim:
 
 def cheapest(label: str, digits: float) -> Claim:
     """The default integrator against the best."""
-    return Claim(
+    return Claim.below(
         id="A2",
         statement=f"{label}: DOP853 takes up to 1.25 times the least work, {digits:g} digits",
         source="this project's choice of DOP853 in every regime",
         variable="cheapest_ratio",
         where={"problem": label, "digits": digits},
-        relation="below",
         published=1.25,
         reason="right-hand sides over those of the cheapest for the same error",
     )

@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Difference
@@ -188,7 +187,7 @@ figure = Figure(
 
 def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str) -> Claim:
     """C11: quasi-static slip stays bounded, its second peak lower than its first."""
-    return Claim(
+    return Claim.below(
         id="C11",
         statement=f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: decays",
         source=source,
@@ -199,7 +198,6 @@ def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str)
             "load_velocity_ratio": rate,
             "inertia": False,
         },
-        relation="below",
         published=1.0,
     )
 
@@ -284,23 +282,21 @@ study = Study(
             reason="0.05 of the offset of stress, as with other masses, and paths count as merged "
             "within 2e-3 of its range, 0.6 sigma_*",
         ),
-        Claim(
+        Claim.above(
             id="C18",
             statement="V_0 = 200 V_*: they merge on the segment of constant stress",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="paths_merging",
             where=LARGEST,
-            relation="above",
             published=0.0,
             reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
         ),
-        Claim(
+        Claim.above(
             id="C18",
             statement="V_0 = 200 V_*: with mass the slip is a rupture, beyond the norm 5e-4",
             source=f"{PAPER}, section 4",
             variable="max_log10_slip_rate",
             where={**LARGEST, "inertia": True},
-            relation="above",
             published=4.73,
             reason="an inequality: the norm V T/(2 pi D_c) = 5e-4 is at 10^4.73 V_*",
         ),

@@ -2,12 +2,10 @@
 
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.declare.figure import Axes
 
 from ._synthetic_fit import SyntheticFit
 from .law_identification import CHANCE, ScatterOverPromise

@@ -3,9 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.linear_stability import LinearStability
 
 from ._fluids import FAULT, REFERENCE, SEGALL_RICE
@@ -116,23 +115,21 @@ study = Study(
         vouched(0.002, 1e-3),
         vouched(0.004, 1.0),
         vouched(0.012, 1e3),
-        Claim(
+        Claim.below(
             id="D4",
             statement="E = 0.006 > b - a: stable almost everywhere undrained",
             source=SEGALL_RICE,
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1e-3},
-            relation="below",
             published=1e-4,
             reason="an inequality: a fiftieth of b - a",
         ),
-        Claim(
+        Claim.above(
             id="D4",
             statement="E = 0.006 > b - a: yet unstable at k = 0.75 (b - a) where c* D_c/V = 1",
             source=SEGALL_RICE,
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1.0},
-            relation="above",
             published=0.00375,
         ),
     ],

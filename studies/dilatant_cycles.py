@@ -3,11 +3,9 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 
 from ._fluids import FAULT, REFERENCE, SEGALL_RICE
 
@@ -109,13 +107,12 @@ study = Study(
         for claim in (
             peak(law, 0.0, "above", 9.0, "dynamic rupture"),
             peak(law, 0.008, "below", 2.5, "slow slip"),
-            Claim(
+            Claim.below(
                 id="D8",
                 statement=f"{law} law: slow cycles drop less than a fifth of the stress",
                 source=SEGALL_RICE,
                 variable="static_stress_drop",
                 where={"law": law, "drainage": 1.0, "dilatancy": 0.008},
-                relation="below",
                 published=0.05,
                 reason="an inequality; 0.24 to 0.27 without dilatancy",
             ),

@@ -5,11 +5,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.motion.accuracy import Accuracy
 
 from ._fluids import FAULT, REFERENCE, SEGALL_RICE
 
@@ -25,14 +22,13 @@ FAULTS: dict[str, dict[str, str | float]] = {
 
 def above_drained(fault: str, drainage: float, by: float) -> Claim:
     """D5: dilatancy stabilises."""
-    return Claim(
+    return Claim.above(
         id="D5",
         statement=f"{fault}, drainage {drainage:.3g}: {by:g} V_* more than drained",
         source=f"{SEGALL_RICE}: dilatancy opposes nucleation",
         variable="critical_velocity_ratio",
         where={"fault": fault, "drainage": drainage},
         minus={"fault": DRAINED, "drainage": drainage},
-        relation="above",
         published=by,
     )
 
@@ -77,17 +73,16 @@ study = Study(
     claims=[
         above_drained("dilatancy 0.002", 0.1, 1.0),
         above_drained("dilatancy 0.004", 1.0, 5.0),
-        Claim(
+        Claim.below(
             id="D6",
             statement="dilatancy 0.004: ten times faster drainage lowers the boundary",
             source=SEGALL_RICE,
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 10.0},
             minus={"fault": "dilatancy 0.004", "drainage": 1.0},
-            relation="below",
             published=-1.0,
         ),
-        Claim(
+        Claim.above(
             id="D6",
             statement="dilatancy 0.004, drainage 1: steady sliding is as if drained, to 12 %; the "
             "boundary is as if undrained, to 5 %",
@@ -95,7 +90,6 @@ study = Study(
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 1.0},
             minus={"fault": "dilatancy 0.004", "drainage": 0.1},
-            relation="above",
             published=-0.5,
             reason="an inequality, 5 % of the boundary",
         ),

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel, level, reference_line
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import level, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit, RelativeDifference
 

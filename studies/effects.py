@@ -9,12 +9,10 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Draw, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, Draw
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import RelativeDifference
@@ -179,13 +177,12 @@ figure = Figure(
 
 def loses(law: str, dynamics: str, published: float) -> Claim:
     """E1: radiation damping instead of mass loses part of the static drop."""
-    return Claim(
+    return Claim.above(
         id="E1",
         statement=f"{law} law: {dynamics} instead of mass loses part of the static drop",
         source="overshoot is the mass's: damped slip stops where the stress balances",
         variable="drop_lost_without_mass",
         where={"law": law, "coupling": "constant normal stress", "dynamics": dynamics},
-        relation="above",
         published=published,
     )
 
@@ -239,13 +236,12 @@ study = Study(
             tolerance=0.0,
             reason="spring stress and state; mass adds its unknown in ruptures only",
         ),
-        Claim(
+        Claim.below(
             id="E2",
             statement="full scene, slip law: the full equations take part of the work only",
             source="inertia is integrated where it acts",
             variable="share_in_rupture",
             where={"law": "slip", **FULL},
-            relation="below",
             published=0.9,
         ),
     ],

@@ -6,11 +6,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.declare.figure import Axes
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
 
@@ -94,13 +92,12 @@ shares = Panel(
 def covers(series: str, words: str, **where: str) -> list[Claim]:
     """Two claims of a series: intervals cover what they promise, within chance."""
     return [
-        Claim(
+        Claim.above(
             id=f"{series}{number}",
             statement=f"{words}: {100 * share:.1f} % intervals cover as much",
             source="this project's promise for the errors of fits",
             variable=f"share_{name.removeprefix('inside_')}_least",
             where=where,
-            relation="above",
             published=0.0,
             tolerance=CHANCE,
             reason="binomial standard deviations, of the parameter covered least",
@@ -111,13 +108,12 @@ def covers(series: str, words: str, **where: str) -> list[Claim]:
 
 def naive_fails(process: str, law: str) -> Claim:
     """F3: residuals taken for white noise make errors too small."""
-    return Claim(
+    return Claim.below(
         id="F3",
         statement=f"{process} noise, {law} law: naive 68.3 % intervals cover far less",
         source="of n samples with correlated noise fewer count",
         variable="naive_share_one_least",
         where={"process": process, "law": law},
-        relation="below",
         published=-CHANCE,
         reason="beyond chance",
     )

@@ -2,9 +2,7 @@
 
 from dataclasses import replace
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.figure import Figure
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Figure, Scene, Study
 
 from ._synthetic_fit import SyntheticFit
 from .fit_coverage import REDUCTIONS, covers, shares

@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import (
     LOGARITHMIC,
@@ -20,11 +20,9 @@ from rsfstudy.analysis.fitting.model import (
     parameters_of,
 )
 from rsfstudy.analysis.fitting.search import Search
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.status import Status
@@ -264,13 +262,12 @@ def comes_back(case: str, source: str) -> Claim:
         "other code": "a hundred times the errors of both motions, 1e-11, over the 5e-3 by which a "
         "slip distance moves friction: parameters trade off",
     }
-    return Claim(
+    return Claim.below(
         id="F4",
         statement=f"{case}: the parameters of a record by {source} come back",
         source="identity of model and record",
         variable="largest_deviation",
         where={"case": case, "record_by": source},
-        relation="below",
         published=LEAVES[source],
         reason=reasons[source],
     )

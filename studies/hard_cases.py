@@ -7,9 +7,8 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -17,7 +16,6 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.status import Status
@@ -376,13 +374,12 @@ study = Study(
     axes=[Axis("hard_case", {label: fields for label, (fields, _problem) in CASES.items()})],
     measure=HardCase(problems=tuple(problem for _fields, problem in CASES.values())),
     claims=[
-        Claim(
+        Claim.below(
             id="H1",
             statement=f"{label}: error below the 1e-7 asked for, switch between regimes included",
             source=known.EXTENDED,
             variable="measured_error",
             where={"hard_case": label},
-            relation="below",
             published=1e-7,
             reason="an inequality, against an independent computation",
         )

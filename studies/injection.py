@@ -8,9 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, level
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, level
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, level
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, level
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import Inverse
 

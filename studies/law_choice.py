@@ -6,10 +6,8 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
 
@@ -109,13 +107,12 @@ def told(law: str, design: str, size: float) -> Claim:
 
 def seldom_wrong(law: str) -> Claim:
     """L2: where noise hides it, a record is seldom taken for one of the other law."""
-    return Claim(
+    return Claim.below(
         id="L2",
         statement=f"{law} law, one step up, noise 0.005: fewer than half mislead",
         source="likelihood: the other law leads by e^2 in one record of nine at most",
         variable="chosen_wrong",
         where={"law": law, "design": "one step up", "noise_size": 5e-3},
-        relation="below",
         published=0.5,
         reason="four of six mislead by chance once in 500",
     )

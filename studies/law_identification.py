@@ -7,10 +7,8 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
 

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure
+from rsfstudy import Axis, Claim, Figure, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, RelativeDifference
 

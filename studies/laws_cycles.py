@@ -1,8 +1,6 @@
 """Laws: how much of stick-slip hangs on the state evolution law."""
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure
+from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import Difference, LinearFit, OverClosedForm
 

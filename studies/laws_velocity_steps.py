@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure
+from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import RelativeDifference
 
@@ -27,27 +25,25 @@ STIFF = {"normal_stress": "constant", "stiffness_ratio": 1.25}
 
 def order(smaller: str, larger: str) -> Claim:
     """L5: the faster the state falls above steady sliding, the smaller the critical step."""
-    return Claim(
+    return Claim.above(
         id="L5",
         statement=f"constant, k = 1.25 k_cr: step by {larger} above that by {smaller}",
         source="the faster the state falls above steady sliding, the smaller the step",
         variable="critical_velocity_ratio",
         where={"evolution": larger, **STIFF},
         minus={"evolution": smaller, **STIFF},
-        relation="above",
         published=0.0,
     )
 
 
 def lowered(law: str) -> Claim:
     """L6: what C7 says of the slip law."""
-    return Claim(
+    return Claim.above(
         id="L6",
         statement=f"{law}, k = 1.25 k_cr: variable normal stress lowers the critical step",
         source=f"{PAPER}, section 3.1, for the slip law",
         variable="lowering",
         where={"evolution": law, **STIFF, "normal_stress": "variable"},
-        relation="above",
         published=0.1,
         reason="an inequality; ours are 0.12 to 0.48",
     )
@@ -88,13 +84,12 @@ study = Study(
         order(MIDDLE, SLOWNESS),
         order(SLOWNESS, CUT_OFF),
         *map(lowered, (SLIP, MIDDLE, SLOWNESS, PERRIN, COMPOSITE, CUT_OFF, NAGATA)),
-        Claim(
+        Claim.below(
             id="L6",
             statement="slowness law, k = 1.75 k_cr: variable normal stress does not lower it",
             source="the end of what the paper finds for the slip law",
             variable="lowering",
             where={"evolution": SLOWNESS, "normal_stress": "variable", "stiffness_ratio": 1.75},
-            relation="below",
             published=0.0,
             reason="an inequality; ours is -0.03",
         ),

@@ -3,9 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit
 
@@ -30,14 +28,13 @@ def zeta(exponent: float) -> Claim:
 
 def below(exponent: float) -> Claim:
     """L8: what C7 says of the slip law."""
-    return Claim(
+    return Claim.below(
         id="L8",
         statement=f"eps = {exponent:g}: variable normal stress lowers zeta",
         source=f"{PAPER}, Fig. 5, for the slip law",
         variable="zeta",
         where={"law_exponent": exponent, "normal_stress": "variable"},
         minus={"law_exponent": exponent, "normal_stress": "constant"},
-        relation="below",
         published=0.0,
     )
 

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
 
 from ._paper import PAPER, REFERENCE
@@ -154,14 +153,13 @@ study = Study(
             tolerance=0.5,
             reason="'by 10 orders of magnitude'",
         ),
-        Claim(
+        Claim.above(
             id="C12",
             statement="slip law: larger stress drop with variable normal stress",
             source=f"{PAPER}, Fig. 9",
             variable="static_stress_drop",
             where=speaks_of("slip", "variable"),
             minus=speaks_of("slip", "constant"),
-            relation="above",
             published=0.0,
         ),
         Claim(
@@ -189,26 +187,24 @@ study = Study(
             for stress in ("constant", "variable")
         ),
         *(
-            Claim(
+            Claim.above(
                 id="C14",
                 statement=f"slowness law, {stress}: drops in acceleration and deceleration unequal",
                 source=f"{PAPER}, section 3.4, Fig. 11",
                 variable="drop_asymmetry",
                 where=speaks_of("slowness", stress),
-                relation="above",
                 published=1.5,
                 reason="'strongly asymmetrical'; 1 is symmetrical",
             )
             for stress in ("constant", "variable")
         ),
-        Claim(
+        Claim.above(
             id="C14",
             statement="constant normal stress: far more so than with the slip law",
             source=f"{PAPER}, section 3.4, Rice and Tse (1986)",
             variable="drop_asymmetry",
             where=speaks_of("slowness", "constant"),
             minus=speaks_of("slip", "constant"),
-            relation="above",
             published=1.0,
             reason="'different to the slip law', whose two drops are within a quarter of equal",
         ),

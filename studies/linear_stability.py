@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import Inverse, LinearFit
 from rsfstudy.slider.stability import critical_stiffness
@@ -43,14 +42,13 @@ def vouched(mass: str, phi: float, rate: float) -> Claim:
 
 def steepness(phi: float, gentler: float) -> Claim:
     """C1: steeper curves for smaller angles."""
-    return Claim(
+    return Claim.below(
         id="C1",
         statement=f"k_cr falls with V more steeply at {phi:g} than at {gentler:g} degrees",
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
         where={"mass": MASSLESS, "phi": phi},
         minus={"mass": MASSLESS, "phi": gentler},
-        relation="below",
         published=0.0,
     )
 
@@ -162,13 +160,12 @@ study = Study(
         ),
     ],
     claims=[
-        Claim(
+        Claim.below(
             id="C1",
             statement="phi = 60 degrees: k_cr falls with V",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stiffness_slope",
             where={"mass": MASSLESS, "phi": 60.0},
-            relation="below",
             published=0.0,
         ),
         steepness(50.0, 60.0),
@@ -189,33 +186,30 @@ study = Study(
         vouched(AS_PUBLISHED, 60.0, 1e6),
         vouched(HEAVY, 60.0, 1.0),
         vouched(HEAVY, 40.0, 100.0),
-        Claim(
+        Claim.above(
             id="C2",
             statement="phi = 40 degrees, V = 1e-4 V_*: mu_ss exceeds tan(phi) = 0.8391",
             source=f"{PAPER}, eq. 9",
             variable="steady_friction",
             where={"mass": MASSLESS, "phi": 40.0, "load_velocity_ratio": 1e-4},
-            relation="above",
             published=0.8391,
             reason="an inequality: no steady state there, while faster sliding has one",
         ),
-        Claim(
+        Claim.below(
             id="C2",
             statement="phi = 50: a spring of 0.8 k_cr(V_*) slides stably from below 1000 V_* on",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
             where={"mass": MASSLESS, "phi": 50.0},
-            relation="below",
             published=1000.0,
             reason="an inequality; the limit cycles of that spring end there too",
         ),
-        Claim(
+        Claim.above(
             id="C2",
             statement="phi = 60: it takes more than ten times the velocity at phi = 50",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
             where={"mass": MASSLESS, "phi": 60.0},
-            relation="above",
             published=1000.0,
             reason="'the curve is very flat'",
         ),

@@ -7,10 +7,8 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import quad
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, level
 
 from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_of

@@ -5,9 +5,8 @@
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, reference_line
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import ProportionalFit, RelativeDifference
 
@@ -119,23 +118,21 @@ study = Study(
             tolerance=1e-4,
             reason="the finite norm lowers it by 5e-5",
         ),
-        Claim(
+        Claim.below(
             id="C7",
             statement="alpha = 0.56: zeta < 1",
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
             where={"case": STRONG},
-            relation="below",
             published=1.0,
         ),
-        Claim(
+        Claim.below(
             id="C7",
             statement="zeta falls with alpha (0.56 less 0.25)",
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
             where={"case": STRONG},
             minus={"case": WEAK},
-            relation="below",
             published=0.0,
         ),
         lower(0.25, 0.07),

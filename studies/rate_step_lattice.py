@@ -5,9 +5,8 @@ import math
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.reduce import Boundary
 

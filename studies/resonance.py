@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel, level
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, level
 from rsfstudy.reduce import Inverse
 from rsfstudy.slider.stability import response_to_normal_stress
 
@@ -69,7 +67,7 @@ def is_linear(law: str, ratio: float, period: float) -> Claim:
 def resounds(law: str, period: float) -> Claim:
     """R2: the period of resonance."""
     at = {"law": law, "stiffness_ratio": RATIOS[0], "oscillation_amplitude": SMALL}
-    return Claim(
+    return Claim.above(
         id="R2",
         statement=f"{law} law, k = {RATIOS[0]:g} k_cr: gain is larger than at "
         f"{period / RESONANT:g} times the period",
@@ -77,7 +75,6 @@ def resounds(law: str, period: float) -> Claim:
         variable="gain",
         where={**at, "oscillation_period": RESONANT},
         minus={**at, "oscillation_period": period},
-        relation="above",
         published=0.0,
     )
 
@@ -104,7 +101,7 @@ def holds(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Cl
 def fails_earlier(softer: float, stiffer: float) -> Claim:
     """R4: the amplitude at which linear theory fails."""
     at = {"law": "slowness", "oscillation_period": RESONANT}
-    return Claim(
+    return Claim.below(
         id="R4",
         statement=f"slowness law: linear theory fails at a smaller amplitude at {softer:g} k_cr "
         f"than at {stiffer:g} k_cr",
@@ -112,7 +109,6 @@ def fails_earlier(softer: float, stiffer: float) -> Claim:
         variable="failing_amplitude",
         where={**at, "stiffness_ratio": softer},
         minus={**at, "stiffness_ratio": stiffer},
-        relation="below",
         published=0.0,
     )
 

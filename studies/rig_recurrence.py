@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import xarray as xr
 
-from rsfstudy import Axis, Laboratory, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Laboratory, Panel, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit
 
@@ -49,13 +47,12 @@ def falls(stress: float, drop: str, multiple: float) -> Claim:
 
 def falls_faster(stress: float) -> Claim:
     """S2: with the slowness law contact heals all the while."""
-    return Claim(
+    return Claim.below(
         id="S2",
         statement=f"slowness law, {stress:g} MPa: static drop falls faster still",
         source="contact heals at rest, for a time that goes with the drop",
         variable="static_slope",
         where={"law": "slowness", "sigma_star": stress},
-        relation="below",
         published=-2.0 * weakening,
     )
 

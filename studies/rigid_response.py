@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel, level
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import level
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.reduce import RelativeDifference
 from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
@@ -77,13 +76,12 @@ class Spread(Reduction):
 
 def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
     """C3, C4: variable normal stress slows the evolution."""
-    return Claim(
+    return Claim.below(
         id=claim,
         statement=f"{law} law, V = {rate:g} V_*: slower evolution with variable sigma",
         source=f"{PAPER}, {figure}",
         variable="slowing",
         where={"law": law, "normal_stress": "variable", "load_velocity_ratio": rate},
-        relation="below",
         published=0.0,
         reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
     )
@@ -159,23 +157,21 @@ study = Study(
     claims=[
         *(slower("slip", rate, "Fig. 3", "C3") for rate in (1e-4, 1e-2)),
         *(slower("slowness", rate, "Fig. 4", "C4") for rate in (1e-4, 1e-2)),
-        Claim(
+        Claim.above(
             id="C3",
             statement="slip law, 4 decades down: more stress evolves than upward",
             source=f"{PAPER}, section 2.3, Fig. 3",
             variable="evolution_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
-            relation="above",
             published=0.0,
             reason="an inequality, on stress less its future steady value, as the figure plots it",
         ),
-        Claim(
+        Claim.above(
             id="C3",
             statement="slip law, 4 decades down: higher direct stress change than upward",
             source=f"{PAPER}, section 2.3",
             variable="direct_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
-            relation="above",
             published=0.0,
             expected="differs",
             because=(
@@ -193,13 +189,12 @@ study = Study(
             tolerance=2.9e-4,
             reason="less than a line's width in the figure: 0.02 of its 37 a sigma_*",
         ),
-        Claim(
+        Claim.above(
             id="C4",
             statement="slowness law, variable: they become separate, by more than 0.5 a sigma_*",
             source=f"{PAPER}, section 2.3, Fig. 4",
             variable="separation",
             where={"law": "slowness", "normal_stress": "variable"},
-            relation="above",
             published=0.5 * 0.0145,
             reason="25 times that width",
         ),
@@ -223,13 +218,12 @@ study = Study(
             tolerance=0.01,
             reason="ln(1 + x) = x to x/2, over ln 1.05: a quarter of it at most",
         ),
-        Claim(
+        Claim.above(
             id="C5",
             statement="slowness law, constant, V = 200 V_*: far slower than eq. 17b",
             source=f"{PAPER}, section 3.4",
             variable="exponential_misfit",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
-            relation="above",
             published=0.3,
             reason="an inequality: at some slip, over 0.3 of the change is left beyond eq. 17b",
         ),

@@ -5,9 +5,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.healing import Healing
 from rsfstudy.reduce import DecadeFit
 
@@ -160,26 +158,24 @@ study = Study(
         *(peaks(ratio) for ratio in RATIOS),
         *(heals(ratio) for ratio in RATIOS),
         *(
-            Claim(
+            Claim.below(
                 id="P5",
                 statement=f"slip law: healing per decade falls from {soft:g} to {stiff:g} k_cr",
                 source="with the slip law a slider heals by the slip of its hold alone",
                 variable="healing_per_decade",
                 where={"case": SLIP, "stiffness": stiff * a},
                 minus={"case": SLIP, "stiffness": soft * a},
-                relation="below",
                 published=0.0,
             )
             for soft, stiff in ((1.5, 3.0), (3.0, 10.0), (10.0, 30.0))
         ),
-        Claim(
+        Claim.below(
             id="P5",
             statement="slip law, k = 3 k_cr: relaxation goes on from 1e6 to 1e8 D_c/V_*",
             source="with the slip law relaxation never ends",
             variable="relaxation",
             where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST},
             minus={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
-            relation="below",
             published=0.0,
         ),
     ],

@@ -10,12 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Boundary
 from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused

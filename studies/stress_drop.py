@@ -8,9 +8,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
 from rsfstudy.status import Status
@@ -53,13 +51,12 @@ def slope(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim
 
 def falls(case: str) -> Claim:
     """C16: slowness law drops fall with ln V_0."""
-    return Claim(
+    return Claim.below(
         id="C16",
         statement=f"slowness law, {case}: static drop falls with ln V_0",
         source=f"{PAPER}, section 3.5",
         variable="static_slope",
         where={"law": "slowness", "case": case, "stiffness_ratio": 0.8},
-        relation="below",
         published=0.0,
     )
 
@@ -185,24 +182,22 @@ study = Study(
         slope("dynamic", VARIABLE, 1.0, -weakening * enhancement, "(a-b)/(1 - mu_* cot phi)"),
         falls(CONSTANT),
         falls(VARIABLE),
-        Claim(
+        Claim.below(
             id="C16",
             statement="slowness law: steeper with variable normal stress",
             source=f"{PAPER}, section 3.5",
             variable="static_slope",
             where={"law": "slowness", "case": VARIABLE, "stiffness_ratio": 0.8},
             minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
-            relation="below",
             published=0.0,
         ),
-        Claim(
+        Claim.above(
             id="C16",
             statement="slowness law, constant: f(k) depends on stiffness (0.4 less 0.8 k_cr)",
             source="He et al. (2003), cited in section 3.5",
             variable="static_slope_scaled",
             where={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.4},
             minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
-            relation="above",
             published=0.05,
             reason="an inequality, well above the standard errors",
         ),
@@ -221,13 +216,12 @@ study = Study(
             tolerance=0.0,
             reason="the status no_limit_cycle: faster loading stabilises",
         ),
-        Claim(
+        Claim.below(
             id="C2",
             statement="phi = 50, 0.8 k_cr: the fit says how many of ten points it has",
             source=f"{PAPER}, section 2.2",
             variable="static_slope_points",
             where={"law": "slip", "case": STEEP, "stiffness_ratio": 0.8},
-            relation="below",
             published=10.0,
             reason="an inequality: cells without stick-slip are left out",
         ),

@@ -14,9 +14,8 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level, reference_line
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, Draw, level, reference_line
 from rsfstudy.reduce import LinearFit
 from rsfstudy.slider.closed_forms import effective_friction, normal_stress_step
 
@@ -80,14 +79,13 @@ def limit(law: str, case: str) -> Claim:
 def weaker(law: str) -> Claim:
     """N3: what Linker and Dieterich's effect does."""
     where = {"law": law, "stiffness_ratio": 0.5}
-    return Claim(
+    return Claim.below(
         id="N3",
         statement=f"{law} law, imposed, k = 0.5 k_cr: with alpha = 0.56 a larger fall is needed",
         source="Linker and Dieterich (1992): a fall of normal stress strengthens the state",
         variable="critical_normal_stress_step",
         where={**where, "case": IMPOSED},
         minus={**where, "case": PLAIN},
-        relation="below",
         published=-0.5 * base.a * (0.5 / FRICTION - 0.5 / base.mu_star),
         reason="an inequality: by more than half of what the first order says",
     )
@@ -229,23 +227,21 @@ study = Study(
             tolerance=1e-5,
             reason="a finite norm takes 2e-5 of either, and about the same",
         ),
-        Claim(
+        Claim.above(
             id="N5",
             statement="slip law, inclined, alpha = 0.56, k = 2 k_cr: it predicts to 3 %",
             source="what is left of the first order where it is worst",
             variable="coulomb_ratio",
             where={"law": "slip", "case": STRONG, "stiffness_ratio": 2.0},
-            relation="above",
             published=0.97,
             reason="an inequality; ours is 0.974",
         ),
-        Claim(
+        Claim.above(
             id="N6",
             statement="slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: it misleads",
             source="a fall also lowers the critical stiffness: h(u*) = -q k^",
             variable="coulomb_ratio",
             where={"law": "slowness", "case": STRONG, "stiffness_ratio": 1.25},
-            relation="above",
             published=2.0,
             reason="an inequality; ours is 2.40",
         ),

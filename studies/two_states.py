@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Draw, Figure, Panel, level
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes, Draw, level
 from rsfstudy.reduce import Boundary, Inverse
 from rsfstudy.status import Status
 
@@ -225,13 +223,12 @@ study = Study(
             tolerance=4e-3,
             reason="within 1e-4 k_cr of the doubling: a change of the multiplier by 4e-3",
         ),
-        Claim(
+        Claim.above(
             id="S5",
             statement="k = 0.8531 k_cr: small departures grow, in the mean: chaos",
             source=f"{BECKER}, finds chaos; for this spring not known to be published",
             variable="lyapunov_exponent",
             where=at(0.8531),
-            relation="above",
             published=0.1,
             reason="an inequality, well above what 32 events leave uncertain",
         ),

@@ -5,8 +5,7 @@ friction that strengthens with slip rate.
 import math
 from typing import Any
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
+from rsfstudy import Axis, Claim, Scene, Study
 from rsfstudy.measures.linear_stability import LinearStability
 
 GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"

@@ -6,11 +6,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Laboratory, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Laboratory, Panel, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.reduce import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.rig.reductions import InUnits
 
@@ -71,22 +69,20 @@ CLAIMS = (
             "where b - a is a fifth smaller"
         ),
     ),
-    Claim(
+    Claim.below(
         id="U2",
         statement="errors taken for independent would say over four times as much",
         source="propagation of errors to first order, without covariances",
         variable="relative_spread",
         where={},
-        relation="below",
         published=0.25 * AS_IF_INDEPENDENT,
     ),
-    Claim(
+    Claim.below(
         id="U3",
         statement="the interval is known better than b - a",
         source="contact heals at rest, by b ln t: not all of the drop goes with b - a",
         variable="relative_spread",
         where={},
-        relation="below",
         published=OF_NET,
     ),
     Claim(

@@ -5,9 +5,8 @@ import math
 import xarray as xr
 from scipy.integrate import quad
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel, level
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import level
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.reduce import OverClosedForm
 
@@ -54,13 +53,12 @@ def follows(law: str, ratio: float) -> Claim:
 
 def reads_too_little(law: str, ratio: float) -> Claim:
     """P7: the direct effect of a machine that is ten times as stiff as critical."""
-    return Claim(
+    return Claim.below(
         id="P7",
         statement=f"{law} law, {WAYS[ratio]}, k = 10 k_cr: a is read at least a tenth too small",
         source="evolution begins before the spring has loaded the slider",
         variable="apparent_a",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 10.0},
-        relation="below",
         published=0.9 * a,
     )
 

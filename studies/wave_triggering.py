@@ -5,10 +5,8 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Figure, Panel, level
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import level
 
 from ._clock_advance import LAWS, ClockAdvance
 
@@ -116,13 +114,12 @@ def forgets(amplitude: float) -> Claim:
 
 def misleads(law: str) -> Claim:
     """W5: what Coulomb's threshold misses of waves that are not slow."""
-    return Claim(
+    return Claim.above(
         id="W5",
         statement=f"{words(law, WAVES, 0.8)}, A = {LARGE:g}: delayed by more than a threshold says",
         source="an inequality: nucleation averages over a sigma/(k V_0)",
         variable="coulomb_ratio",
         where=place(law, WAVES, LARGE, 0.8),
-        relation="above",
         published=1.5,
         reason="an inequality; ours are 1.9 and 11",
     )

@@ -9,13 +9,11 @@ import numpy as np
 import xarray as xr
 from scipy.stats import norm
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.figure import Axes, Figure, Panel
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy.declare.figure import Axes
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import Logarithm, SobolIndices

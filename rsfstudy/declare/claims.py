@@ -107,6 +107,16 @@ class Claim:
                     rule = f"must be a text or a number, in claim {self.id}"
                     raise InvalidValue(name, value, rule)
 
+    @classmethod
+    def below(cls, **claim: Any) -> Claim:
+        """A claim that ours is below the published value; takes what `Claim` does."""
+        return cls(relation="below", **claim)
+
+    @classmethod
+    def above(cls, **claim: Any) -> Claim:
+        """A claim that ours is above the published value; takes what `Claim` does."""
+        return cls(relation="above", **claim)
+
     def describe(self) -> dict[str, Any]:
         """The claim as plain data."""
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}

@@ -44,12 +44,8 @@ CLASSES = {
     "Measure": "rsfstudy.measures",
     "Outcome": "rsfstudy.measures",
     "Output": "rsfstudy.quantity",
-    "Accuracy": "rsfstudy.motion.accuracy",
     "Reduction": "rsfstudy.reduce",
     "Stepper": "rsfstudy.motion.steppers",
-    "Figure": "rsfstudy.declare.figure",
-    "Panel": "rsfstudy.declare.figure",
-    "Claim": "rsfstudy.declare.claims",
 }
 
 
