@@ -1,5 +1,6 @@
 """Do the errors of a fit cover the truth? Synthetic velocity steps with noise of three kinds."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,7 +10,6 @@ import xarray as xr
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.figure import Axes
-from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
 
 from ._synthetic_fit import ONE, TWO, SyntheticFit
@@ -39,6 +39,10 @@ class ShareInside(Reduction):
 
     covers: float = ONE
     kind: ClassVar[str] = "share_inside"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "": "share of records with the truth inside",
+        "_least": "least share above what is promised, in standard deviations",
+    }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Mean over records."""
@@ -46,15 +50,6 @@ class ShareInside(Reduction):
         spread = np.sqrt(self.covers * (1.0 - self.covers) / dataset.sizes["seed"])
         least = (share.min("parameter") - self.covers) / spread
         return xr.Dataset({self.name: share, f"{self.name}_least": least})
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The share, and how far it is from what is promised."""
-        words = "least share above what is promised, in standard deviations"
-        return (
-            Quantity(self.name, "", "1", "share of records with the truth inside"),
-            Quantity(f"{self.name}_least", "", "1", words),
-        )
 
 
 def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:

@@ -1,5 +1,6 @@
 """Slip law or slowness law? How often a record tells, and how often it misleads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -8,7 +9,6 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import Axes
-from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
 
 from ._synthetic_fit import SyntheticFit
@@ -34,6 +34,11 @@ class Choice(Reduction):
     """
 
     kind: ClassVar[str] = "choice"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "_right": "share of records that tell the law that made them",
+        "_wrong": "share of records that tell the other law",
+        "_open": "share of records that tell neither law",
+    }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Over records."""
@@ -50,15 +55,6 @@ class Choice(Reduction):
                 f"{self.name}_wrong": (ahead < -DECIDES).mean("seed"),
                 f"{self.name}_open": (abs(ahead) <= DECIDES).mean("seed"),
             }
-        )
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The shares."""
-        words = {"right": "the law that made them", "wrong": "the other law", "open": "neither law"}
-        return tuple(
-            Quantity(f"{self.name}_{key}", "", "1", f"share of records that tell {text}")
-            for key, text in words.items()
         )
 
 

@@ -1,6 +1,7 @@
 """Which steps tell the evolution law? Its exponent, and how well, by three designs."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,7 +10,6 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import Axes
-from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
 
 from ._synthetic_fit import SyntheticFit
@@ -44,6 +44,10 @@ class ScatterOverPromise(Reduction):
 
     over: tuple[str, ...] = ("seed",)
     kind: ClassVar[str] = "scatter_over_promise"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "": "scatter of estimates over what is promised",
+        "_off": "scatter over what is promised, less 1, in standard deviations",
+    }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Over records."""
@@ -59,15 +63,6 @@ class ScatterOverPromise(Reduction):
 
     def _records(self, dataset: xr.Dataset) -> int:
         return math.prod(dataset.sizes[name] for name in self.over)
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The scatter, and how far it is from 1."""
-        words = "scatter over what is promised, less 1, in standard deviations"
-        return (
-            Quantity(self.name, "", "1", "scatter of estimates over what is promised"),
-            Quantity(f"{self.name}_off", "", "1", words),
-        )
 
 
 def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:

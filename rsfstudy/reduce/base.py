@@ -36,12 +36,15 @@ class Reduction:
     hold NaN in `dataset`, which has their `status`. Optional are what tells names and units, and
     what carries numerical errors of cells over to ``<name>_error``::
 
-        quantities: property -> Sequence[Quantity]
+        long_names: ClassVar[Mapping[str, str]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
     """
 
     #: Name of the kind in declarations.
     kind: ClassVar[str]
+    #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
+    #: in them is `name` in words.
+    long_names: ClassVar[Mapping[str, str]] = {}
     #: Whether it tells of cells that failed, which all others refuse to draw on.
     of_failures: ClassVar[bool] = False
 
@@ -69,8 +72,10 @@ class Reduction:
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Names and units of its results that the vocabulary does not hold."""
-        return ()
+        """Names and units of its results that the vocabulary does not hold: of `long_names`."""
+        words = {"name": self.name.replace("_", " ")}
+        given = self.long_names.items()
+        return [Quantity(f"{self.name}{end}", "", "1", t.format(**words)) for end, t in given]
 
     def describe(self) -> dict[str, Any]:
         """The reduction as plain data."""

@@ -9,7 +9,7 @@ samples were independent, which those of Sobol points and Latin hypercubes rarel
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -41,6 +41,10 @@ class _Statistic(Reduction):
     """
 
     over: str = "sample"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "_stderr": "standard error, by sampling, of {name}",
+        "_points": "samples with a number for {name}",
+    }
     #: What it is, in words.
     text: ClassVar[str]
 
@@ -52,14 +56,6 @@ class _Statistic(Reduction):
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The statistic, and its standard error."""
         raise TypeError(f"{type(self).__name__} is no statistic")
-
-    @property
-    def quantities(self) -> Sequence[Quantity]:
-        name = self.name.replace("_", " ")
-        return (
-            Quantity(f"{self.name}_stderr", "", "1", f"standard error, by sampling, of {name}"),
-            Quantity(f"{self.name}_points", "", "1", f"samples with a number for {name}"),
-        )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Reduce along the dimension of the samples.
@@ -201,15 +197,14 @@ class StatusShares(Reduction):
     over: str = "sample"
     kind: ClassVar[str] = "status_shares"
     of_failures: ClassVar[bool] = True
+    long_names: ClassVar[Mapping[str, str]] = {
+        "": "share of samples that ended so",
+        "_stderr": "standard error, by sampling, of {name}",
+    }
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        name = self.name.replace("_", " ")
-        return (
-            Quantity(self.name, "", "1", "share of samples that ended so"),
-            Quantity(f"{self.name}_stderr", "", "1", f"standard error, by sampling, of {name}"),
-            Quantity("ended", "", "", "status with which a sample ended"),
-        )
+        return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """Cells that are there, however they ended."""
