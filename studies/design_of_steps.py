@@ -2,45 +2,35 @@
 
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.figure import Axes
 
-from ._synthetic_fit import SyntheticFit
-from .law_identification import CHANCE, ScatterOverPromise
+from .law_identification import BACK, CHANCE, EXPONENT_FREE, FAMILY, STEP, ScatterOverPromise
 
 RECORDS, DISTANCE = 4, 10.0
-UP, DOWN, HOLD = "1:30, 10:270", "10:30, 1:270", "1:30, 0:1000 s, 1:270"
+HOLD = "1:30, 0:1000 s, 1:270"
 #: Rows of a step, and white noise.
 ROWS, NOISE = 500, 5e-4
 DESIGNS: dict[str, dict[str, str | float]] = {
-    "step up": {"protocol": UP},
-    "4 times the rows": {"protocol": UP, "rows": 4 * ROWS},
-    "half the noise": {"protocol": UP, "noise_size": 0.5 * NOISE},
-    "step back": {"protocol": DOWN},
+    "step up": {"protocol": STEP},
+    "4 times the rows": {"protocol": STEP, "rows": 4 * ROWS},
+    "half the noise": {"protocol": STEP, "noise_size": 0.5 * NOISE},
+    "step back": {"protocol": BACK},
     "hold": {"protocol": HOLD},
-    "two steps up": {"protocol": f"{UP}; {UP}"},
-    "up and back": {"protocol": f"{UP}; {DOWN}"},
-    "up and hold": {"protocol": f"{UP}; {HOLD}"},
+    "two steps up": {"protocol": f"{STEP}; {STEP}"},
+    "up and back": {"protocol": f"{STEP}; {BACK}"},
+    "up and hold": {"protocol": f"{STEP}; {HOLD}"},
 }
+SHOWN = ("a", "b", "slip_distance", "law_exponent")
 #: Stiffness over normal stress in 1/um.
 MACHINES = (1e-3, 3e-3)
 
 
-def mark_promises(dataset: xr.Dataset, axes: Axes) -> None:
-    """Standard errors promised for each design, by parameter."""
-    from rsfstudy.plots import look, marker, name_rows
-
-    promised = dataset["promised_spread"].isel(seed=0)
-    for number, name in enumerate(("a", "b", "slip_distance", "law_exponent")):
-        one = promised.sel(parameter=name)
-        label = MODEL[name].symbol
-        label = rf"$\ln$ {label}" if name in LOGARITHMIC else label
-        style = {"color": look(number)["color"], "marker": marker(number), "linestyle": "none"}
-        axes.plot(one, range(one.size), label=label, **style)
-    axes.set_xscale("log")
-    name_rows(axes, [str(name) for name in promised["design"].values])
+def symbol(row: xr.Dataset) -> str:
+    """That of a parameter, or of its logarithm where that is fitted."""
+    name = str(row["parameter"].item())
+    return rf"$\ln$ {MODEL[name].symbol}" if name in LOGARITHMIC else MODEL[name].symbol
 
 
 def machine(dataset: xr.Dataset) -> str:
@@ -51,9 +41,14 @@ def machine(dataset: xr.Dataset) -> str:
 figure = Figure(
     [
         Panel(
+            x="promised_spread",
+            y="design",
+            by=["parameter"],
             each=["stiffness"],
-            marks=[mark_promises],
+            at={"seed": 0, "parameter": lambda _names: list(SHOWN)},
+            name=symbol,
             title=machine,
+            log="x",
             x_label="Standard error promised",
             y_label="Experiment",
             x_limits=(1e-5, 0.3),
@@ -105,22 +100,13 @@ study = Study(
         "tells it better by one step, five times; four times as many rows tell as much as half "
         "the noise, twice as well. Fits of synthetic records keep what is promised."
     ),
-    base=Scene(
-        law="family",
-        law_exponent=0.5,
-        normal_stress="constant",
-        a=0.01,
-        b_over_a=1.3,
-        stiffness=0.03,
-    ),
+    base=FAMILY,
     axes=[
         Axis("design", {n: {"rows": ROWS, "noise_size": NOISE, **d} for n, d in DESIGNS.items()}),
         Axis("stiffness", [k * DISTANCE for k in MACHINES]),
         Axis("seed", list(range(RECORDS))),
     ],
-    measure=SyntheticFit(
-        free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
-    ),
+    measure=EXPONENT_FREE,
     reductions=[ScatterOverPromise("kept", "deviation", ("seed", "design"))],
     claims=[
         promise("step up", 3e-3, 0.087),
@@ -129,7 +115,7 @@ study = Study(
         promise("half the noise", 3e-3, 0.087 / 2.0),
         promise("up and back", 3e-3, 0.009),
         promise("two steps up", 3e-3, 0.062),
-        *(kept(k, name) for k in MACHINES for name in ("a", "b", "slip_distance", "law_exponent")),
+        *(kept(k, name) for k in MACHINES for name in SHOWN),
     ],
     plot=figure,
     accuracy=Accuracy(budget=50_000_000, engine="compiled"),

@@ -14,6 +14,8 @@ from rsfstudy.reduce.base import Reduction
 
 from ._synthetic_fit import ONE, TWO, SyntheticFit
 
+#: Of the studies that fit synthetic records.
+RIG = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
 RECORDS = 24
 PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
 #: Of which shares of records are told, with what Gaussian errors cover.
@@ -130,7 +132,7 @@ study = Study(
         "promise; those of the usual formula, which takes residuals for white noise (open "
         "markers), cover it far less often where noise is correlated."
     ),
-    base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03),
+    base=RIG,
     axes=[
         Axis("process", list(PROCESSES)),
         Axis("law", list(LAWS)),

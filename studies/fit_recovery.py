@@ -230,26 +230,25 @@ CASES = {
 }
 
 
-def mark_deviations(dataset: xr.Dataset, axes: Axes) -> None:
-    """Largest deviation of each case, by what made the record."""
-    from rsfstudy.plots import look, marker, name_rows
+def mark_allowed(dataset: xr.Dataset, axes: Axes) -> None:
+    """What the claims allow, by what made the record."""
+    from rsfstudy.plots import look
 
-    places = np.arange(dataset.sizes["case"])
     for number, source in enumerate(dataset["record_by"].values):
-        off = np.maximum(dataset["largest_deviation"].sel(record_by=source), 1e-16)
-        style = {"marker": marker(number), "color": look(number)["color"], "linestyle": ""}
-        axes.plot(off, places, label=str(source), **style)
-        axes.axvline(LEAVES[str(source)], color=style["color"], linestyle="--", linewidth=0.8)
-    name_rows(axes, [str(name) for name in dataset["case"].values])
-    axes.set_xscale("log")
+        colour = look(number)["color"]
+        axes.axvline(LEAVES[str(source)], color=colour, linestyle="--", linewidth=0.8)
 
 
 figure = Figure(
     [
         Panel(
-            marks=[mark_deviations],
+            x=lambda row: row["largest_deviation"].clip(min=1e-16),
+            y="case",
+            by=["record_by"],
+            marks=[mark_allowed],
             y_label="Record",
             x_label="Largest deviation of a parameter",
+            log="x",
         )
     ]
 )

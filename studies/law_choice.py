@@ -7,11 +7,12 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
 from ._synthetic_fit import SyntheticFit
+from .fit_coverage import RIG
 
 RECORDS = 6
 LAWS = ("slip", "slowness")
@@ -123,7 +124,7 @@ study = Study(
         "tells the law. At ten times that noise a step leaves it open, and a pair, up and back, "
         "tells it."
     ),
-    base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03),
+    base=RIG,
     axes=[
         Axis("law", list(LAWS)),
         Axis("fitted_law", list(LAWS)),

@@ -8,11 +8,12 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Derivatives, Reduction
 
 from ._synthetic_fit import SyntheticFit
+from .fit_coverage import RIG
 
 RECORDS = 12
 STEP, BACK = "1:30, 10:270", "10:30, 1:270"
@@ -25,6 +26,12 @@ DESIGNS = {
 PROMISED = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
 #: Standard deviations of chance.
 CHANCE = 3.5
+#: A law halfway between slip and slowness, whose exponent is fitted.
+EXPONENT = 0.5
+FAMILY = RIG.with_(law="family", law_exponent=EXPONENT)
+EXPONENT_FREE = SyntheticFit(
+    free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
+)
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,6 @@ def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
     axes.axhline(EXPONENT, color="0.6", linewidth=0.8)
 
 
-EXPONENT = 0.5
 figure = Figure(
     [
         Panel(
@@ -134,21 +140,12 @@ study = Study(
         "One step up tells it poorly, since slip distance makes up for it; a second one like it "
         "helps as any repetition does. A step back tells it ten times better."
     ),
-    base=Scene(
-        law="family",
-        law_exponent=EXPONENT,
-        normal_stress="constant",
-        a=0.01,
-        b_over_a=1.3,
-        stiffness=0.03,
-    ),
+    base=FAMILY,
     axes=[
         Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
         Axis("seed", list(range(RECORDS))),
     ],
-    measure=SyntheticFit(
-        free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
-    ),
+    measure=EXPONENT_FREE,
     reductions=[ScatterOverPromise("scatter", "deviation")],
     claims=[claim for design in DESIGNS for claim in claims(design)],
     plot=figure,

@@ -45,6 +45,7 @@ class Panel:
     ----------
     x, y : str or function of dataset
         What curves are drawn of: variables by their names, or what a function makes of them.
+        Points of an axis of names lie beside each other, or below each other.
     by : sequence of str
         Axes whose points are curves: the first is told by colours and markers, and the second by
         dashes and open markers.

@@ -20,6 +20,7 @@ from rsfstudy.plots._axes import (
     is_numeric,
     is_wide,
     log_scale,
+    name_rows,
     place,
 )
 from rsfstudy.plots._style import in_grey, legend, look, marker, room
@@ -169,10 +170,13 @@ def _name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
 
 def _curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]) -> np.ndarray:
     """Draw one curve, and give its values."""
-    x, y = _values(panel.x, row), np.asarray(_values(panel.y, row), dtype=float)
-    if x.dtype.kind not in "fiu":
-        x = np.arange(x.size, dtype=float)
-        style = style | {"linestyle": "none"}
+    values = _values(panel.x, row), _values(panel.y, row)
+    named = [found.dtype.kind not in "fiu" for found in values]
+    x, y = (
+        np.arange(found.size) if by_name else np.asarray(found, dtype=float)
+        for found, by_name in zip(values, named, strict=True)
+    )
+    style = style | ({"linestyle": "none"} if any(named) else {})
     if y.size > _DENSE and not panel.points:
         style = style | {"marker": ""}
     if np.isfinite(y).sum() == 1 and not style["marker"]:
@@ -204,6 +208,8 @@ def _scales(panel: Panel, part: xr.Dataset, axes: Axes, values: np.ndarray) -> N
     named = isinstance(panel.x, str) and part[panel.x].dtype.kind not in "fiu"
     if named:
         axis_of(axes, part, str(panel.x))
+    if isinstance(panel.y, str) and part[panel.y].dtype.kind in "OU":
+        name_rows(axes, list(map(str, part[panel.y].values)))
     log = panel.log
     if log is None:
         along = isinstance(panel.x, str) and panel.x in part.coords and not named
