@@ -85,7 +85,8 @@ def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
         promise = float(one["promised_spread"].isel(seed=0))
         axes.errorbar(number + 0.35, EXPONENT, promise, color="0.2", capsize=4, marker="_")
         text = f"{promise:.3f}"
-        axes.annotate(text, (number + 0.35, EXPONENT + promise), (0, 4), textcoords="offset points")
+        above = {"textcoords": "offset points", "ha": "center"}
+        axes.annotate(text, (number + 0.35, EXPONENT + promise), (0, 4), **above)
     axes.set_xticks(range(seen.sizes["design"]), [str(name) for name in seen["design"].values])
     axes.set_xlim(-0.4, seen.sizes["design"] - 0.3)
     axes.axhline(EXPONENT, color="0.6", linewidth=0.8)

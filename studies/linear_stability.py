@@ -113,14 +113,14 @@ figure = Figure(
         replace(
             panel,
             y=seen_rise,
-            by=["phi", "mass"],
-            style={"markersize": 2},
+            by=["mass", "phi"],
+            style={"markersize": 2, "fillstyle": "full"},
             through=lambda row: (
                 row["load_velocity_ratio"],
                 row["rise_by_dynamics"].where(row["rise_by_dynamics"] > 0.0),
             ),
             name=lambda row: str(row["mass"].item()),
-            title="Rise by mass; colours as in (a)",
+            title="Rise by mass, at all angles",
             when=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
             y_label=r"Rise of $k_{cr}$ by mass, as a fraction",
         ),

@@ -51,12 +51,15 @@ def expanded(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
         replace(panel, each=(), at={**dict(zip(panel.each, at, strict=True)), **panel.at})
         for at in places
     ]
-    return [one for one in found if not callable(panel.y) or _is_known(one, dataset)]
+    return [one for one in found if not panel.y or _is_known(one, dataset)]
 
 
 def _is_known(panel: Panel, dataset: xr.Dataset) -> bool:
-    """True if the function of a panel has a number anywhere."""
-    found = (_values(panel.y, row) for row, _style in rows(panel, _part(panel, dataset)))
+    """True if there is anything to draw in a panel."""
+    part = _part(panel, dataset)
+    if isinstance(panel.y, str):
+        return bool(part[panel.y].notnull().any())
+    found = (_values(panel.y, row) for row, _style in rows(panel, part))
     return any(np.isfinite(values.astype(float)).any() for values in found)
 
 

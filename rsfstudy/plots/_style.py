@@ -236,4 +236,17 @@ def settle(figure: Figure) -> None:
         figure.draw_without_rendering()
         return
     layout.execute(figure)
+    for axes in figure.axes:
+        _keep_title(axes)
     layout.execute(figure)
+
+
+def _keep_title(axes: Axes) -> None:
+    """Break a title that would be cut where the figure ends: long names along y move its panel."""
+    title, edges = axes.title, cast(Figure, axes.figure).bbox
+    extent, middle = title.get_window_extent(), 0.5 * sum(axes.get_window_extent().intervalx)
+    free = 2.0 * min(middle - edges.x0, edges.x1 - middle)
+    if title.get_text() and extent.width > free:
+        longest = max(map(len, title.get_text().split("\n")))
+        text = title.get_text().replace("\n", " ")
+        title.set_text(wrapped(text, int(0.95 * longest * free / extent.width)))
