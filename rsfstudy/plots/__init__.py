@@ -150,7 +150,7 @@ def _lacking(dataset: xr.Dataset) -> str:
     failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
     parts = [
         "" if completeness == "complete" else completeness,
-        f"{failed} cells failed" * (failed > 0),
+        f"{failed} cell{'s' * (failed > 1)} failed" * (failed > 0),
     ]
     return ", ".join(filter(None, parts))
 

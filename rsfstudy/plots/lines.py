@@ -131,9 +131,12 @@ def _different(
 
 def _named(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
     """Places of curves that lie on each other: what they have in common, or else all of the two or
-    three that there are.
+    three that there are, or the first.
     """
     places = [list(dict.fromkeys(place(group, d) for group in same)) for d in dimensions]
-    if len(same) <= _FEW and all(len(names) > 1 for names in places):
-        return (" and ".join(", ".join(place(one, d) for d in dimensions) for one in same),)
-    return tuple(names[0] for names in places if len(names) == 1)
+    if not places or any(len(names) == 1 for names in places):
+        return tuple(names[0] for names in places if len(names) == 1)
+    every = [", ".join(place(one, d) for d in dimensions) for one in same]
+    if len(every) <= _FEW:
+        return (" and ".join(every),)
+    return (f"{every[0]} and {len(every) - 1} more",)
