@@ -122,7 +122,7 @@ figure = Figure(
             name=lambda row: str(row["mass"].item()),
             title="Rise by mass, at all angles",
             when=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
-            y_label=r"Rise of $k_{cr}$ by mass, as a fraction",
+            y_label=r"Rise of $k_{cr}$ by mass (fraction)",
         ),
     ]
 )

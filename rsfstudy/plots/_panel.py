@@ -26,6 +26,7 @@ from rsfstudy.plots._axes import (
 from rsfstudy.plots._style import in_grey, legend, look, marker, room
 from rsfstudy.plots._text import label, pretty, slope_with_error, wrapped
 from rsfstudy.reduce.base import stated_by
+from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 #: Of the second axis of `by`: dashes, and how markers are filled.
@@ -58,7 +59,7 @@ def _is_known(panel: Panel, dataset: xr.Dataset) -> bool:
     """True if there is anything to draw in a panel."""
     part = _part(panel, dataset)
     if isinstance(panel.y, str):
-        return bool(part[panel.y].notnull().any())
+        return bool(part[panel.y].notnull().any() or (part["status"] == Status.OK).any())
     found = (_values(panel.y, row) for row, _style in rows(panel, part))
     return any(np.isfinite(values.astype(float)).any() for values in found)
 
@@ -72,10 +73,12 @@ def _part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
 def within(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
     """The panel at a place on further axes, which its title says too."""
 
-    def title(part: xr.Dataset) -> str:
-        return ", ".join(filter(None, (_text(panel.title, part, _places(part, panel.at)), said)))
+    own = {dimension: at for dimension, at in panel.at.items() if dimension not in where}
 
-    return replace(panel, at={**where, **panel.at}, title=title, when=None)
+    def title(part: xr.Dataset) -> str:
+        return _sentence(_text(panel.title, part, _places(part, own)), said)
+
+    return replace(panel, at={**own, **where}, title=title, when=None)
 
 
 def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
@@ -239,5 +242,10 @@ def _text(said: Any, part: xr.Dataset, otherwise: str) -> str:
 
 def _places(part: xr.Dataset, at: Mapping[str, Any]) -> str:
     """Place of a panel on the axes that it shows one point of, as a title."""
-    text = ", ".join(place(part, dimension) for dimension in at if part[dimension].ndim == 0)
+    return _sentence(*(place(part, dimension) for dimension in at if part[dimension].ndim == 0))
+
+
+def _sentence(*parts: str) -> str:
+    """Parts one after the other, with a capital letter; empty ones are left out."""
+    text = ", ".join(filter(None, parts))
     return f"{text[:1].upper()}{text[1:]}"
