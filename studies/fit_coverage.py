@@ -63,7 +63,7 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
         for prefix, fill in (("", "full"), ("naive_", "none")):
             share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
             axes.plot(
-                places + 0.15 * (number - 1),
+                places + 0.15 * (number - 0.5 * (dataset.sizes["process"] - 1)),
                 share,
                 marker=marker(number),
                 color=look(number)["color"],

@@ -122,7 +122,7 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     if not shown:
         return
     lines = 1 + axes.get_xlabel().count("\n")
-    drop = rcParams["font.size"] * (2.4 + 1.3 * lines)
+    drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
@@ -215,10 +215,10 @@ def make_room(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
 
 
 def _height(legend: Legend) -> float:
-    """Inches, with a line between it and what it belongs to."""
+    """Inches, with a line and a half between it and what it belongs to."""
     figure = cast(Figure, legend.figure)
     height = float(legend.get_window_extent().height)
-    return height / figure.dpi + float(rcParams["font.size"]) / 72.0
+    return height / figure.dpi + 1.5 * float(rcParams["font.size"]) / 72.0
 
 
 def hold_ticks(axes: Axes) -> None:
