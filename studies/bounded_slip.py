@@ -1,7 +1,7 @@
 """Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -50,24 +50,17 @@ class Parting(Reduction):
     along: str = "inertia"
     tolerance: float = 1e-3
     kind: ClassVar[str] = "parting"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "_parting": "log10(V/V_star) at which mass makes the path leave its massless twin",
+        "_merging": "log10(V/V_star) at which mass lets the path join its massless twin",
+    }
 
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Both places, and the difference of stress."""
-        name, at = self.name, "log10(V/V_star) at which mass"
-        return (
-            Quantity(
-                f"{self.name}_parting", "", "1", f"{at} makes the path leave its massless twin"
-            ),
-            Quantity(f"{name}_merging", "", "1", f"{at} lets the path join its massless twin"),
-            Quantity(
-                f"{name}_offset",
-                "",
-                "1",
-                "stress after the rupture with mass, less that without",
-                "sigma_*",
-            ),
-        )
+        words = "stress after the rupture with mass, less that without"
+        offset = Quantity(f"{self.name}_offset", "", "1", words, "sigma_*")
+        return [*super().quantities, offset]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare the two points of `along`; nothing unless there are two."""

@@ -233,7 +233,6 @@ study = Study(
             variable="unknowns",
             where={"law": "slip", **FULL},
             published=2.0,
-            tolerance=0.0,
             reason="spring stress and state; mass adds its unknown in ruptures only",
         ),
         Claim.below(

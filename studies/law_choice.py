@@ -97,7 +97,6 @@ def told(law: str, design: str, size: float) -> Claim:
         variable="chosen_right",
         where={"law": law, "design": design, "noise_size": size},
         published=1.0,
-        tolerance=0.0,
         reason="ten standard errors lie between the laws",
     )
 

@@ -2,7 +2,7 @@
 oscillation, slow slip and stick-slip lie.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -53,6 +53,11 @@ class CyclingEdge(Reduction):
 
     across: str = "load_velocity_ratio"
     kind: ClassVar[str] = "cycling_edge"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "_farthest": "largest distance of that edge from the linear boundary, over the spacing of "
+        "cells",
+        "_misplaced": "number of cells that cycle above the linear boundary or settle below it",
+    }
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -66,18 +71,7 @@ class CyclingEdge(Reduction):
                 "1",
                 "critical stiffness at V_0 by eigenvalues of steady sliding, over k_cr(V_star)",
             ),
-            Quantity(
-                f"{name}_farthest",
-                "",
-                "1",
-                "largest distance of that edge from the linear boundary, over the spacing of cells",
-            ),
-            Quantity(
-                f"{name}_misplaced",
-                "",
-                "1",
-                "number of cells that cycle above the linear boundary or settle below it",
-            ),
+            *super().quantities,
         )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:

@@ -213,7 +213,6 @@ study = Study(
                 "load_velocity_ratio": 1e3,
             },
             published=float(Status.NO_LIMIT_CYCLE),
-            tolerance=0.0,
             reason="the status no_limit_cycle: faster loading stabilises",
         ),
         Claim.below(

@@ -239,7 +239,6 @@ study = Study(
             variable="period_events",
             where=at(0.8567),
             published=4.0,
-            tolerance=0.0,
             reason="a whole number",
         ),
     ],

@@ -92,7 +92,6 @@ CLAIMS = (
         variable="share",
         where={"ended": "ok"},
         published=1.0,
-        tolerance=0.0,
         reason="a count",
     ),
 )

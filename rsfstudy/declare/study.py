@@ -284,10 +284,8 @@ class Study:
 
     def place(self, cell: int) -> str:
         """Where a cell is on the axes, in words."""
-        words = []
-        for axis, i in zip(self.axes, np.unravel_index(cell, self.shape), strict=True):
-            words.append(f"{axis.dimension} = {axis.points[i]}")
-        return ", ".join(words)
+        at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
+        return ", ".join(f"{axis.dimension} = {axis.points[i]}" for axis, i in at)
 
     def split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
         """The fields of the scene, and those of the measure, that rows set."""
