@@ -1,4 +1,10 @@
-"""What accuracy costs: every integrator on problems whose answer is known to more digits."""
+"""What accuracy costs: every integrator on problems whose answer is known to more digits.
+
+Problems with answers known to 12 digits or more, solved by each of SciPy's integrators at each
+accuracy; for cycles also with another integrator where mass acts. The error is the measured one,
+the work counts every right-hand side, and processor times are relative to those of DOP853 for 3
+digits on the same problem at the same moment. The defaults of the core follow from it.
+"""
 
 import math
 import statistics
@@ -318,13 +324,7 @@ def cheapest(label: str, digits: float) -> Claim:
 study = Study(
     name="accuracy_cost",
     title="What accuracy costs: error against work for SciPy's integrators",
-    summary=(
-        "Problems with answers known to 12 digits or more, solved by each of SciPy's integrators "
-        "at each accuracy; for cycles also with another integrator where mass acts. The error is "
-        "the measured one, the work counts every right-hand side, and processor times are relative "
-        "to those of DOP853 for 3 digits on the same problem at the same moment. The defaults of "
-        "the core follow from it."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(),
     axes=[
         Axis("problem", {label: fields for label, (fields, _problem) in PROBLEMS.items()}),

@@ -1,4 +1,11 @@
-"""Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12)."""
+"""Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12).
+
+With the slowness law and k >= k_cr the slip rate after any step stays bounded, without mass too; at
+constant normal stress and k = k_cr oscillations repeat for ever. Bounded is not slow: after large
+steps mass limits the slip rate, and the motion with mass leaves the quasi-static one. At variable
+normal stress and k = k_cr the two join again after the largest steps; elsewhere an offset of stress
+remains.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -220,13 +227,7 @@ LARGEST = {"normal_stress": "variable", "stiffness_ratio": 1.0, "load_velocity_r
 study = Study(
     name="bounded_slip",
     title="Motions after steps of load point velocity, slowness law, k >= k_cr(V_*), b/a = 2",
-    summary=(
-        "With the slowness law and k >= k_cr the slip rate after any step stays bounded, "
-        "without mass too; at constant normal stress and k = k_cr oscillations repeat for "
-        "ever. Bounded is not slow: after large steps mass limits the slip rate, and the motion "
-        "with mass leaves the quasi-static one. At variable normal stress and k = k_cr the two "
-        "join again after the largest steps; elsewhere an offset of stress remains."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(law="slowness", b_over_a=2.0, alpha=0.56),
     axes=[
         Axis("normal_stress", ["constant", "variable"]),

@@ -1,4 +1,13 @@
-"""Coverage: do error estimates cover the errors, over random scenes?"""
+"""Coverage: do error estimates cover the errors, over random scenes?
+
+Scenes drawn from wide ranges of every parameter, for both laws, constant and variable normal
+stress, and each kind of dynamics. Each is measured at the accuracy asked for and a hundred times
+tighter: the error that shows, beyond what the tighter run is itself uncertain by, over the estimate
+that the first run gave. More scenes by --set sample=0:49:50, other accuracies by --set
+requested_digits=4,7,9, and the readings of a laboratory by --set question: rigid response, velocity
+step, healing; and, with --set normal_stress=imposed, normal stress transient and normal stress
+response.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -283,15 +292,7 @@ def claims(digits: int) -> list[Claim]:
 study = Study(
     name="coverage",
     title="How error estimates cover the errors, over random scenes",
-    summary=(
-        "Scenes drawn from wide ranges of every parameter, for both laws, constant and variable "
-        "normal stress, and each kind of dynamics. Each is measured at the accuracy asked for and "
-        "a hundred times tighter: the error that shows, beyond what the tighter run is itself "
-        "uncertain by, over the estimate that the first run gave. More scenes by --set "
-        "sample=0:49:50, other accuracies by --set requested_digits=4,7,9, and the readings of a "
-        "laboratory by --set question: rigid response, velocity step, healing; and, with --set "
-        "normal_stress=imposed, normal stress transient and normal stress response."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(),
     axes=[
         Axis("question", list(QUESTIONS)),

@@ -1,4 +1,11 @@
-"""Which experiment tells the parameters? Designs of steps and machines, before any is run."""
+"""Which experiment tells the parameters? Designs of steps and machines, before any is run.
+
+Fisher's information tells the errors of an experiment before it is made: steps up, back, holds and
+pairs of them, on a stiff and on a compliant machine. A step up and one back tell the exponent of
+the law seven times better than two steps up; a compliant machine tells it better by one step, five
+times; four times as many rows tell as much as half the noise, twice as well. Fits of synthetic
+records keep what is promised.
+"""
 
 import xarray as xr
 
@@ -93,13 +100,7 @@ def kept(k: float, parameter: str) -> Claim:
 study = Study(
     name="design_of_steps",
     title="Standard errors that steps, holds and machines promise",
-    summary=(
-        "Fisher's information tells the errors of an experiment before it is made: steps up, back, "
-        "holds and pairs of them, on a stiff and on a compliant machine. A step up and one back "
-        "tell the exponent of the law seven times better than two steps up; a compliant machine "
-        "tells it better by one step, five times; four times as many rows tell as much as half "
-        "the noise, twice as well. Fits of synthetic records keep what is promised."
-    ),
+    summary=Study.caption(__doc__),
     base=FAMILY,
     axes=[
         Axis("design", {n: {"rows": ROWS, "noise_size": NOISE, **d} for n, d in DESIGNS.items()}),

@@ -1,4 +1,11 @@
-"""Dilatancy: the critical stiffness of steady sliding against drainage."""
+"""Dilatancy: the critical stiffness of steady sliding against drainage.
+
+Where pores open with slip rate, pore pressure falls and friction rises until fluid flows in.
+Drained fast, the critical stiffness is b - a, as without a fluid; undrained, it is b - a - E with E
+= mu_* eps/(beta sigma_*), and no spring is soft enough for instability where E exceeds b - a. In
+between, drainage within the slip distance D_c decides: even the strongest dilatancy leaves
+oscillations that are slow enough to drain.
+"""
 
 import numpy as np
 import xarray as xr
@@ -93,13 +100,7 @@ figure = Figure(
 study = Study(
     name="dilatancy",
     title="Critical stiffness of a dilatant fault against drainage",
-    summary=(
-        "Where pores open with slip rate, pore pressure falls and friction rises until fluid flows "
-        "in. Drained fast, the critical stiffness is b - a, as without a fluid; undrained, it is b "
-        "- a - E with E = mu_* eps/(beta sigma_*), and no spring is soft enough for instability "
-        "where E exceeds b - a. In between, drainage within the slip distance D_c decides: even "
-        "the strongest dilatancy leaves oscillations that are slow enough to drain."
-    ),
+    summary=Study.caption(__doc__),
     base=FAULT,
     axes=[
         Axis("dilatancy", [0.002, 0.004, 0.008, 0.012]),

@@ -1,4 +1,12 @@
-"""Dilatancy: stick-slip cycles that become slow."""
+"""Dilatancy: stick-slip cycles that become slow.
+
+A spring half as stiff as the drained critical one: steady sliding is unstable in every cell, and
+without dilatancy cycles end in dynamic rupture at 10^9 V_*. Ruptures have no time to drain. Some
+way beyond the dilatancy at which the spring is stiffer than the undrained critical one, b - a - E,
+slip still accelerates, but never comes to rupture: within a narrow range of dilatancy cycles of
+10^9 V_* become slow slip of 10 to 1000 V_*, with a tenth of the stress drop. Faster drainage moves
+that to stronger dilatancy.
+"""
 
 import numpy as np
 import xarray as xr
@@ -85,14 +93,7 @@ figure = Figure(
 study = Study(
     name="dilatant_cycles",
     title="Stick-slip of a dilatant fault, k = 0.5 (b-a) sigma_*/D_c, with mass",
-    summary=(
-        "A spring half as stiff as the drained critical one: steady sliding is unstable in every "
-        "cell, and without dilatancy cycles end in dynamic rupture at 10^9 V_*. Ruptures have no "
-        "time to drain. Some way beyond the dilatancy at which the spring is stiffer than the "
-        "undrained critical one, b - a - E, slip still accelerates, but never comes to rupture: "
-        "within a narrow range of dilatancy cycles of 10^9 V_* become slow slip of 10 to 1000 V_*, "
-        "with a tenth of the stress drop. Faster drainage moves that to stronger dilatancy."
-    ),
+    summary=Study.caption(__doc__),
     base=FAULT.with_(stiffness=0.0025, load_velocity_ratio=1.0, inertia=True),
     axes=[
         Axis("law", ["slip", "slowness"]),

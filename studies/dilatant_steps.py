@@ -1,4 +1,11 @@
-"""Dilatancy: the critical step of load point velocity against drainage."""
+"""Dilatancy: the critical step of load point velocity against drainage.
+
+The spring is stiffer than critical however fast pores drain, and steady sliding stable: it takes a
+step of load point velocity to trigger instability. The step grows with dilatancy, and the more the
+less there is time to drain. Slip accelerates far beyond drainage on the way to instability, so that
+drainage has to be a hundred times faster than for steady sliding (study dilatancy) to bring the
+drained boundary back.
+"""
 
 from typing import Any
 
@@ -56,13 +63,7 @@ figure = Figure(
 study = Study(
     name="dilatant_steps",
     title="Critical load point velocity step of a dilatant fault, k = 1.2 (b-a) sigma_*/D_c",
-    summary=(
-        "The spring is stiffer than critical however fast pores drain, and steady sliding stable: "
-        "it takes a step of load point velocity to trigger instability. The step grows with "
-        "dilatancy, and the more the less there is time to drain. Slip accelerates far beyond "
-        "drainage on the way to instability, so that drainage has to be a hundred times faster "
-        "than for steady sliding (study dilatancy) to bring the drained boundary back."
-    ),
+    summary=Study.caption(__doc__),
     base=FAULT.with_(stiffness=0.006, fluid="drained"),
     axes=[
         Axis("fault", FAULTS),

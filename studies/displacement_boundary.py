@@ -1,5 +1,12 @@
 """Displacement boundary: how large a step of load point displacement triggers instability (Fig.
 7).
+
+A slider in steady state at V_* has its load point displaced at once, and then held or moved on at
+V_*. The boundary is the smallest step that takes the slip rate to the instability norm. For the
+slip law and a load point held it is D_c a/(b-a) at every stiffness, at constant normal stress and
+in the limit of a large norm; variable normal stress moves it little. A load point that moves on
+lowers it, the more the softer the spring. The slowness law takes 1.7 to 8 times the displacement;
+where a spring is stiff, only one that takes the slip rate to the norm by itself.
 """
 
 from typing import Any
@@ -78,15 +85,7 @@ figure = Figure(
 study = Study(
     name="displacement_boundary",
     title="Critical load point displacement step against a/(b-a)",
-    summary=(
-        "A slider in steady state at V_* has its load point displaced at once, and then held or "
-        "moved on at V_*. The boundary is the smallest step that takes the slip rate to the "
-        "instability norm. For the slip law and a load point held it is D_c a/(b-a) at every "
-        "stiffness, at constant normal stress and in the limit of a large norm; variable normal "
-        "stress moves it little. A load point that moves on lowers it, the more the softer the "
-        "spring. The slowness law takes 1.7 to 8 times the displacement; where a spring is "
-        "stiff, only one that takes the slip rate to the norm by itself."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(),
     axes=[
         Axis("law", ["slip", "slowness"]),

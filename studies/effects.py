@@ -1,4 +1,12 @@
-"""Effects: what each combination costs in a limit cycle, and what the answer loses without it."""
+"""Effects: what each combination costs in a limit cycle, and what the answer loses without it.
+
+Every combination of normal stress coupling and dynamics for both laws, k = 0.8 k_cr. Without mass
+or damping the slip rate runs away, but for the slowness law at variable normal stress, whose cycles
+reach 10^13 to 10^19 V_*. Radiation damping costs half of what mass does, and loses the overshoot: a
+quarter to a half of the static stress drop. An effect that is not in the scene adds no unknown and
+no time. Times of a right-hand side are over those of the plainest scene, quasi-static at constant
+normal stress, which takes turns with it.
+"""
 
 import math
 import statistics
@@ -190,15 +198,7 @@ def loses(law: str, dynamics: str, published: float) -> Claim:
 study = Study(
     name="effects",
     title="What each effect costs in a limit cycle, and what the answer loses without it",
-    summary=(
-        "Every combination of normal stress coupling and dynamics for both laws, k = 0.8 k_cr. "
-        "Without mass or damping the slip rate runs away, but for the slowness law at variable "
-        "normal stress, whose cycles reach 10^13 to 10^19 V_*. Radiation damping costs half of "
-        "what mass does, and loses the overshoot: a quarter to a half of the static stress drop. "
-        "An effect that is not in the scene adds no unknown and no time. Times of a right-hand "
-        "side are over those of the plainest scene, quasi-static at constant normal stress, which "
-        "takes turns with it."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, stiffness_ratio=0.8, load_velocity_ratio=2.0),
     axes=[
         Axis("law", ["slip", "slowness"]),

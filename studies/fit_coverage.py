@@ -1,4 +1,10 @@
-"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of three kinds."""
+"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of three kinds.
+
+A velocity step from 1 to 10 um/s with noise that is white, autoregressive with a correlation of
+0.9, or a moving average, is fitted by the law that made it. Errors that count the correlation of
+the noise (full markers) cover the truth as often as they promise; those of the usual formula, which
+takes residuals for white noise (open markers), cover it far less often where noise is correlated.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -125,13 +131,7 @@ REDUCTIONS = [
 study = Study(
     name="fit_coverage",
     title="Shares of synthetic records whose truth lies within the errors of the fit",
-    summary=(
-        "A velocity step from 1 to 10 um/s with noise that is white, autoregressive with a "
-        "correlation of 0.9, or a moving average, is fitted by the law that made it. Errors that "
-        "count the correlation of the noise (full markers) cover the truth as often as they "
-        "promise; those of the usual formula, which takes residuals for white noise (open "
-        "markers), cover it far less often where noise is correlated."
-    ),
+    summary=Study.caption(__doc__),
     base=RIG,
     axes=[
         Axis("process", list(PROCESSES)),

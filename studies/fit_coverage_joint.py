@@ -1,4 +1,11 @@
-"""Do the errors of fits with two states cover the truth, of one step and of two fitted as one?"""
+"""Do the errors of fits with two states cover the truth, of one step and of two fitted as one?
+
+Velocity steps of a slider with two states, with white noise and with noise of a correlation of 0.9,
+are fitted by the law that made them: a step up alone, and a step up and one back as one, each with
+its own friction before it and its own trend. Correlated noise leaves 26 independent rows to a step:
+one step tells the longer slip distance to a third then, and intervals of what goes with it are
+those of the likelihood, which is no parabola. Markers are as in fit_coverage.
+"""
 
 from dataclasses import replace
 
@@ -15,14 +22,7 @@ DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}"}
 study = Study(
     name="fit_coverage_joint",
     title="Shares of synthetic records of two states whose truth lies within the errors of the fit",
-    summary=(
-        "Velocity steps of a slider with two states, with white noise and with noise of a "
-        "correlation of 0.9, are fitted by the law that made them: a step up alone, and a step up "
-        "and one back as one, each with its own friction before it and its own trend. Correlated "
-        "noise leaves 26 independent rows to a step: one step tells the longer slip distance to a "
-        "third then, and intervals of what goes with it are those of the likelihood, which is no "
-        "parabola. Markers are as in fit_coverage."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(
         law="two_slowness_states",
         normal_stress="constant",

@@ -1,4 +1,10 @@
-"""Do fits give back the parameters of records without noise? Every law of one state, and more."""
+"""Do fits give back the parameters of records without noise? Every law of one state, and more.
+
+Records without noise, of every law of one state, with a rate-strengthening b, with stiffness,
+alpha, the exponent of the law or the time of the step free: searches that begin a fifth to a half
+off end at the parameters of the record, which the model that is fitted has made, or other equations
+by an integrator of SciPy. Dashed lines are what the claims allow.
+"""
 
 import math
 from collections.abc import Mapping
@@ -275,13 +281,7 @@ def comes_back(case: str, source: str) -> Claim:
 study = Study(
     name="fit_recovery",
     title="Deviations of fitted parameters from those of records without noise",
-    summary=(
-        "Records without noise, of every law of one state, with a rate-strengthening b, with "
-        "stiffness, alpha, the exponent of the law or the time of the step free: searches that "
-        "begin a fifth to a half off end at the parameters of the record, which the model that "
-        "is fitted has made, or other equations by an integrator of SciPy. "
-        "Dashed lines are what the claims allow."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, mu_star=0.6, stiffness=0.03),
     axes=[
         Axis("case", CASES),

@@ -1,4 +1,10 @@
-"""Hard cases: what breaks ordinary slider codes, each with what must come out."""
+"""Hard cases: what breaks ordinary slider codes, each with what must come out.
+
+Slip rates from 10^-1745 to 10^87 V_*, critical stiffness to eight digits, parameters at the ends of
+their ranges, masses from none to overwhelming, and loading that friction cannot follow. Each case
+ends with the number an independent computation or a closed form gives, within its own error
+estimate, or with the status that names the reason.
+"""
 
 import math
 from dataclasses import dataclass
@@ -364,12 +370,7 @@ figure = Figure(
 study = Study(
     name="hard_cases",
     title="Cases that break ordinary slider codes, and what comes out",
-    summary=(
-        "Slip rates from 10^-1745 to 10^87 V_*, critical stiffness to eight digits, parameters at "
-        "the ends of their ranges, masses from none to overwhelming, and loading that friction "
-        "cannot follow. Each case ends with the number an independent computation or a closed "
-        "form gives, within its own error estimate, or with the status that names the reason."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(),
     axes=[Axis("hard_case", {label: fields for label, (fields, _problem) in CASES.items()})],
     measure=HardCase(problems=tuple(problem for _fields, problem in CASES.values())),

@@ -1,4 +1,13 @@
-"""Injection: fluid pressed slowly into a fault ends instability, and begins it as it flows back."""
+"""Injection: fluid pressed slowly into a fault ends instability, and begins it as it flows back.
+
+Pore pressure around a fault rises slowly, as it was sampled, and falls again; on a drained fault
+and on ones that dilate, into which it drains. The spring is a little softer than critical before.
+Small departures stop growing where k exceeds the critical stiffness at the pressure of the moment
+in the fault, which falls with effective normal stress, and begin to grow again where k falls below
+it: to the change of pressure within one or two D_c/V_*, by both laws. While pressure rises slip is
+faster, and drainage over slip rate less, so that dilatancy ends instability at lower pressure than
+it begins at.
+"""
 
 import math
 from dataclasses import dataclass
@@ -323,15 +332,7 @@ figure = Figure(
 study = Study(
     name="injection",
     title="Slow injection ends instability, and begins it: k = 0.98 k_cr before",
-    summary=(
-        "Pore pressure around a fault rises slowly, as it was sampled, and falls again; on a "
-        "drained fault and on ones that dilate, into which it drains. The spring is a little "
-        "softer than critical before. Small departures stop growing where k exceeds the critical "
-        "stiffness at the pressure of the moment in the fault, which falls with effective normal "
-        "stress, and begin to grow again where k falls below it: to the change of pressure within "
-        "one or two D_c/V_*, by both laws. While pressure rises slip is faster, and drainage over "
-        "slip rate less, so that dilatancy ends instability at lower pressure than it begins at."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", LAWS),

@@ -1,4 +1,10 @@
-"""Instability norm: how boundaries depend on it, and which norm the paper's numbers imply."""
+"""Instability norm: how boundaries depend on it, and which norm the paper's numbers imply.
+
+A motion counts as unstable once V T/(2 pi D_c) reaches a norm the paper does not state. Both of its
+numbers for the slowness law imply the same one, 5e-4. The slip law feels the norm where b - a is
+small against a: at a/(b-a) = 4 the boundary is 4.66 V_* at 5e-4, and 5 V_* for a norm without
+bound.
+"""
 
 import math
 from dataclasses import replace
@@ -95,12 +101,7 @@ figure = Figure(
 study = Study(
     name="instability_norm",
     title="Critical load point velocity step against the instability norm",
-    summary=(
-        "A motion counts as unstable once V T/(2 pi D_c) reaches a norm the paper does not "
-        "state. Both of its numbers for the slowness law imply the same one, 5e-4. The slip "
-        "law feels the norm where b - a is small against a: at a/(b-a) = 4 the boundary is 4.66 "
-        "V_* at 5e-4, and 5 V_* for a norm without bound."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(),
     axes=[
         Axis("boundary", BOUNDARIES),

@@ -1,4 +1,10 @@
-"""Which steps tell the evolution law? Its exponent, and how well, by three designs."""
+"""Which steps tell the evolution law? Its exponent, and how well, by three designs.
+
+Velocity steps of ten with white noise of 5e-4, each with its own friction before it and its own
+trend. The exponent of the law is 0 for the slip law and 1 for the slowness law. One step up tells
+it poorly, since slip distance makes up for it; a second one like it helps as any repetition does. A
+step back tells it ten times better.
+"""
 
 import math
 from collections.abc import Mapping
@@ -135,12 +141,7 @@ def claims(design: str) -> list[Claim]:
 study = Study(
     name="law_identification",
     title="Estimates of the exponent of the evolution law by three designs of velocity steps",
-    summary=(
-        "Velocity steps of ten with white noise of 5e-4, each with its own friction before it and "
-        "its own trend. The exponent of the law is 0 for the slip law and 1 for the slowness law. "
-        "One step up tells it poorly, since slip distance makes up for it; a second one like it "
-        "helps as any repetition does. A step back tells it ten times better."
-    ),
+    summary=Study.caption(__doc__),
     base=FAMILY,
     axes=[
         Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),

@@ -1,4 +1,15 @@
-"""Laws: how much of the displacement boundary hangs on the state evolution law."""
+"""Laws: how much of the displacement boundary hangs on the state evolution law.
+
+The load point is displaced at once and then held. For every law that falls with Theta/b + ln V
+alone the critical step has a closed form at constant normal stress, h(u*) = -k/k_cr. Between the
+slip and the slowness law (eps from 0 to 1) the step grows with stiffness, and none exists for eps k
+>= k_cr: what is left is the jump of slip rate at the step itself. Laws that fall faster than the
+slip law far from steady sliding need smaller steps, the smaller the stiffer the spring. That
+variable normal stress hardly moves the boundary (Fig. 7) holds for the slip law and those near to
+it, and not for the slowness law; nor where slip faster than a cut-off strengthens. The composite
+law has V_c = 100 V_*, the cut-off is at 10^4 V_*. The norm is 1e6, so high that closed forms for an
+infinite one apply.
+"""
 
 import math
 
@@ -95,18 +106,7 @@ figure = Figure(
 study = Study(
     name="laws",
     title="Critical displacement step and the state evolution law",
-    summary=(
-        "The load point is displaced at once and then held. For every law that falls with Theta/b "
-        "+ ln V alone the critical step has a closed form at constant normal stress, h(u*) = "
-        "-k/k_cr. Between the slip and the slowness law (eps from 0 to 1) the step grows with "
-        "stiffness, and none exists for eps k >= k_cr: what is left is the jump of slip rate at "
-        "the step itself. Laws that fall faster than the slip law far from steady sliding need "
-        "smaller steps, the smaller the stiffer the spring. That variable normal stress hardly "
-        "moves the boundary (Fig. 7) holds for the slip law and those near to it, and not for the "
-        "slowness law; nor where slip faster than a cut-off strengthens. The composite law has "
-        "V_c = 100 V_*, the cut-off is at 10^4 V_*. The norm is 1e6, so high that closed forms "
-        "for an infinite one apply."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("evolution", LAWS),

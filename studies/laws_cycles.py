@@ -1,4 +1,13 @@
-"""Laws: how much of stick-slip hangs on the state evolution law."""
+"""Laws: how much of stick-slip hangs on the state evolution law.
+
+Limit cycles with mass by every law, at four load point velocities. The dynamic stress drop falls
+with ln V_0 by about (a-b) sigma_* whatever the law, at constant normal stress; the static drop does
+by 2.1 times that for the slip law and 1.5 times for the slowness law. What hangs on the law most is
+how slow a slider gets between its slips: from 10^-1.4 V_* (slip) to 10^-19 V_* (Perrin-Rice-Zheng).
+That variable normal stress takes ten decades off the slowest slip rate is true of the slip law
+alone; for the slowness law it takes none. The composite law has V_c = 100 V_*; the cut-off at 10^4
+V_* keeps slip below 10^5.4 V_*, and drops small.
+"""
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -74,16 +83,7 @@ figure = Figure(
 study = Study(
     name="laws_cycles",
     title="Stick-slip cycles and the state evolution law, k = 0.8 k_cr",
-    summary=(
-        "Limit cycles with mass by every law, at four load point velocities. The dynamic stress "
-        "drop falls with ln V_0 by about (a-b) sigma_* whatever the law, at constant normal "
-        "stress; the static drop does by 2.1 times that for the slip law and 1.5 times for the "
-        "slowness law. What hangs on the law most is how slow a slider gets between its slips: "
-        "from 10^-1.4 V_* (slip) to 10^-19 V_* (Perrin-Rice-Zheng). That variable normal stress "
-        "takes ten decades off the slowest slip rate is true of the slip law alone; for the "
-        "slowness law it takes none. The composite law has V_c = 100 V_*; the cut-off at 10^4 "
-        "V_* keeps slip below 10^5.4 V_*, and drops small."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("evolution", LAWS),

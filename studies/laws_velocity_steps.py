@@ -1,4 +1,12 @@
-"""Laws: how much of the load velocity boundary hangs on the state evolution law."""
+"""Laws: how much of the load velocity boundary hangs on the state evolution law.
+
+The faster the state falls above steady sliding, the smaller the critical step: at 1.25 k_cr and
+constant normal stress from 2.1 V_* (Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and
+146 V_* (slowness with a cut-off at 10^4 V_*); at 2 k_cr from 3.4 V_* to 4700 V_*. That variable
+normal stress lowers the boundary, as the paper finds for the slip law, holds for every law near
+critical stiffness; between 1.5 and 1.9 k_cr it ends for the slowness law, alone or with c = 1. The
+composite law has V_c = 100 V_*.
+"""
 
 import numpy as np
 
@@ -55,14 +63,7 @@ figure = Figure([by_law("stiffness_ratio", "critical_velocity_ratio", "y")], hei
 study = Study(
     name="laws_velocity_steps",
     title="Critical load point velocity step and the state evolution law",
-    summary=(
-        "The faster the state falls above steady sliding, the smaller the critical step: at 1.25 "
-        "k_cr and constant normal stress from 2.1 V_* (Perrin-Rice-Zheng) and 2.6 V_* (slip) to "
-        "53 V_* (slowness) and 146 V_* (slowness with a cut-off at 10^4 V_*); at 2 k_cr from 3.4 "
-        "V_* to 4700 V_*. That variable normal stress lowers the boundary, as the paper finds for "
-        "the slip law, holds for every law near critical stiffness; between 1.5 and 1.9 k_cr it "
-        "ends for the slowness law, alone or with c = 1. The composite law has V_c = 100 V_*."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0),
     axes=[
         Axis("evolution", LAWS),

@@ -1,4 +1,12 @@
-"""Laws: zeta of the rate-step boundary, from the slip law towards the slowness law."""
+"""Laws: zeta of the rate-step boundary, from the slip law towards the slowness law.
+
+At constant normal stress and critical stiffness the critical step of the family of laws between
+slip (eps = 0) and slowness (eps = 1) is V_0/V_* = 1 + a/[(1 - eps)(b-a)], of which eq. 10 of the
+paper is the beginning: zeta = 1/(1 - eps), and no step is critical for every norm by the slowness
+law. Variable normal stress lowers zeta; closer to the slowness law it takes the critical step away,
+because k_cr falls with V_0. The norm is 1e6, so high that the closed form for an infinite one
+applies.
+"""
 
 import numpy as np
 import xarray as xr
@@ -66,14 +74,7 @@ figure = Figure(
 study = Study(
     name="laws_zeta",
     title="zeta in V_0/V_* = 1 + zeta a/(b-a) and the state evolution law, k = k_cr",
-    summary=(
-        "At constant normal stress and critical stiffness the critical step of the family of laws "
-        "between slip (eps = 0) and slowness (eps = 1) is V_0/V_* = 1 + a/[(1 - eps)(b-a)], of "
-        "which eq. 10 of the paper is the beginning: zeta = 1/(1 - eps), and no step is critical "
-        "for every norm by the slowness law. Variable normal stress lowers zeta; closer to the "
-        "slowness law it takes the critical step away, because k_cr falls with V_0. The norm is "
-        "1e6, so high that the closed form for an infinite one applies."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(law="family", instability_norm=1e6),
     axes=[
         Axis("law_exponent", [0.0, 0.25, 0.5]),

@@ -1,4 +1,9 @@
-"""Stick-slip limit cycles: both laws, constant and variable normal stress (Figs. 9, 10 and 11)."""
+"""Stick-slip limit cycles: both laws, constant and variable normal stress (Figs. 9, 10 and 11).
+
+Complete stick-slip motions with inertia, once cycles repeat. With the slip law, variable normal
+stress lowers the slowest slip rate by ten orders of magnitude; with the slowness law it changes the
+range of slip rate little, and a segment of nearly constant stress follows each rupture.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -127,12 +132,7 @@ figure = Figure(
 study = Study(
     name="limit_cycles",
     title="Stick-slip limit cycles, k = 0.8 k_cr(V_*), b/a = 2, V_0 = 2 V_*",
-    summary=(
-        "Complete stick-slip motions with inertia, once cycles repeat. With the slip law, "
-        "variable normal stress lowers the slowest slip rate by ten orders of magnitude; with "
-        "the slowness law it changes the range of slip rate little, and a segment of nearly "
-        "constant stress follows each rupture."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(
         b_over_a=2.0, alpha=0.56, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
     ),

@@ -1,5 +1,11 @@
 """Linear stability: the critical stiffness as a function of slip rate and driving angle (Fig.
 2).
+
+Above its curve steady sliding is stable under small perturbations, below it unstable. The curves
+fall with slip rate, the more steeply the smaller the angle between the driving stress and the fault
+normal; where phi < atan(mu_ss) there is no steady state. So a faster load point can stabilise a
+spring, and a slower one destabilise it. Mass raises the curves in proportion to (T V)**2: by 6e-5
+at most for T = 5 s and 1e6 V_*.
 """
 
 import math
@@ -131,13 +137,7 @@ figure = Figure(
 study = Study(
     name="linear_stability",
     title="Critical stiffness of steady sliding against slip rate, b/a = 2, alpha = 0.56",
-    summary=(
-        "Above its curve steady sliding is stable under small perturbations, below it unstable. "
-        "The curves fall with slip rate, the more steeply the smaller the angle between the "
-        "driving stress and the fault normal; where phi < atan(mu_ss) there is no steady state. "
-        "So a faster load point can stabilise a spring, and a slower one destabilise it. Mass "
-        "raises the curves in proportion to (T V)**2: by 6e-5 at most for T = 5 s and 1e6 V_*."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, alpha=0.56),
     axes=[
         Axis("mass", MASSES),

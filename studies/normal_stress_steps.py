@@ -1,4 +1,12 @@
-"""Steps of normal stress: alpha and D_c as Linker and Dieterich's test gives them."""
+"""Steps of normal stress: alpha and D_c as Linker and Dieterich's test gives them.
+
+Imposed normal stress steps while the load point moves on at V_*, and friction is recorded over 20
+D_c. An exponential through the transient, followed back to the step, gives alpha and D_c. With the
+slip law both are right on a stiff machine. With the slowness law alpha is read too small from steps
+up and too large from steps down, however stiff the machine. On a compliant machine slip has passed
+before the spring has taken up the change of strength, and what is read says as much of the machine
+as of the fault.
+"""
 
 import math
 from dataclasses import replace
@@ -173,14 +181,7 @@ figure = Figure(
 study = Study(
     name="normal_stress_steps",
     title="Steps of normal stress as an experimenter reads them, b/a = 2",
-    summary=(
-        "Imposed normal stress steps while the load point moves on at V_*, and friction is "
-        "recorded over 20 D_c. An exponential through the transient, followed back to the step, "
-        "gives alpha and D_c. With the slip law both are right on a stiff machine. With the "
-        "slowness law alpha is read too small from steps up and too large from steps down, however "
-        "stiff the machine. On a compliant machine slip has passed before the spring has taken up "
-        "the change of strength, and what is read says as much of the machine as of the fault."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", LAWS),

@@ -1,5 +1,11 @@
 """Rate-step boundary against b/a: how large a step of load point velocity triggers instability
 (Fig. 5).
+
+A slider in steady state at V_* has its load point velocity stepped to V_0. The boundary is the
+smallest V_0 that takes the slip rate to the instability norm, at constant normal stress and at
+normal stress varying with shear stress. The fit V_0/V_* = 1 + zeta a/(b-a) covers a/(b-a) from 0.25
+to 1; beyond, the finite norm takes even the curve of constant normal stress below its line V_0/V_*
+= 1 + a/(b-a).
 """
 
 import numpy as np
@@ -72,13 +78,7 @@ def lower(inverse: float, published: float) -> Claim:
 study = Study(
     name="rate_step_boundary",
     title="Critical load point velocity step against a/(b-a), slip law, k = k_cr(V_*)",
-    summary=(
-        "A slider in steady state at V_* has its load point velocity stepped to V_0. The "
-        "boundary is the smallest V_0 that takes the slip rate to the instability norm, at "
-        "constant normal stress and at normal stress varying with shear stress. The fit V_0/V_* "
-        "= 1 + zeta a/(b-a) covers a/(b-a) from 0.25 to 1; beyond, the finite norm takes even "
-        "the curve of constant normal stress below its line V_0/V_* = 1 + a/(b-a)."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(law="slip", stiffness_ratio=1.0),
     axes=[
         Axis("case", CASES),

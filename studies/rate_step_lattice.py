@@ -1,4 +1,9 @@
-"""Rate-step boundary the plain way: a lattice of cells that are stable or unstable (Fig. 6)."""
+"""Rate-step boundary the plain way: a lattice of cells that are stable or unstable (Fig. 6).
+
+Each cell follows one motion and says whether it reaches the instability norm; the boundary between
+the cells is all such a lattice can tell, to within its spacing. It costs 40 motions for two digits
+where rate_step_stiffness has ten from a few paths.
+"""
 
 import math
 
@@ -44,11 +49,7 @@ figure = Figure(
 study = Study(
     name="rate_step_lattice",
     title="Stable and unstable steps of load point velocity, slip law, b/a = e",
-    summary=(
-        "Each cell follows one motion and says whether it reaches the instability norm; the "
-        "boundary between the cells is all such a lattice can tell, to within its spacing. It "
-        "costs 40 motions for two digits where rate_step_stiffness has ten from a few paths."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(law="slip", b_over_a=math.e),
     axes=[
         Axis("case", CASES),

@@ -1,4 +1,10 @@
-"""Rate-step boundary against stiffness, b/a = e, both laws (Fig. 6 and section 4)."""
+"""Rate-step boundary against stiffness, b/a = e, both laws (Fig. 6 and section 4).
+
+The critical step of load point velocity grows with stiffness, about exponentially for the slip law;
+the slowness law is much more stable. Eq. 11 of the paper, V_0/V_* = exp(k/k_cr)/lambda, is exact at
+k = k_cr only: the boundary lies up to 2.4 % lower. The study rate_step_lattice finds the same
+boundary from stable and unstable cells, instability_norm how it depends on the norm.
+"""
 
 import math
 from dataclasses import replace
@@ -71,13 +77,7 @@ figure = Figure(
 study = Study(
     name="rate_step_stiffness",
     title="Critical load point velocity step against stiffness, b/a = e",
-    summary=(
-        "The critical step of load point velocity grows with stiffness, about exponentially for "
-        "the slip law; the slowness law is much more stable. Eq. 11 of the paper, V_0/V_* = "
-        "exp(k/k_cr)/lambda, is exact at k = k_cr only: the boundary lies up to 2.4 % lower. The "
-        "study rate_step_lattice finds the same boundary from stable and unstable cells, "
-        "instability_norm how it depends on the norm."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=math.e),
     axes=[
         Axis("law", ["slip", "slowness"]),

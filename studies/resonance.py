@@ -1,4 +1,10 @@
-"""Resonance: what oscillating normal stress makes of spring stress, against its period."""
+"""Resonance: what oscillating normal stress makes of spring stress, against its period.
+
+Imposed normal stress oscillates around steady sliding, and spring stress with it. Small
+oscillations resound at the period 2 pi sqrt(a/(b - a)) D_c/V as stiffness falls to critical, by
+either law. The closer stiffness is to critical, the smaller the amplitude at which linear theory
+fails.
+"""
 
 import math
 from collections.abc import Callable
@@ -181,12 +187,7 @@ figure = Figure(
 study = Study(
     name="resonance",
     title="Response to oscillating normal stress, b/a = 2",
-    summary=(
-        "Imposed normal stress oscillates around steady sliding, and spring stress with it. Small "
-        "oscillations resound at the period 2 pi sqrt(a/(b - a)) D_c/V as stiffness falls to "
-        "critical, by either law. The closer stiffness is to critical, the smaller the amplitude "
-        "at which linear theory fails."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", LAWS),

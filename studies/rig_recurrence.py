@@ -1,4 +1,11 @@
-"""Stick-slip in the laboratory: recurrence interval and stress drop at three normal stresses."""
+"""Stick-slip in the laboratory: recurrence interval and stress drop at three normal stresses.
+
+Recurrence interval in s and static stress drop in MPa against load point velocity in um/s, on one
+machine, whose stiffness is 0.4, 0.2 and 0.1 of the critical one at 5, 10 and 20 MPa. Drops fall
+with the logarithm of load point velocity, by 2 (b-a) sigma and a little more: half of it by
+friction, half by overshoot. Intervals are the times in which the spring is loaded by the drop
+(lines), and a little longer for what creeps meanwhile.
+"""
 
 from dataclasses import replace
 
@@ -81,13 +88,7 @@ figure = Figure(
 study = Study(
     name="rig_recurrence",
     title="Stick-slip of a rig, k = 0.001 MPa/um, at three normal stresses",
-    summary=(
-        "Recurrence interval in s and static stress drop in MPa against load point velocity in "
-        "um/s, on one machine, whose stiffness is 0.4, 0.2 and 0.1 of the critical one at 5, 10 "
-        "and 20 MPa. Drops fall with the logarithm of load point velocity, by 2 (b-a) sigma and a "
-        "little more: half of it by friction, half by overshoot. Intervals are the times in which "
-        "the spring is loaded by the drop (lines), and a little longer for what creeps meanwhile."
-    ),
+    summary=Study.caption(__doc__),
     laboratory=rig,
     base=base,
     axes=[

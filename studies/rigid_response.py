@@ -1,4 +1,9 @@
-"""Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4)."""
+"""Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4).
+
+Stress against slip after the slip rate of a rigid slider steps from V_* to V. Variable normal
+stress slows the evolution to the new steady state and makes upward and downward steps unequal; with
+the slowness law it separates the responses to large downward steps.
+"""
 
 import math
 from dataclasses import dataclass
@@ -130,12 +135,7 @@ figure = Figure(
 study = Study(
     name="rigid_response",
     title="Responses of a rigid slider to steps of slip rate, b/a = 2",
-    summary=(
-        "Stress against slip after the slip rate of a rigid slider steps from V_* to V. "
-        "Variable normal stress slows the evolution to the new steady state and makes upward "
-        "and downward steps unequal; with the slowness law it separates the responses to large "
-        "downward steps."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, alpha=0.56),
     axes=[
         Axis("law", ["slip", "slowness"]),

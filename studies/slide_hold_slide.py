@@ -1,4 +1,11 @@
-"""Slide-hold-slide: healing and relaxation against hold time and stiffness."""
+"""Slide-hold-slide: healing and relaxation against hold time and stiffness.
+
+The load point is held, from steady sliding at V_*, and moves on at V_*. With the slowness law and b
+> a relaxation comes to an end that depends on stiffness, and healing grows by b ln 10 a decade at
+every stiffness; without rate weakening relaxation never ends. With the slip law healing per decade
+falls with stiffness, and relaxation never ends either, so that what is read off says as much of the
+machine as of the fault.
+"""
 
 import math
 
@@ -121,13 +128,7 @@ figure = Figure(
 study = Study(
     name="slide_hold_slide",
     title="Healing and relaxation in slide-hold-slide tests",
-    summary=(
-        "The load point is held, from steady sliding at V_*, and moves on at V_*. With the "
-        "slowness law and b > a relaxation comes to an end that depends on stiffness, and healing "
-        "grows by b ln 10 a decade at every stiffness; without rate weakening relaxation never "
-        "ends. With the slip law healing per decade falls with stiffness, and relaxation never "
-        "ends either, so that what is read off says as much of the machine as of the fault."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("case", CASES),

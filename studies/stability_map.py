@@ -1,5 +1,15 @@
 """Maps of limit cycles over stiffness and load point velocity: where steady sliding, damped
 oscillation, slow slip and stick-slip lie.
+
+What a slider does in the end whose load point steps from V_* to V_0: it slides steadily where
+linear theory calls that stable, and cycles everywhere else. Cycles whose peak slip rate stays below
+the instability norm are slow slip, those that reach it stick-slip; motions that settle do so by a
+damped oscillation where the eigenvalues are a complex pair, up to some six times the critical
+stiffness (slip_mode). The critical stiffness at V_0, from the eigenvalues of steady sliding, bounds
+the cycling region in every column of the map; at variable normal stress it falls with V_0, and slow
+slip lies in a narrow band below, while at constant normal stress stick-slip reaches up to the
+boundary. Beside it cycles are approached slowly, over thousands of events, and small errors of a
+step move them far: motions are integrated 300 times more tightly than their numbers are asked for.
 """
 
 from collections.abc import Mapping, Sequence
@@ -244,19 +254,7 @@ def edge(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
 study = Study(
     name="stability_map",
     title="Limit cycles over stiffness and load point velocity, b/a = 2, alpha = 0.56",
-    summary=(
-        "What a slider does in the end whose load point steps from V_* to V_0: it slides steadily "
-        "where linear theory calls that stable, and cycles everywhere else. Cycles whose peak "
-        "slip rate stays below the instability norm are slow slip, those that reach it "
-        "stick-slip; motions that settle do so by a damped oscillation where the eigenvalues are "
-        "a complex pair, up to some six times the critical stiffness (slip_mode). The critical "
-        "stiffness at V_0, from the eigenvalues of steady sliding, "
-        "bounds the cycling region in every column of the map; at variable normal stress it "
-        "falls with V_0, and slow slip lies in a narrow band below, while at constant "
-        "normal stress stick-slip reaches up to the boundary. Beside it cycles are approached "
-        "slowly, over thousands of events, and small errors of a step move them far: motions "
-        "are integrated 300 times more tightly than their numbers are asked for."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, alpha=0.56, inertia=True),
     axes=[
         Axis("law", ["slip", "slowness"]),

@@ -1,5 +1,13 @@
 """Stress drop against ln V_0: how loading rate scales static and dynamic stress drops (section
 3.5).
+
+Stress drops of limit cycles fall with the logarithm of load point velocity. For the slip law the
+slopes over three decades are close to 2 (a-b) sigma_* (static) and (a-b) sigma_* (dynamic) at
+constant normal stress, and those over 1 - mu_* cot(phi) where normal stress varies; for the
+slowness law they depend on stiffness. Slopes at the slow and the fast end of the range tell how
+constant they are: at variable normal stress they are not. At phi = 50 degrees k_cr falls so much
+with V that stick-slip ends: those cells say so, and the fits leave them out and count what they
+have.
 """
 
 import math
@@ -157,15 +165,7 @@ figure = Figure(
 study = Study(
     name="stress_drop",
     title="Static and dynamic stress drops of stick-slip against ln V_0",
-    summary=(
-        "Stress drops of limit cycles fall with the logarithm of load point velocity. For the "
-        "slip law the slopes over three decades are close to 2 (a-b) sigma_* (static) and (a-b) "
-        "sigma_* (dynamic) at constant normal stress, and those over 1 - mu_* cot(phi) where "
-        "normal stress varies; for the slowness law they depend on stiffness. Slopes at the "
-        "slow and the fast end of the range tell how constant they are: at variable normal "
-        "stress they are not. At phi = 50 degrees k_cr falls so much with V that stick-slip "
-        "ends: those cells say so, and the fits leave them out and count what they have."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", ["slip", "slowness"]),

@@ -1,6 +1,18 @@
 """Triggering: critical steps of normal stress, displacement and velocity as changes of stress, and
 whether a change of Coulomb stress predicts one from the other.
 
+A slider in steady state at V_* has its normal stress lowered at once, or its load point displaced,
+and is then held; or its load point goes on faster. To first order in k/k_cr a fall of normal stress
+triggers as a displacement step does, at a change of Coulomb stress with mu' = mu_* - alpha (1 -
+a/b), by every law. By the slip law that goes on to hold: exactly for alpha = 0, and to 3 % up to 2
+k_cr, inclined driving included. By the slowness law it ends near critical stiffness, where a fall
+of normal stress takes up to 2.4 times the change of Coulomb stress of a displacement: a fall also
+lowers the critical stiffness. Where the spring is so stiff that only a jump of slip rate to the
+norm is critical, it predicts no better. The effect of normal stress on the state makes falls
+trigger less. A velocity step, whose direct effect is a ln(V_0/V_*), takes 0.6 to 1.03 times the
+stress of a displacement, most of them less because the load point goes on; below critical stiffness
+any triggers. Inclined driving is at 60 degrees, the fall then one of sigma_3.
+
 A change of Coulomb stress is ``dtau - mu' dsigma``. A displacement step of the load point changes
 shear stress by K d, and normal stress by cot(phi) times that; a step of imposed normal stress, or
 of sigma_3, changes nothing else. To first order in k/k_cr both trigger at the same change of
@@ -166,21 +178,7 @@ figure = Figure(
 study = Study(
     name="triggering",
     title="Does a change of Coulomb stress predict triggering?",
-    summary=(
-        "A slider in steady state at V_* has its normal stress lowered at once, or its load point "
-        "displaced, and is then held; or its load point goes on faster. To first order in k/k_cr a "
-        "fall of normal stress triggers as a displacement step does, at a change of Coulomb stress "
-        "with mu' = mu_* - alpha (1 - a/b), by every law. By the slip law that goes on to hold: "
-        "exactly for alpha = 0, and to 3 % up to 2 k_cr, inclined driving included. By the "
-        "slowness law it ends near critical stiffness, where a fall of normal stress takes up to "
-        "2.4 times the change of Coulomb stress of a displacement: a fall also "
-        "lowers the critical stiffness. Where the spring is so stiff "
-        "that only a jump of slip rate to the norm is critical, it predicts no better. The effect "
-        "of normal stress on the state makes falls trigger less. A velocity step, whose direct "
-        "effect is a ln(V_0/V_*), takes 0.6 to 1.03 times the stress of a displacement, most of "
-        "them less because the load point goes on; below critical stiffness any triggers. "
-        "Inclined driving is at 60 degrees, the fall then one of sigma_3."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", ["slip", "slowness"]),

@@ -1,5 +1,11 @@
 """A law of two states: cycles whose period doubles, chaos, and Floquet multipliers (Gu et al. 1984;
 Becker 2000).
+
+A spring a little softer than critical oscillates with a limited slip rate, without mass and with
+the slip law, because a second state evolves over a longer slip. Softened, its period doubles, and
+doubles again, until the motion never repeats itself; softer than that slip rate is unbounded. The
+first doubling is where a Floquet multiplier of the cycle of one event passes -1; repelling, that
+cycle goes on through all that follows.
 """
 
 import math
@@ -153,13 +159,7 @@ figure = Figure(
 study = Study(
     name="two_states",
     title="Two states: slow oscillations double their period, b_1 = a, b_2 = 0.84 a, L_2 = 21 D_c",
-    summary=(
-        "A spring a little softer than critical oscillates with a limited slip rate, without mass "
-        "and with the slip law, because a second state evolves over a longer slip. Softened, its "
-        "period doubles, and doubles again, until the motion never repeats itself; softer than "
-        "that slip rate is unbounded. The first doubling is where a Floquet multiplier of the "
-        "cycle of one event passes -1; repelling, that cycle goes on through all that follows."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(
         law="two_slip_states",
         normal_stress="constant",

@@ -1,5 +1,11 @@
 """Two states: critical stiffness against the second evolution effect and its slip distance, down to
 friction that strengthens with slip rate.
+
+What a second state does to the stability of steady sliding. A negative b_2 over a longer slip
+distance makes steady friction strengthen with slip rate (b_1 + b_2 < a, b_2 below -0.4 a), and
+steady sliding is unstable nevertheless on springs that are soft enough: the first state weakens
+before the second has taken part. Over shorter distances than that of the first, the second state
+only takes from the direct effect or adds to it.
 """
 
 import math
@@ -46,13 +52,7 @@ EXACT: dict[str, Any] = {
 study = Study(
     name="two_states_stability",
     title="Critical stiffness of two states, b_1 = 1.4 a",
-    summary=(
-        "What a second state does to the stability of steady sliding. A negative b_2 over a longer "
-        "slip distance makes steady friction strengthen with slip rate (b_1 + b_2 < a, b_2 below "
-        "-0.4 a), and steady sliding is unstable nevertheless on springs that are soft enough: the "
-        "first state weakens before the second has taken part. Over shorter distances than that of "
-        "the first, the second state only takes from the direct effect or adds to it."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(law="two_slip_states", normal_stress="constant", a=A, b1_over_a=FIRST, stiffness=A),
     axes=[
         Axis("b2_over_a", [-1.1, -0.9, -0.7, -0.6, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7]),

@@ -1,4 +1,10 @@
-"""From a fit of a, b and D_c with their covariance to the distribution of a recurrence interval."""
+"""From a fit of a, b and D_c with their covariance to the distribution of a recurrence interval.
+
+A fit of a velocity step knows a and b to a tenth each, and b - a to a fifth, because the two are
+correlated; D_c, known to a tenth, hardly shows. The interval of stick-slip on this machine is known
+to 15 %: the drop goes with b - a, and with b for what heals at rest. Errors taken for independent
+would say 90 %.
+"""
 
 import math
 from dataclasses import replace
@@ -141,12 +147,7 @@ figure = Figure(
 study = Study(
     name="uncertain_recurrence",
     title="Recurrence interval of a rig by estimates of a, b and D_c with their covariance",
-    summary=(
-        "A fit of a velocity step knows a and b to a tenth each, and b - a to a fifth, because "
-        "the two are correlated; D_c, known to a tenth, hardly shows. The interval of "
-        "stick-slip on this machine is known to 15 %: the drop goes with b - a, and with b for "
-        "what heals at rest. Errors taken for independent would say 90 %."
-    ),
+    summary=Study.caption(__doc__),
     laboratory=rig,
     base=base,
     axes=[

@@ -1,4 +1,12 @@
-"""Velocity steps: by how much a, b, a - b and D_c as read off lie, against stiffness."""
+"""Velocity steps: by how much a, b, a - b and D_c as read off lie, against stiffness.
+
+Load point velocity steps from V_* to r V_*, and friction is recorded over 20 D_c. Read off are the
+direct effect, the evolution after it and the displacement over which it falls to 1/e. The softer
+the machine, the smaller a and b: at 10 k_cr tenfold steps give an a that is 14 to 40 % too small. a
+- b is right wherever friction has settled. D_c lies by the machine and, with the slowness law, by
+the direction of the step, which no correction for stiffness mends. With the slip law, large steps
+up on soft machines end in instability.
+"""
 
 import math
 
@@ -155,15 +163,7 @@ figure = Figure(
 study = Study(
     name="velocity_steps",
     title="Velocity steps as an experimenter reads them, b/a = 2",
-    summary=(
-        "Load point velocity steps from V_* to r V_*, and friction is recorded over 20 D_c. Read "
-        "off are the direct effect, the evolution after it and the displacement over which it "
-        "falls to 1/e. The softer the machine, the smaller a and b: at 10 k_cr tenfold steps give "
-        "an a that is 14 to 40 % too small. a - b is right wherever friction has settled. D_c lies "
-        "by the machine and, with the slowness law, by the direction of the step, which no "
-        "correction for stiffness mends. With the slip law, large steps up on soft machines end in "
-        "instability."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", ["slip", "slowness"]),

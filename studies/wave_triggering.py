@@ -1,4 +1,13 @@
-"""Wave triggering: by how much a train of waves advances the clock of the next event."""
+"""Wave triggering: by how much a train of waves advances the clock of the next event.
+
+A slider in its stick-slip cycle is met by two waves of normal stress, which falls first. Small ones
+advance or delay the next event in proportion to their amplitude, as the equations linear in
+departures from the free cycle say; with the slowness law what comes longer than a few a sigma/(k
+V_0) before the event is forgotten. Waves a hundred times slower than that trigger where Coulomb
+stress reaches the threshold of free events, to a few per cent, and so do strong ones, which raise
+it faster than the load point does, to within a sigma/(k V_0). In between the threshold misleads by
+a factor of two to ten.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -160,15 +169,7 @@ figure = Figure(
 study = Study(
     name="wave_triggering",
     title="Clock advance of stick-slip by a train of two waves of normal stress, k = 0.5 k_cr",
-    summary=(
-        "A slider in its stick-slip cycle is met by two waves of normal stress, which falls first. "
-        "Small ones advance or delay the next event in proportion to their amplitude, as the "
-        "equations linear in departures from the free cycle say; with the slowness law what comes "
-        "longer than a few a sigma/(k V_0) before the event is forgotten. Waves a hundred times "
-        "slower than that trigger where Coulomb stress reaches the threshold of free events, to a "
-        "few per cent, and so do strong ones, which raise it faster than the load point does, to "
-        "within a sigma/(k V_0). In between the threshold misleads by a factor of two to ten."
-    ),
+    summary=Study.caption(__doc__),
     base=base,
     axes=[
         Axis("law", LAWS),

@@ -1,4 +1,10 @@
-"""What matters: Sobol indices of three headlines under uncertain a, b - a and stiffness."""
+"""What matters: Sobol indices of three headlines under uncertain a, b - a and stiffness.
+
+Each of a, b - a and k is uncertain by 10 %, independently. The displacement boundary a/(b - a)
+feels a and b - a alike; the stress drop b - a almost alone; the interval, which is the drop over k
+V_0, b - a and k. Indices of first order and total are the same: nothing acts together. Bars are
+intervals of 95 %.
+"""
 
 import math
 from dataclasses import dataclass
@@ -121,12 +127,7 @@ figure = Figure(
 study = Study(
     name="what_matters",
     title="Sobol indices of three headlines under uncertain a, b - a and stiffness",
-    summary=(
-        "Each of a, b - a and k is uncertain by 10 %, independently. The displacement boundary "
-        "a/(b - a) feels a and b - a alike; the stress drop b - a almost alone; the interval, "
-        "which is the drop over k V_0, b - a and k. Indices of first order and total are the same: "
-        "nothing acts together. Bars are intervals of 95 %."
-    ),
+    summary=Study.caption(__doc__),
     base=Scene(normal_stress="constant", inertia=True, stiffness=0.006),
     axes=[
         Axis.samples(

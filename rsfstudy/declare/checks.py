@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rsfstudy.declare.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
+from rsfstudy.rig.quantities import FULL
 from rsfstudy.slider.registry import FIELDS, SLOT_NAMES
 from rsfstudy.slider.synonyms import instead_of_field
 from rsfstudy.vocabulary import QUANTITIES
@@ -58,6 +60,17 @@ def fields(study: Study) -> None:
             rule = "decides which numbers are measured, which all cells must share"
             remedy = "Make a study of each value."
             raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
+
+
+def apart(axes: Sequence[Axis]) -> None:
+    """Refuse axes that repeat a dimension or vary the same field."""
+    taken: dict[str, str] = {}
+    for axis in axes:
+        for name in {FULL.get(n, n) for n in (axis.dimension, *axis.fields)}:
+            if name in taken:
+                rule = f"varies {name!r}, as {taken[name]!r} does already"
+                raise InvalidValue("axis", axis.dimension, rule)
+            taken[name] = axis.dimension
 
 
 def unknown(of: str, name: str, rule: str, known: Collection[str]) -> InvalidValue:

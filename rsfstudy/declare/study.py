@@ -121,18 +121,12 @@ class Study:
         self._check_parts()
         checks.own_fields(self)
         checks.fields(self)
+        checks.apart(self.axes)
         for name, value in self.describe().items():
             try:
                 json.dumps(value)
             except (TypeError, ValueError) as error:
                 raise InvalidValue(name, value, f"must be plain data ({error})") from error
-        taken: dict[str, str] = {}
-        for axis in self.axes:
-            for name in {FULL.get(n, n) for n in (axis.dimension, *axis.fields)}:
-                if name in taken:
-                    rule = f"varies {name!r}, as {taken[name]!r} does already"
-                    raise InvalidValue("axis", axis.dimension, rule)
-                taken[name] = axis.dimension
 
     def _check_parts(self) -> None:
         parts: list[tuple[str, Sequence[Any], type]] = [
@@ -175,6 +169,12 @@ class Study:
             if {name, FULL.get(name)} & set(self.measure.sought):
                 rule = f"{self.measure.name} solves for {name}; it cannot be an axis or be set"
                 raise InvalidValue(name, "...", rule, remedy="Leave it out.")
+
+    @staticmethod
+    def caption(docstring: str | None) -> str:
+        """The second paragraph of a module's docstring: a summary at the top of the file."""
+        paragraphs = (docstring or "").split("\n\n", 2)
+        return " ".join(" ".join(paragraphs[1:2]).split())
 
     # ---- parts of the user's own ------------------------------------------------------------
 
