@@ -22,7 +22,7 @@ from rsfstudy.reduce import (
     StandardDeviation,
     reduced,
 )
-from rsfstudy.reduce.carried import COMMENT
+from rsfstudy.reduce.base import COMMENT
 from rsfstudy.status import Status
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])

@@ -3,7 +3,7 @@
 A reduction never draws on failed or missing cells: where there are any within its support, the
 result is NaN and says why, unless it is told to leave the failed ones out. Cells that answered
 without a number (such as `stable_for_all_steps`) are left out, and counted. Numerical errors of
-cells are carried to what is made of them (`rsfstudy.reduce.carried`).
+cells are carried to what is made of them (`rsfstudy.reduce.base.carried`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,16 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Reduction, failed, known, stated_by, without_failures, worst
+from rsfstudy.reduce.base import (
+    Reduction,
+    carried,
+    failed,
+    known,
+    stated_by,
+    without_failures,
+    worst,
+)
 from rsfstudy.reduce.boundaries import Boundary, Inverse
-from rsfstudy.reduce.carried import carried
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, Range, RelativeDifference
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares

@@ -15,8 +15,8 @@ Pair = tuple[xr.DataArray, xr.DataArray]
 
 
 @dataclass(frozen=True)
-class _Against(Reduction):
-    """A variable against its value at a reference point of one dimension; members say how.
+class Difference(Reduction):
+    """Difference of a variable above its value at a reference point: ``of - of_reference``.
 
     Parameters
     ----------
@@ -32,15 +32,16 @@ class _Against(Reduction):
 
     along: str = ""
     reference: str | float = ""
-    formula: ClassVar[str]
+    kind: ClassVar[str] = "difference"
+    formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-        """The comparison."""
-        raise TypeError(f"{type(self).__name__} compares nothing")
+        """The comparison: of - of_reference."""
+        return values - reference
 
     def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
-        """Derivatives of the comparison by the value and by the reference."""
-        raise TypeError(f"{type(self).__name__} compares nothing")
+        """Derivatives of the comparison by the value and by the reference: 1 and -1."""
+        return xr.ones_like(values), -xr.ones_like(values)
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """The point itself and the reference: where one failed, there is nothing to compare."""
@@ -65,6 +66,22 @@ class _Against(Reduction):
         own, others = self.slopes(values, values.sel(place, drop=True))
         apart = dataset[self.along] != self.reference
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
+
+
+@dataclass(frozen=True)
+class RelativeDifference(Difference):
+    """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
+
+    kind: ClassVar[str] = "relative_difference"
+    formula: ClassVar[str] = "1 - {of} over {reference}"
+
+    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
+        """1 - of/of_reference."""
+        return 1.0 - values / reference
+
+    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
+        """-1/of_reference and of/of_reference^2."""
+        return -xr.ones_like(values) / reference, values / reference**2
 
 
 @dataclass(frozen=True)
@@ -94,38 +111,6 @@ class Range(Reduction):
         """1 by the largest, -1 by the least."""
         of = dataset[self.of].reset_coords(drop=True)
         return [(1.0 * (of == of.max(self.over)) - 1.0 * (of == of.min(self.over)), {})]
-
-
-@dataclass(frozen=True)
-class RelativeDifference(_Against):
-    """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
-
-    kind: ClassVar[str] = "relative_difference"
-    formula: ClassVar[str] = "1 - {of} over {reference}"
-
-    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-        """1 - of/of_reference."""
-        return 1.0 - values / reference
-
-    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
-        """-1/of_reference and of/of_reference^2."""
-        return -xr.ones_like(values) / reference, values / reference**2
-
-
-@dataclass(frozen=True)
-class Difference(_Against):
-    """Difference of a variable above its value at a reference point: ``of - of_reference``."""
-
-    kind: ClassVar[str] = "difference"
-    formula: ClassVar[str] = "{of} less {reference}"
-
-    def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-        """Of - of_reference."""
-        return values - reference
-
-    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
-        """1 and -1."""
-        return xr.ones_like(values), -xr.ones_like(values)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, 
 
 
 @dataclass(frozen=True)
-class _Fit(Reduction):
-    """Unweighted least squares along one coordinate; members say of which law.
+class LinearFit(Reduction):
+    """Unweighted least squares of ``of = constant + name * on`` along one coordinate.
 
     Parameters
     ----------
@@ -33,12 +33,15 @@ class _Fit(Reduction):
     on: str = ""
     within: tuple[float, float] | None = None
     #: Parameters of the law, and the law with the names of the fields of the fit.
-    unknowns: ClassVar[int] = 1
-    law: ClassVar[str]
+    unknowns: ClassVar[int] = 2
+    law: ClassVar[str] = "{of} = constant + {name} * {on}"
+    kind: ClassVar[str] = "linear_fit"
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """Values as they enter a fit through the origin."""
-        raise TypeError(f"{type(self).__name__} fits no law")
+        """Values as they enter a fit through the origin: less their mean, which takes care of the
+        constant.
+        """
+        return values - values.mean(dimension)
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
@@ -108,12 +111,13 @@ class _Fit(Reduction):
 
 
 @dataclass(frozen=True)
-class ProportionalFit(_Fit):
+class ProportionalFit(LinearFit):
     """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
     at the origin.
     """
 
     minus: float = 0.0
+    unknowns: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
     law: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
 
@@ -124,19 +128,6 @@ class ProportionalFit(_Fit):
     def offset(self, values: xr.DataArray) -> xr.DataArray:
         """Values less the value at the origin."""
         return values - self.minus
-
-
-@dataclass(frozen=True)
-class LinearFit(_Fit):
-    """Least squares of ``of = constant + name * on``."""
-
-    unknowns: ClassVar[int] = 2
-    kind: ClassVar[str] = "linear_fit"
-    law: ClassVar[str] = "{of} = constant + {name} * {on}"
-
-    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """Less their mean, which takes care of the constant."""
-        return values - values.mean(dimension)
 
 
 @dataclass(frozen=True)
