@@ -5,10 +5,12 @@ import pytest
 import test_figures as checks
 import xarray as xr
 from matplotlib.figure import Figure
-from running import named_results
+from running import named_results, run
 
 import rsfstudy
-from rsfstudy import Scene, plots
+from rsfstudy import Axis, Panel, Scene, Study, plots
+from rsfstudy.declare import catalogue
+from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text
 from rsfstudy.plots.maps import contours
 
@@ -42,6 +44,53 @@ def test_the_picture_of_a_motion_is_printable():
     ):
         test(drawn)
     assert drawn._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
+    """Names along y move the panel, and its title with it; each curve has a name."""
+    dataset, _path = named_results("accuracy_cost", tmp_path_factory)
+    drawn = plots.figure(dataset, variable="status")
+    checks.assert_printable(drawn)
+    (axes,) = drawn.axes
+    assert axes.get_title().count("\n") > 1
+    assert len(axes.get_legend_handles_labels()[1]) == len(axes.lines)
+
+
+def test_an_added_axis_lays_out_what_a_panel_shows_one_point_of():
+    """The panel is at the first law; of two laws it is drawn twice, with the curves of each."""
+    study = catalogue.load("rate_step_boundary")
+    narrow = {"b_over_a": [1.5, 2.0, 3.0], "case": ["constant normal stress"]}
+    dataset = run(study.with_(**narrow, law=["slip", "slowness"]), rtol=1e-3)
+    slip, slowness = plots.figure(dataset).axes
+    assert slip.get_title().endswith("slip law")
+    assert slowness.get_title().endswith("slowness law")
+    assert max(slowness.lines[0].get_ydata()) > 2.0 * max(slip.lines[0].get_ydata())
+
+
+def stiffnesses() -> xr.Dataset:
+    """Critical stiffness at two angles, of two values of b/a that have names."""
+    points = {"strong": {"b_over_a": 2.0}, "weak": {"b_over_a": 1.5}}
+    axes = [Axis("phi", [50.0, 60.0]), Axis("weakening", points)]
+    return run(Study(name="n", title="t", base=Scene(), axes=axes, measure=LinearStability()))
+
+
+def test_names_along_y_are_written_from_the_top_down():
+    panel = Panel(x="critical_stiffness", y="weakening", by=["phi"])
+    (axes,) = plots.figure(stiffnesses(), plots.Declared([panel])).axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["strong", "weak"]
+    assert axes.yaxis_inverted()
+    assert [line.get_linestyle() for line in axes.lines] == ["None", "None"]
+
+
+def test_nothing_is_drawn_where_nothing_came_out():
+    """Neither a number nor a cell that is fine: there is no panel."""
+    dataset = stiffnesses()
+    failed = dataset["phi"] == 50.0
+    dataset["critical_stiffness"] = dataset["critical_stiffness"].where(~failed)
+    panels = plots.Declared([Panel(x="weakening", y="critical_stiffness", each=["phi"])])
+    assert len(plots.figure(dataset, panels).axes) == 2
+    dataset["status"] = dataset["status"].where(~failed, np.int8(20))
+    assert len(plots.figure(dataset, panels).axes) == 1
 
 
 def test_errors_too_small_to_show_are_left_out():
