@@ -19,7 +19,7 @@ from rsfstudy.declare.figure import level, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, ProportionalFit, RelativeDifference
 
-from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
 
 CLOSE = "'very close'; 'maximum difference of a few percents'"
 
@@ -141,8 +141,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
-    ],
+    references=[REFERENCE, GU_ET_AL],
 )

@@ -1,4 +1,9 @@
-"""Slip law or slowness law? How often a record tells, and how often it misleads."""
+"""Slip law or slowness law? How often a record tells, and how often it misleads.
+
+Velocity steps made by one law and fitted by both; Akaike's criterion, in which the noise counts,
+decides where it differs by 4. At the noise of a good rig one step tells the law. At ten times that
+noise a step leaves it open, and a pair, up and back, tells it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -117,12 +122,7 @@ def seldom_wrong(law: str) -> Claim:
 study = Study(
     name="law_choice",
     title="Records that tell the evolution law, mislead, or leave it open",
-    summary=(
-        "Velocity steps made by one law and fitted by both; Akaike's criterion, in which the noise "
-        f"counts, decides where it differs by {DECIDES:g}. At the noise of a good rig one step "
-        "tells the law. At ten times that noise a step leaves it open, and a pair, up and back, "
-        "tells it."
-    ),
+    summary=Study.caption(__doc__),
     base=RIG,
     axes=[
         Axis("law", list(LAWS)),

@@ -16,7 +16,7 @@ from rsfstudy.declare.figure import Axes, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import ProportionalFit, RelativeDifference
 
-from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
 
 #: a/(b-a): densely over the paper's range, which is fitted, and on to where the finite norm bends
 #: the curves.
@@ -139,8 +139,5 @@ study = Study(
         lower(1.0, 0.16),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
-    ],
+    references=[REFERENCE, GU_ET_AL],
 )

@@ -17,7 +17,7 @@ from rsfstudy.declare.figure import Axes, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import OverClosedForm, RelativeDifference
 
-from ._paper import CASES, CONSTANT, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
 
 
 def slowness(stiffness_ratio: float, published: float, tolerance: float, digits: str) -> Claim:
@@ -125,8 +125,5 @@ study = Study(
         slowness(1.5, 2361.0, 0.5, "the unit"),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
-    ],
+    references=[REFERENCE, GU_ET_AL],
 )

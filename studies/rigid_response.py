@@ -239,7 +239,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-    ],
+    references=[REFERENCE],
 )

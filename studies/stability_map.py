@@ -30,7 +30,7 @@ from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
-from ._paper import PAPER, REFERENCE
+from ._paper import GU_ET_AL, PAPER, REFERENCE
 from ._phase_plane import scene_of
 
 CASES = [(law, stress) for law in ("slip", "slowness") for stress in ("constant", "variable")]
@@ -270,8 +270,5 @@ study = Study(
         *(edge(*case, **NONE_MISPLACED) for case in CASES),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
-    ],
+    references=[REFERENCE, GU_ET_AL],
 )

@@ -31,7 +31,7 @@ from rsfstudy.declare.figure import Axes, Draw, level, reference_line
 from rsfstudy.reduce import LinearFit
 from rsfstudy.slider.closed_forms import effective_friction, normal_stress_step
 
-from ._paper import REFERENCE
+from ._paper import GU_ET_AL, REFERENCE
 from ._triggers import Triggers
 
 base = Scene(b_over_a=2.0)
@@ -248,6 +248,6 @@ study = Study(
     references=[
         REFERENCE,
         "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940",
-        "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196",
+        GU_ET_AL,
     ],
 )
