@@ -363,7 +363,7 @@ figure = Figure(
         ),
         Panel(marks=[mark_work], x_label="Right-hand sides", y_label="Case"),
     ],
-    height=lambda dataset: 20.0 + 3.25 * dataset.sizes["hard_case"],
+    height=lambda dataset: max(40.0, 20.0 + 3.25 * dataset.sizes["hard_case"]),
 )
 
 

@@ -24,8 +24,8 @@ from rsfstudy.vocabulary import coverage, quantity
 _WIDE = 100.0
 #: Log axes that span less than this have numbers between decades too.
 _NARROW = 50.0
-#: Most names along an axis.
-_NAMES = 45
+#: Most names along y, and along x.
+_NAMES, _ACROSS = 45, 30
 #: Most names along x that lie side by side; more stand upright.
 _UPRIGHT = 12
 #: What the points of some axes are said to be.
@@ -107,7 +107,7 @@ def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
         return np.asarray(points, dtype=float)
     upright = points.size > _UPRIGHT
     width = 40 if upright else max(8, 48 // points.size)
-    name_points(axes.xaxis, [str(point) for point in points], width)
+    name_points(axes.xaxis, [str(point) for point in points], width, _ACROSS)
     if upright:
         axes.tick_params(axis="x", labelrotation=90.0, labelsize=5.0)
     axes.set_xlim(-0.5, points.size - 0.5)
@@ -137,9 +137,9 @@ def log_scale(axes: Axes, which: str) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def name_points(axis: Axis, names: list[str], width: int) -> None:
+def name_points(axis: Axis, names: list[str], width: int, most: int = _NAMES) -> None:
     """Ticks at 0, 1, ... with names: of all points, or of some where there are many."""
-    some = slice(None, None, -(-len(names) // _NAMES))
+    some = slice(None, None, -(-len(names) // most))
     texts = [wrapped(pretty(name), width) for name in names[some]]
     axis.set_ticks(range(len(names))[some], texts)
 

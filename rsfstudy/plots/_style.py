@@ -121,7 +121,8 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     shown = _named(axes)
     if not shown:
         return
-    lines = 1 + axes.get_xlabel().count("\n")
+    ticks = max((text.get_text().count("\n") for text in axes.get_xticklabels()), default=0)
+    lines = 1 + ticks + axes.get_xlabel().count("\n")
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
