@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from rsfstudy.plots._text import label, number, pretty, stiffness, symbol, wrapped
+from rsfstudy.plots._text import label, length, number, pretty, stiffness, symbol, wrapped
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -105,9 +105,12 @@ def axis_of(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
     points = dataset[dimension].values
     if is_numeric(dataset, dimension):
         return np.asarray(points, dtype=float)
-    upright = points.size > _UPRIGHT
-    width = 40 if upright else max(8, 48 // points.size)
-    name_points(axes.xaxis, [str(point) for point in points], width, _ACROSS)
+    names, width = [str(point) for point in points], max(8, 48 // points.size)
+    longest = max(
+        length(part) for name in names for part in wrapped(pretty(name), width).split("\n")
+    )
+    upright = points.size > _UPRIGHT or longest > 1.4 * width
+    name_points(axes.xaxis, names, 40 if upright else width, _ACROSS)
     if upright:
         axes.tick_params(axis="x", labelrotation=90.0, labelsize=5.0)
     axes.set_xlim(-0.5, points.size - 0.5)

@@ -20,6 +20,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
 from rsfstudy.doors import check_file
@@ -121,8 +122,7 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     shown = _named(axes)
     if not shown:
         return
-    ticks = max((text.get_text().count("\n") for text in axes.get_xticklabels()), default=0)
-    lines = 1 + ticks + axes.get_xlabel().count("\n")
+    lines = axes.get_xlabel().count("\n") + _tick_lines(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
@@ -136,6 +136,16 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         title=title,
     )
     _fit(made, min(columns, len(shown)), 0.97 * (right - left) * figure.bbox.width)
+
+
+def _tick_lines(axes: Axes) -> float:
+    """Lines of text that the names of ticks along x are high."""
+
+    def lines(tick: Text) -> float:
+        parts = tick.get_text().split("\n")
+        return 0.3 * max(map(len, parts)) if tick.get_rotation() == 90.0 else float(len(parts))
+
+    return max(1.0, *map(lines, axes.get_xticklabels()))
 
 
 def _named(axes: Axes) -> dict[str, Any]:
@@ -209,9 +219,13 @@ def _texts(legend: Legend) -> list[str]:
 
 
 def make_room(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
-    """Make a figure as much taller as its legends are, so that they take nothing from the data."""
+    """Make a figure as much taller as its legends and names of ticks are, so that they take nothing
+    from the data.
+    """
     beside = [[legend for panel in row if (legend := panel.get_legend())] for row in rows]
     heights = [max(map(_height, legends), default=0.0) for legends in (*beside, figure.legends)]
+    line = 1.3 * float(rcParams["font.size"]) / 72.0
+    heights += [line * (max(map(_tick_lines, row)) - 1.0) for row in rows]
     figure.set_figheight(figure.get_figheight() + sum(heights))
 
 
@@ -243,10 +257,13 @@ def settle(figure: Figure) -> None:
 
 
 def _keep_title(axes: Axes) -> None:
-    """Break a title that would be cut where the figure ends: long names along y move its panel."""
-    title, edges = axes.title, cast(Figure, axes.figure).bbox
-    extent, middle = title.get_window_extent(), 0.5 * sum(axes.get_window_extent().intervalx)
-    free = 2.0 * min(middle - edges.x0, edges.x1 - middle)
+    """Break a title that would be cut where the figure ends, or touch the letter of its panel: long
+    names along y move the panel, and a scale of colours makes it narrow.
+    """
+    title, edges, panel = axes.title, cast(Figure, axes.figure).bbox, axes.get_window_extent()
+    extent, middle = title.get_window_extent(), 0.5 * sum(panel.intervalx)
+    left = panel.x0 if axes.get_title(loc="left") else edges.x0
+    free = 1.9 * min(middle - left, edges.x1 - middle)
     if title.get_text() and extent.width > free:
         longest = max(map(len, title.get_text().split("\n")))
         text = title.get_text().replace("\n", " ")

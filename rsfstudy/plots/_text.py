@@ -102,13 +102,13 @@ def wrapped(text: str, width: int) -> str:
             words.append(word)
     lines: list[list[str]] = [[]]
     for word in words:
-        if lines[-1] and _length(" ".join([*lines[-1], word])) > width:
+        if lines[-1] and length(" ".join([*lines[-1], word])) > width:
             lines.append([])
         lines[-1].append(word)
     return "\n".join(" ".join(line) for line in lines)
 
 
-def _length(text: str) -> int:
+def length(text: str) -> int:
     """Characters to be seen, about."""
     return len(re.sub(r"[${}^_]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
 
