@@ -25,7 +25,7 @@ from matplotlib.transforms import blended_transform_factory, offset_copy
 
 from rsfstudy.doors import check_file
 from rsfstudy.errors import InvalidValue
-from rsfstudy.plots._text import wrapped
+from rsfstudy.plots._text import length, wrapped
 
 #: The style sheet that ships.
 SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
@@ -145,7 +145,7 @@ def _tick_lines(axes: Axes) -> float:
         parts = tick.get_text().split("\n")
         return 0.3 * max(map(len, parts)) if tick.get_rotation() == 90.0 else float(len(parts))
 
-    return max(1.0, *map(lines, axes.get_xticklabels()))
+    return max([1.0, *map(lines, axes.get_xticklabels())])
 
 
 def _named(axes: Axes) -> dict[str, Any]:
@@ -265,6 +265,6 @@ def _keep_title(axes: Axes) -> None:
     left = panel.x0 if axes.get_title(loc="left") else edges.x0
     free = 1.9 * min(middle - left, edges.x1 - middle)
     if title.get_text() and extent.width > free:
-        longest = max(map(len, title.get_text().split("\n")))
+        longest = max(map(length, title.get_text().split("\n")))
         text = title.get_text().replace("\n", " ")
         title.set_text(wrapped(text, int(0.95 * longest * free / extent.width)))
