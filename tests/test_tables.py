@@ -86,7 +86,7 @@ def test_a_relation_stays_with_its_number(printed):
 
 def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
     path = "/a/very/long/path" * 9
-    lines = printed(40, layout.pairs, {"file": path})
+    lines = printed(40, layout.show, {"file": path})
     assert path in "".join("".join(lines).split())
 
 

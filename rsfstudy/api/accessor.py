@@ -50,7 +50,7 @@ class Accessor:
         from rsfstudy.api import report
 
         self._must_be_ours()
-        return report.tables_of(self._dataset)
+        return report.html(self._dataset)
 
     @property
     @door
@@ -65,7 +65,7 @@ class Accessor:
         """
         from rsfstudy.api import fit_results, scenes
 
-        if "rows_fitted" in self._dataset:
+        if fit_results.is_fit(self._dataset):
             return fit_results.scene(self._dataset)
         if self._is_study:
             return self.study.scene(scenes.cell(self._dataset, self.study))

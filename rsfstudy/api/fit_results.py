@@ -37,9 +37,14 @@ SHORT = {
 }
 
 
+def is_fit(dataset: xr.Dataset) -> bool:
+    """True of fits of records."""
+    return "rows_fitted" in dataset
+
+
 def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
     """The fits that a dataset holds, one by one; of several windows, that of the whole one."""
-    if "rows_fitted" not in dataset:
+    if not is_fit(dataset):
         raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
     if "part" in dataset.dims:
         dataset = dataset.isel(part=0)

@@ -6,7 +6,7 @@ import base64
 import os
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from html import escape
 from importlib import resources
@@ -17,15 +17,16 @@ from urllib.parse import quote
 
 import xarray as xr
 
-from rsfstudy.api import fit_tables, runs, tables
+from rsfstudy.api import runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
-from rsfstudy.declare.wording import settings, stated
+from rsfstudy.declare.wording import settings
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
 from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, table
+from rsfstudy.status import Status
 
 _UNREAD = "cannot be read"
 #: What begins a page of ours, and a figure.
@@ -123,7 +124,7 @@ def _page(directory: Path, found: list[_Result]) -> str:
     return page.substitute(
         title=f"Results in {_text(directory.resolve().name)}",
         made=_text(f"{len(found)} files, read by {by}, {when}"),
-        summary=f"<nav>{_table(summary)}</nav>",
+        summary=f"<nav>{_shown(summary)}</nav>",
         sections="\n".join(sections),
     )
 
@@ -145,15 +146,15 @@ def _result(path: Path, beside: Path) -> _Result:
 def _read(path: Path, dataset: xr.Dataset) -> _Result:
     """What is told of a file that can be read."""
     title = str(dataset.attrs.get("title", "answer for one scene"))
-    numbers = tables_of(dataset)
+    numbers = html(dataset)
     # the accessor, which this module cannot import: it shows these tables
     if contents.is_of_a_scene(dataset):
         is_motion = "load_point_displacement" in dataset
         figure = _figure(path, dataset.rsf.plot) if is_motion else ""
-        status = str(dataset.attrs["status"])
-        return _Result(path, title, "", "" if status == "ok" else status, (figure, numbers))
+        status = str(dataset.attrs["status"]).removeprefix(Status.OK.label)
+        return _Result(path, title, "", status, (figure, numbers))
     about = contents.declaration(dataset)
-    parts = [_said(about.summary)] if about.summary else []
+    parts = [_shown(about.summary)] if about.summary else []
     if about.overrides:
         parts.append(_said(f"Not as declared: {settings(about.overrides)}", "yellow"))
     parts += [_figure(path, dataset.rsf.plot), numbers]
@@ -163,37 +164,19 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
     failed, cells = tables.failures(dataset)
     if cells:
         commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
-        parts.append(f"<h3>Failures</h3>\n{_table(failed)}<pre>{_text(commands)}</pre>")
-    parts.append(f"<h3>Provenance</h3>\n{_list(tables.origin(dataset))}")
+        parts.append(f"<h3>Failures</h3>\n{_shown(failed)}<pre>{_text(commands)}</pre>")
+    parts.append(f"<h3>Provenance</h3>\n{_shown(told.origin(dataset))}")
     return _Result(path, title, verdicts, ", ".join(wrong), tuple(parts))
 
 
-def tables_of(dataset: xr.Dataset) -> str:
-    """The numbers of a dataset in HTML: fits, or headline, slopes and verdicts, or those of one
-    scene.
-    """
+def html(dataset: xr.Dataset) -> str:
+    """The numbers of a dataset in HTML, and the verdicts on those of a study."""
+    parts = list(map(_shown, told.numbers(dataset)))
     if contents.is_of_a_scene(dataset):
-        return _list(_of_a_scene(dataset))
-    told: list[Table | str] = [tables.headline(dataset), *tables.reductions(dataset)]
-    if "rows_fitted" in dataset:
-        told = list(fit_tables.told(dataset))
-    claimed = tables.claims(runs.check(dataset))
-    parts = [_said(one) if isinstance(one, str) else _table(one) for one in told]
-    parts += ["<h3>Claims</h3>", _table(claimed)] if claimed.rows else []
+        parts.append(_shown(told.origin(dataset)))
+    elif (claimed := tables.claims(runs.check(dataset))).rows:
+        parts += ["<h3>Claims</h3>", _shown(claimed)]
     return "\n".join(filter(None, parts))
-
-
-def _of_a_scene(answer: xr.Dataset) -> dict[str, str]:
-    """What is told of a motion, or of another answer for one scene."""
-    about = answer.attrs
-    numbers = {n: v for n, v in answer.data_vars.items() if not v.dims and v.dtype.kind in "fiu"}
-    return {
-        "status": f"{about['status']} {about.get('message', '')}".strip(),
-        **{str(name): f"{value.item():.8g}" for name, value in numbers.items()},
-        "scene": stated(answer.rsf.scene.as_dict()),
-        "made by": about.get("history", "unknown"),
-        "with": about.get("source", "unknown"),
-    }
 
 
 # ---- pieces of HTML ------------------------------------------------------------------------------
@@ -208,23 +191,23 @@ def _said(text: str, colour: str = "") -> str:
     return f'<p class="{colour}">{_text(text)}</p>'
 
 
-def _table(told: Table) -> str:
-    """A table, in a box of its own that scrolls where it is too wide; none without rows."""
-    if not told.rows:
-        return ""
-    rows = []
-    for row, colour in zip(told.rows, told.colours or [""] * len(told.rows), strict=True):
-        whole = {head: "" if head in told.prose else "whole" for head in row}
+def _shown(piece: told.Piece) -> str:
+    """A sentence, what is what, or a table, in a box of its own that scrolls where it is too wide;
+    nothing of what is empty.
+    """
+    if isinstance(piece, str):
+        return _said(piece)
+    if not isinstance(piece, Table):
+        rows = (f"<dt>{_text(n)}</dt><dd>{_text(value)}</dd>" for n, value in piece.items())
+        return f"<dl>{''.join(rows)}</dl>" if piece else ""
+    rows_ = []
+    for row, colour in zip(piece.rows, piece.colours or [""] * len(piece.rows), strict=True):
+        whole = {head: "" if head in piece.prose else "whole" for head in row}
         whole[list(row)[-1]] += f" {colour}"
         texts = {head: c if isinstance(c, Markup) else _text(c) for head, c in row.items()}
-        rows.append([Markup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
-    caption = _said(told.caption) if told.caption else ""
-    return f'{caption}<div class="wide">{table(list(told.rows[0]), rows)}</div>'
-
-
-def _list(pairs: Mapping[str, Any]) -> str:
-    rows = "".join(f"<dt>{_text(n)}</dt><dd>{_text(value)}</dd>" for n, value in pairs.items())
-    return f"<dl>{rows}</dl>"
+        rows_.append([Markup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
+    caption = _said(piece.caption) if piece.caption else ""
+    return f'{caption}<div class="wide">{table(list(piece.rows[0]), rows_)}</div>' if rows_ else ""
 
 
 def _figure(path: Path, draw: Callable[[], Any]) -> str:

@@ -57,6 +57,12 @@ def number(value: float, form: str = ".8g") -> str:
     return "-" if np.isnan(value) else format(value, form)
 
 
+def units_of(values: xr.DataArray) -> str:
+    """The units of values, or what those without units are measured in; "1" for numbers."""
+    units = values.attrs.get("scale") or values.attrs.get("units", "1")
+    return str(units).replace(" s-1", "/s")
+
+
 def with_units(along: xr.DataArray) -> str:
     """The name of an axis, and its units where it is that of a rig."""
     name, units = str(along.name), along.attrs.get("units", "1")
@@ -114,9 +120,8 @@ def headline(dataset: xr.Dataset) -> Table:
         if others:
             row["status"] = LABELS[int(cell["status"])]
         rows.append(row)
-    about = dataset[name].attrs
-    units = about.get("scale") or about.get("units", "1")
-    caption = about.get("long_name", name) + (f", in {units}" if units != "1" else "")
+    units = units_of(dataset[name])
+    caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
     if len(rows) < status.size:
         caption += f" ({len(rows)} of {status.size:,} cells)"
     return Table(rows, caption)
@@ -131,7 +136,7 @@ def in_short(dataset: xr.Dataset) -> list[str]:
         least_and_most = " to ".join(
             short(value) for value in dict.fromkeys((*told[:1], *told[-1:]))
         )
-        units = values.attrs.get("scale") or values.attrs.get("units", "1")
+        units = units_of(values)
         text = f"{values.name}: {least_and_most or 'no number'}"
         lines.append(text + f" {units}" * bool(least_and_most and units != "1"))
     slopes = {slope: converted[slope].values.ravel().tolist() for slope in _slopes(converted)}

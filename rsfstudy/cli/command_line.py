@@ -1,23 +1,21 @@
-"""The command line: how each command is spelt, and what its help says. What a command needs is
+"""The command line: how each command is spelt, and what its help says. What a command does is
 loaded when it is called, so that help and the list of studies answer at once.
 """
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
 import shlex
 import signal
 import sys
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from rsfstudy.cli import command_line_fit, command_line_referee, command_line_simulate, options
+from rsfstudy.cli import command_line_motions, options
 from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS, OUTPUT
 from rsfstudy.doors import in_words
@@ -36,8 +34,10 @@ OK, FAILED, WRONG_USAGE = 0, 1, 2
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
 
 
-class InOrder(click.Group):
+class Commands(click.Group):
     """A group whose help names commands in the order of this file."""
+
+    command_class = options.Command
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Names of the commands."""
@@ -52,7 +52,7 @@ class InOrder(click.Group):
 
 
 @click.group(
-    cls=InOrder,
+    cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="To begin with: rsfstudy list, then rsfstudy show NAME, then rsfstudy run NAME. "
     "Each command has a --help of its own.",
@@ -72,9 +72,11 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
             stream.reconfigure(errors="backslashreplace")
+    for number in _ENDING:
+        if signal.getsignal(number) is signal.SIG_DFL:  # and not ignored, as by nohup
+            signal.signal(number, _end)
     try:
-        with _signals_raise():
-            sys.exit(cli(standalone_mode=False) or OK)
+        sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
         error.message = brief(error.message)  # type: ignore[misc]
         error.show()
@@ -97,27 +99,11 @@ def main() -> None:
         sys.exit(FAILED)
 
 
-@contextlib.contextmanager
-def _signals_raise() -> Iterator[None]:
-    """Have `Signalled` raised by the first signal that would end the process, which then ends in
-    its own time whatever follows: `timeout` sends two. A signal that is ignored, as by nohup, stays
-    so.
-    """
-    ending = [number for number in _ENDING if signal.getsignal(number) is signal.SIG_DFL]
-    arrived: list[int] = []
-
-    def end(number: int, _frame: object) -> None:
-        arrived.append(number)
-        if len(arrived) == 1:
-            raise Signalled(number)
-
-    for number in ending:
-        signal.signal(number, end)
-    try:
-        yield
-    finally:
-        for number in () if arrived else ending:
-            signal.signal(number, signal.SIG_DFL)
+def _end(number: int, _frame: object) -> None:
+    """End the command; it then takes its own time whatever follows: `timeout` sends two signals."""
+    for other in _ENDING:
+        signal.signal(other, signal.SIG_IGN)
+    raise Signalled(number)
 
 
 def _warn(message: Warning | str) -> None:
@@ -131,7 +117,7 @@ def _say(text: str) -> None:
     stderr.print(text)
 
 
-@cli.command("list")
+@cli.command("list", cls=click.Command)
 @click.pass_context
 def list_studies(context: click.Context) -> None:
     """Name the studies."""
@@ -148,16 +134,13 @@ def list_studies(context: click.Context) -> None:
 @options.rtol
 @options.output
 @options.rig
-def show(**given: Any) -> int:
+def show() -> None:
     """Show a study before it is run, or what is in a results file.
 
     Of a study, by its NAME or file: what varies, what is fixed and measured, and what it costs, as
     long as its cells took last where they are kept in OUTPUT. Of a results file: its numbers, where
     they come from, and how to reproduce each cell that failed.
     """
-    from rsfstudy.cli import commands
-
-    return commands.show(**given)
 
 
 @cli.command()
@@ -185,29 +168,23 @@ def show(**given: Any) -> int:
 @options.style
 @options.quiet
 @options.rig
-def run(**given: Any) -> int:
+def run() -> None:
     """Run a study: results, figure, slopes and claims.
 
     Of a study, by its NAME or file: OUTPUT/NAME.nc, its figure OUTPUT/NAME.png, its reductions and
     its claims. Cells that are finished already are kept: the same command goes on where it ended.
     """
-    from rsfstudy.cli import commands
-
-    return commands.run(**given)
 
 
 @cli.command()
 @click.argument("name", required=False)
 @options.every
 @options.output
-def check(**given: Any) -> int:
+def check() -> None:
     """Hold results against published values.
 
     Those of a named study, or of a results file. Fails where a verdict is not the one expected.
     """
-    from rsfstudy.cli import commands
-
-    return commands.check(**given)
 
 
 @cli.command()
@@ -219,45 +196,36 @@ def check(**given: Any) -> int:
 @click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
 @options.study
 @options.against
-def plot(**given: Any) -> int:
+def plot() -> None:
     """Draw the figure of results, or a motion, beside them.
 
     Of a named study's results, or of a file, that of a motion too. A figure of your own is taken
     from the file that --study names, which is run.
     """
-    from rsfstudy.cli import commands
-
-    return commands.plot(**given)
 
 
 @cli.command()
 @click.argument("directory", default=OUTPUT, type=click.Path(path_type=Path))
 @click.option("--output", metavar="FILE", help="The page.  [default: DIRECTORY/report.html]")
-def report(**given: Any) -> int:
+def report() -> None:
     """Write one page of HTML of all results in a directory.
 
     With verdicts, figures, slopes, failed cells, and where each file comes from, for a browser or a
     printer; it needs no other file. Fails where a file cannot be read, which the page tells.
     """
-    from rsfstudy.cli import commands
-
-    return commands.report(**given)
 
 
 @cli.command()
 @click.argument("first")
 @click.argument("second")
 @options.output
-def compare(**given: Any) -> int:
+def compare() -> None:
     """Compare two results files: declaration, versions, numbers.
 
     Or the results of two studies, by name. Cells are matched by their places on the axes, and
     numbers held against the sum of both error estimates. Exit status 0 where nothing differs beyond
     them, 1 where a number or a status does, or no cell is in both.
     """
-    from rsfstudy.cli import commands
-
-    return commands.compare(**given)
 
 
 @cli.command()
@@ -281,14 +249,11 @@ def compare(**given: Any) -> int:
 @options.scheduler
 @options.time_limit
 @options.quiet
-def rerun(**given: Any) -> int:
+def rerun() -> None:
     """Compute a results file anew, and compare every number.
 
     It is computed from what the file says of itself. Fails where a number is not the same.
     """
-    from rsfstudy.cli import commands
-
-    return commands.rerun(**given)
 
 
 @cli.command()
@@ -298,20 +263,15 @@ def rerun(**given: Any) -> int:
 @click.option(
     "--output", type=click.Path(path_type=Path), help="The file to write.  [default: beside FILE]"
 )
-def export(**given: Any) -> int:
+def export() -> None:
     """Write results, or a motion, for other programs.
 
     As a table of CSV, a row a cell or a time, as a file of MATLAB, or both.
     """
-    from rsfstudy.cli import commands
-
-    return commands.export(**given)
 
 
-cli.add_command(command_line_simulate.simulate)
-cli.add_command(command_line_fit.fit)
-cli.add_command(command_line_referee.problems)
-cli.add_command(command_line_referee.verify)
+for one in command_line_motions.COMMANDS:
+    cli.add_command(one)
 
 if __name__ == "__main__":
     main()

@@ -1,79 +1,54 @@
-"""The command `fit`, and what `show` prints of its files; how it is spelt is in
-`command_line_fit`.
-"""
+"""What the command `fit` does."""
 
 from __future__ import annotations
-
-import shlex
-import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
 from rsfstudy import plots
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.api import fit_tables, fitting
+from rsfstudy.api import fitting, told
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import assignments, commands_simulate, layout, terminal
 from rsfstudy.cli.console import console
+from rsfstudy.cli.options import Given
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files import contents, store
+from rsfstudy.files import store
 from rsfstudy.rig.records import read_record
 
 #: Most steps of a record that are listed.
 _MOST_STEPS = 24
+#: Options that `rsfstudy.fit` takes as they are.
+_TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
+    "noise", "loading", "posterior", "budget", "engine")  # fmt: skip
 
 
-def fit(
-    records: Sequence[Path],
-    columns: Sequence[str],
-    normal_stress: str | None,
-    steps: Sequence[str],
-    settings: tuple[str, ...],
-    output: Path,
-    **given: Any,
-) -> int:
+def fit(given: Given) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
-    data = output.with_suffix(".nc")
-    commands_simulate.check_replaceable(data, is_fit, "fit")
-    named = _columns(columns)
-    read = [read_record(path, named, normal_stress=normal_stress) for path in records]
-    for record in read:
-        _steps(record)
+    data = given.output.with_suffix(".nc")
+    commands_simulate.check_replaceable(data, _is_fit, "fit")
+    rule = "must read NAME=HEADING, as in 'time=t (s)'"
+    columns = dict(assignments.named("--columns", text, rule) for text in given.columns) or None
+    stress = given.normal_stress
+    records = [read_record(path, columns, normal_stress=stress) for path in given.records]
+    for record in records:
+        _list_steps(record)
     dataset = fitting.fit(
-        read,
-        steps=[_number(text) for text in steps],
-        command=shlex.join(["rsfstudy", *sys.argv[1:]]),
-        **given,
-        **assignments.fields(settings),
+        records,
+        steps=[_number(text) for text in given.steps],
+        command=given.command,
+        **{name: getattr(given, name) for name in _TAKEN},
+        **assignments.fields(given.settings),
     )
     dataset = store.write(dataset, data)
-    plots.save(dataset, output)
-    status = tables(dataset)
-    console.print(f"wrote {output} and {data}", soft_wrap=True)
-    return status
+    plots.save(dataset, given.output)
+    for piece in told.numbers(dataset):
+        layout.show(piece)
+    console.print(f"wrote {given.output} and {data}", soft_wrap=True)
+    return terminal.status_of(dataset)
 
 
-def show(dataset: xr.Dataset) -> int:
-    """Print the fits of a file, and where they come from."""
-    about = contents.provenance(dataset)
-    console.print(f"{dataset.attrs['title']}\n", style="bold")
-    console.print(
-        f"made by {about['command']}, {about['time']}, git {about['git']}\n", soft_wrap=True
-    )
-    return tables(dataset)
-
-
-def is_fit(dataset: xr.Dataset) -> bool:
-    """True for fits of records."""
-    return "rows_fitted" in dataset and "declaration" in dataset.attrs
-
-
-def _columns(texts: Sequence[str]) -> dict[str, str] | None:
-    rule = "must read NAME=HEADING, as in 'time=t (s)'"
-    return dict(assignments.named("--columns", text, rule) for text in texts) or None
+def _is_fit(there: xr.Dataset) -> bool:
+    return "rows_fitted" in there and "declaration" in there.attrs
 
 
 def _number(text: str) -> int:
@@ -82,24 +57,19 @@ def _number(text: str) -> int:
     return int(text)
 
 
-def _steps(record: Record) -> None:
+def _list_steps(record: Record) -> None:
     """Print the steps of a record."""
     console.print(f"{record.name}: {len(record):,} rows, {len(record.found)} steps")
-    heads = ("step", "time (s)", "lasts (s)", "V0 (um/s)", "V1 (um/s)")
-    rows = []
-    for number, step in enumerate(record.found[:_MOST_STEPS], start=1):
-        values = step.begins, step.ends - step.begins, step.before, step.after
-        rows.append(dict(zip(heads, (str(number), *(f"{v:.6g}" for v in values)), strict=True)))
+    rows = [
+        {
+            "step": str(number),
+            "time (s)": f"{step.begins:.6g}",
+            "lasts (s)": f"{step.ends - step.begins:.6g}",
+            "V0 (um/s)": f"{step.before:.6g}",
+            "V1 (um/s)": f"{step.after:.6g}",
+        }
+        for number, step in enumerate(record.found[:_MOST_STEPS], start=1)
+    ]
     layout.show(Table(rows))
     if (left := len(record.found) - _MOST_STEPS) > 0:
         console.print(f"and {left} more")
-
-
-def tables(dataset: xr.Dataset) -> int:
-    """Print all fits; FAILED where one has no numbers that are verified."""
-    for one in fit_tables.told(dataset):
-        if isinstance(one, Table):
-            layout.show(one)
-        else:
-            console.print(one)
-    return terminal.OK if fit_tables.answered(dataset) else terminal.FAILED

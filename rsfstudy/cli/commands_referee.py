@@ -1,4 +1,4 @@
-"""The commands `problems` and `verify`; how they are spelt is in `command_line_referee`."""
+"""What the commands `problems` and `verify` do, which check other codes."""
 
 from __future__ import annotations
 
@@ -10,34 +10,29 @@ import numpy as np
 
 from rsfstudy.cli import terminal
 from rsfstudy.cli.console import console
+from rsfstudy.cli.options import Given
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import theirs, writing
 from rsfstudy.referee.problem import Problem, read, shipped
 from rsfstudy.referee.verdict import Verdict, known, verdict
 
 
-def problems(directory: Path) -> int:
+def problems(given: Given) -> int:
     """Write all problems."""
-    writing.write(directory)
-    console.print(f"wrote {len(shipped())} problems into {directory}")
+    writing.write(given.directory)
+    console.print(f"wrote {len(shipped())} problems into {given.directory}")
     return terminal.OK
 
 
-def verify(
-    files: tuple[Path, ...],
-    problem: str | None,
-    columns: str | None,
-    digits: float,
-    figure: Path | None,
-) -> int:
+def verify(given: Given) -> int:
     """Hold files against answers; FAILED where one does not pass."""
-    mapped = theirs.column_map(columns) if columns else None
-    found = [_verdict(file, problem, mapped, digits) for file in files]
-    for file, one in zip(files, found, strict=True):
+    columns = theirs.column_map(given.columns) if given.columns else None
+    found = [_verdict(file, given.problem, columns, given.digits) for file in given.files]
+    for file, one in zip(given.files, found, strict=True):
         _tell(file, one)
     console.print(_to_quote(found), style="bold")
-    if figure is not None:
-        _draw(found, figure)
+    if given.figure is not None:
+        _draw(found, given.figure)
     return terminal.OK if all(one.passes for one in found) else terminal.FAILED
 
 

@@ -13,14 +13,25 @@ from rich.padding import Padding
 from rich.text import Text
 
 from rsfstudy.api.tables import Table
+from rsfstudy.api.told import Piece
 from rsfstudy.cli.console import clean, console
 
 #: Characters between columns, and in which a column of sentences can be read.
 _BETWEEN, _READABLE = 2, 20
 
 
-def show(table: Table) -> None:
-    """Print a table with its caption; nothing where it has no row."""
+def show(piece: Piece) -> None:
+    """Print a table with its caption, what is what, or a sentence; nothing of what is empty."""
+    if isinstance(piece, str):
+        console.print(piece)
+    elif isinstance(piece, Table):
+        _table(piece)
+    elif piece:
+        _list({head: clean(text) for head, text in piece.items()}, set(piece), "")
+
+
+def _table(table: Table) -> None:
+    """Print a table; none without rows."""
     if not table.rows:
         return
     if table.caption:
@@ -45,11 +56,6 @@ def show(table: Table) -> None:
         printed.add_row(*map(Text, texts), Text(last, style=style))
     console.print(printed)
     console.print()
-
-
-def pairs(named: Mapping[str, str]) -> None:
-    """Print a list of what is what, in sentences."""
-    _list({head: clean(text) for head, text in named.items()}, set(named), "")
 
 
 def _list(row: Mapping[str, str], prose: Collection[str], style: str) -> None:

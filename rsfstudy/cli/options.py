@@ -1,9 +1,15 @@
-"""Options that several commands take. What needs more than click to check them is imported then."""
+"""Options that several commands take, and what is given of them. What needs more than click to
+check them is imported then.
+"""
 
 from __future__ import annotations
 
+import importlib
+import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import click
@@ -13,6 +19,38 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Given(SimpleNamespace):
+    """Arguments and options of one call of a command, by their names."""
+
+    variable: str | None = None
+
+    @property
+    def command(self) -> str:
+        """What was typed."""
+        return shlex.join(["rsfstudy", *sys.argv[1:]])
+
+    @property
+    def rig(self) -> dict[str, str]:
+        """What is stated of a rig."""
+        return {name: text for name in RIG if (text := getattr(self, name)) is not None}
+
+
+class Command(click.Command):
+    """A command that is spelt here; what it does is the function of its name in a module of this
+    folder, which is given the options and returns the exit status.
+    """
+
+    def __init__(self, *args: Any, does: str = "commands", **about: Any) -> None:
+        super().__init__(*args, **about)
+        self._does = does
+
+    def invoke(self, context: click.Context) -> Any:
+        """Load what the command does, and do it."""
+        module = importlib.import_module(f"rsfstudy.cli.{self._does}")
+        return getattr(module, str(self.name))(Given(**context.params))
+
 
 every = click.option("--all", "every", is_flag=True, help="Every named study.")
 

@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.api import runs, tables
+from rsfstudy.api import fit_results, fit_tables, runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.compute.plan import Plan, estimated_cost
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.wording import settings, stated
-from rsfstudy.errors import DataError
+from rsfstudy.declare.wording import listed, settings, short, stated
+from rsfstudy.errors import DataError, brief
 from rsfstudy.files import contents
+from rsfstudy.files.comparison import Comparison
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
 from rsfstudy.rig.quantities import STATED
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
+from rsfstudy.vocabulary import coverage
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure
 
 OK, FAILED = 0, 1
-_MOST_SHOWN = 40
+#: Most points of an axis, and most cells that ended otherwise; most characters of a value.
+_MOST_SHOWN, _MOST_ENDS, _MOST_CHARACTERS = 40, 10, 60
 
 
 def declaration(study: Study, output: Path) -> None:
@@ -70,7 +75,7 @@ def declaration(study: Study, output: Path) -> None:
     about["cost"] = "; ".join(
         filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
     )
-    layout.pairs({name: text or "-" for name, text in about.items()})
+    layout.show({name: text or "-" for name, text in about.items()})
 
 
 def announce(study: Study, output: Path, accuracy: bool, advice: bool) -> None:
@@ -165,16 +170,26 @@ def summary(ends: Sequence[Ended]) -> None:
 
 
 def results(dataset: xr.Dataset, file: str) -> int:
-    """The numbers of a results file, where they come from, what else is in it, and which cells
-    failed; FAILED if any did.
+    """Print what a file holds, whatever it is of, and where it comes from; FAILED where cells, fits
+    or a motion failed.
     """
-    console.print(f"{dataset.attrs['id']}: {dataset.attrs['title']}\n", style="bold")
-    layout.pairs(tables.origin(dataset))
-    layout.show(tables.headline(dataset))
-    for table in tables.reductions(dataset):
-        layout.show(table)
-    layout.show(tables.held(dataset))
-    return failures(dataset, file)
+    attrs = dataset.attrs
+    title = attrs.get("title", "answer for one scene")
+    console.print(f"{attrs['id']}: {title}\n" if "id" in attrs else f"{title}\n", style="bold")
+    layout.show(told.origin(dataset))
+    for piece in told.numbers(dataset):
+        layout.show(piece)
+    if not contents.is_of_a_scene(dataset) and not fit_results.is_fit(dataset):
+        layout.show(tables.held(dataset))
+        return failures(dataset, file)
+    return status_of(dataset)
+
+
+def status_of(dataset: xr.Dataset) -> int:
+    """OK where every fit has numbers, or a motion ended as asked."""
+    if fit_results.is_fit(dataset):
+        return OK if fit_tables.answered(dataset) else FAILED
+    return OK if dataset.attrs["status"] == Status.OK.label else FAILED
 
 
 def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
@@ -288,3 +303,76 @@ def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
             write_image(rendered(drawn, path.suffix[1:]), path)
     except OSError as error:
         raise DataError(f"{path}: cannot be written ({error})") from error
+
+
+def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Comparison) -> int:
+    """Print how two results files compare; 1 where a number or a status differs beyond the error
+    estimates, or there is nothing to compare.
+    """
+    for letter, file, dataset in zip("AB", files, datasets, strict=True):
+        about = contents.provenance(dataset)
+        console.print(f"{letter}: {file}, {about['time']}, {about['command']}")
+    _pairs("declaration", found.declaration)
+    _pairs("made by", found.origin)
+    _cells(found)
+    _ends(found.statuses)
+    _agreement(found.numbers)
+    for why in dict.fromkeys(found.left_out.values()):
+        names = [name for name, reason in found.left_out.items() if reason == why]
+        console.print(f"not compared, because {why}: {', '.join(names)}")
+    console.print(_verdict(found), style="green" if found.agrees else "red")
+    return 0 if found.agrees else 1
+
+
+def _pairs(title: str, pairs: Mapping[str, tuple[Any, Any]]) -> None:
+    """Print what is not the same in both."""
+    heads = f"{title} differs", "A", "B"
+    told = [(n, *(brief(short(v), _MOST_CHARACTERS) for v in both)) for n, both in pairs.items()]
+    layout.show(Table([dict(zip(heads, row, strict=True)) for row in told], prose=heads))
+
+
+def _cells(found: Comparison) -> None:
+    """Print which cells both have, and which only one."""
+    both, first, second = found.cells
+    console.print(f"{both:,} cells in both, {first:,} only in A, {second:,} only in B")
+    for axis, alone in found.points.items():
+        for letter, points in zip("AB", alone, strict=True):
+            if points:
+                console.print(f"{axis} only in {letter} ({len(points)}): {listed(points)}")
+
+
+def _ends(statuses: pd.DataFrame) -> None:
+    """Print the cells that ended otherwise."""
+    rows = []
+    for row in statuses[:_MOST_ENDS].to_dict("records"):
+        *place, (_, first), (_, second) = row.items()
+        cell = stated({str(name): value for name, value in place})
+        rows.append({"cell": cell, "A": first, "B": second})
+    layout.show(Table(rows, prose={"cell"}))
+    if len(statuses) > _MOST_ENDS:
+        console.print(f"and {len(statuses) - _MOST_ENDS} more")
+
+
+def _agreement(frame: pd.DataFrame) -> None:
+    """Print the numbers that have an error estimate, and the others that are not the same."""
+    rows = []
+    for row in frame.to_dict("records"):
+        known = not np.isnan(row["beyond_errors"])
+        result = coverage(row["variable"]) == "modelResult"
+        if result and (known or row["identical"] < row["values"]):
+            rows.append({
+                "variable": row["variable"],
+                "values": str(row["values"]),
+                "same": str(row["identical"]),
+                "beyond errors": f"{row['beyond_errors']:.0f}" if known else "no estimate",
+                "largest gap": tables.number(row["largest_difference"], ".3g"),
+            })  # fmt: skip
+    layout.show(Table(rows))
+
+
+def _verdict(found: Comparison) -> str:
+    if not found.cells[0]:
+        return "nothing to compare: no finished cell is in both"
+    wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
+    wrong += [f"{len(found.statuses)} cells ended otherwise"] if len(found.statuses) else []
+    return "; ".join(wrong) or "nothing differs beyond error estimates"

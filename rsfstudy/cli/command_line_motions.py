@@ -1,4 +1,6 @@
-"""The command line: how `fit` is spelt, friction parameters of records with their errors."""
+"""The command line: how the commands are spelt that are about one motion: followed, recorded in a
+laboratory, or computed by other codes.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,41 @@ import click
 
 from rsfstudy.cli import options
 from rsfstudy.defaults import FIT_BUDGET
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
+from rsfstudy.motion.engines import ENGINES, SCIPY
+
+
+@click.command(cls=options.Command, does="commands_simulate")
+@options.fields(
+    "A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
+    "a loading from a CSV file, as in loading=record.csv."
+)
+@click.option(
+    "--protocol",
+    "protocol_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="CSV file of what the load point does: a header such as 'velocity (um/s), duration (s)', "
+    "or, of a record, 'time (s), displacement (um)'. The same as --set loading=FILE.",
+)
+@click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
+@options.against
+@options.rig
+@click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Accuracy.")
+@options.count("--budget", DEFAULT_BUDGET, "Right-hand sides it may evaluate.")
+@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY)
+@options.image(
+    "--output", Path("motion.png"), "File of the picture; the data stand beside it as NetCDF."
+)
+@click.option("--quiet", is_flag=True, help="Say how it ended, and not its peaks and events.")
+def simulate() -> None:
+    """Follow one motion of one slider, draw it and write it.
+
+    The picture shows friction and slip rate along it, and its path on the phase plane.
+
+    Exit status 1 where the motion ends early, whatever the reason; 2 for wrong usage; 3 where it
+    passes the instability norm with neither mass nor radiation damping, beyond which it is no
+    physics; else 0.
+    """
 
 
 def _listed(_context: click.Context, _option: click.Parameter, text: str | None) -> tuple[str, ...]:
@@ -24,7 +60,7 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
     return None if text is None else assignments.number_or_text(text)
 
 
-@click.command()
+@click.command(cls=options.Command, does="commands_fit")
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--columns",
@@ -107,7 +143,7 @@ def _quantity(_context: click.Context, _option: click.Parameter, text: str | Non
 @options.image(
     "--output", Path("fit.png"), "File of the figure; the data stand beside it as NetCDF."
 )
-def fit(**given: Any) -> int:
+def fit() -> None:
     """Fit friction parameters to RECORDS of velocity steps, with honest errors.
 
     Prints the steps that are found, and a table of a, b, D_c and their standard errors, which count
@@ -116,6 +152,42 @@ def fit(**given: Any) -> int:
     Exit status 1 where a fit gives no numbers, or none that are verified; 2 for wrong usage; else
     0, also where a parameter is not identified.
     """
-    from rsfstudy.cli import commands_fit
 
-    return commands_fit.fit(**given)
+
+@click.command(cls=options.Command, does="commands_referee")
+@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+def problems() -> None:
+    """Write the problems of the referee into a new directory.
+
+    Each problem with its answer, a table to be filled, and an example in plain SciPy.
+    """
+
+
+@click.command(cls=options.Command, does="commands_referee")
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option(
+    "--problem",
+    metavar="N|TOML",
+    help="Number of the problem, or a file that states another.  [default: what FILE begins with]",
+)
+@click.option(
+    "--columns",
+    metavar="MAP",
+    help="What its columns are, as in 'time=t (s), friction=mu, slip_rate=v (um/s)'.  [default: as "
+    "its header says]",
+)
+@click.option(
+    "--digits", type=click.FloatRange(1.0, 12.0), default=6.0, help="Digits that make a pass."
+)
+@options.image("--figure", None, "Draw where they agree, into this .png, .pdf or .svg.")
+def verify() -> None:
+    """Hold answers of another code against those that are known.
+
+    Says of each quantity how many digits agree, from where on they part, and what would explain
+    it; and of all files one line to quote. Exit status 1 where a problem is not passed.
+    """
+
+
+COMMANDS = (simulate, fit, problems, verify)

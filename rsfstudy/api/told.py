@@ -1,0 +1,104 @@
+"""What is told of a dataset, whatever it is of: tables, lists and sentences, which a terminal
+prints, and a page or a notebook shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.api import fit_results, fit_tables, tables
+from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
+from rsfstudy.declare.wording import stated
+from rsfstudy.files import contents
+
+Piece = Table | Mapping[str, str] | str
+
+#: What is printed of events; the last has units of a rig only.
+_OF_EVENTS = {
+    "time": "time",
+    "duration": "duration",
+    "interval": "interval",
+    "slip": "slip",
+    "static_stress_drop": "static drop",
+    "dynamic_stress_drop": "dynamic drop",
+    "peak_log10_slip_rate": "lg peak rate",
+    "peak_slip_rate": "peak rate",
+}
+
+
+def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
+    """The numbers of a dataset: the headline and the slopes of a study, the parameters of fits, or
+    what a reader of a motion, or of another answer for one scene, looks for first.
+    """
+    if fit_results.is_fit(dataset):
+        yield from fit_tables.told(dataset)
+    elif not contents.is_of_a_scene(dataset):
+        yield tables.headline(dataset)
+        yield from tables.reductions(dataset)
+    elif "load_point_displacement" in dataset:
+        yield motion(dataset)
+        yield events(dataset.rsf.events())
+    else:
+        plain = {n: v for n, v in dataset.data_vars.items() if not v.dims}
+        yield {str(name): repr(value.item()) for name, value in plain.items()}
+
+
+def origin(dataset: xr.Dataset) -> dict[str, str]:
+    """What a dataset is of, and where it comes from, by what each is."""
+    if not contents.is_of_a_scene(dataset):
+        return tables.origin(dataset)
+    about = dataset.attrs
+    return {
+        "scene": stated(dataset.rsf.scene.as_dict()),
+        "made by": about.get("history", "unknown"),
+        "with": about.get("source", "unknown"),
+        "status": f"{about['status']} {about.get('message', '')}".strip(),
+    }
+
+
+def motion(dataset: xr.Dataset) -> dict[str, str]:
+    """What a reader of a motion looks for first, if it moved at all."""
+    if not dataset.sizes["time"]:
+        return {}
+    time, friction = dataset["time"], dataset["friction_coefficient"]
+    rate, per = dataset.get("slip_rate"), "V_*"
+    if rate is None:
+        rate = 10.0 ** dataset["log10_slip_rate"]
+    else:
+        per = units_of(rate)
+    unit = units_of(time)
+    told = {"duration": f"{float(time[-1]):.6g} {unit}"}
+    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, f" {per}")):
+        peak = int(np.argmax(values.values))
+        told[name] = f"{float(values[peak]):.6g}{of} after {float(time[peak]):.6g} {unit}"
+    if "instability_time" in dataset:
+        since = f"{float(dataset['instability_time']):.6g} {unit}"
+        told["beyond the instability norm"] = f"no physics after {since}"
+    return told | {"friction at the end": f"{float(friction[-1]):.6g}"}
+
+
+def events(catalogue: xr.Dataset) -> Table | str:
+    """The events of a motion, without their errors."""
+    limit = f"faster than {catalogue.attrs['slip_rate_threshold']:g} V_*"
+    count = catalogue.sizes["event"]
+    if not count:
+        return f"no event {limit}"
+    heads = {name: words for name, words in _OF_EVENTS.items() if name in catalogue}
+    if "peak_slip_rate" in heads:
+        del heads["peak_log10_slip_rate"]
+    for name, words in heads.items():
+        unit = units_of(catalogue[name])
+        heads[name] = words if unit == "1" else f"{words} ({unit})"
+    flags = catalogue["cut"].attrs["flag_meanings"].replace("whole", "-").split()
+    rows = []
+    for place in range(min(count, MOST_CELLS)):
+        event = catalogue.isel(event=place)
+        row = {words: number(float(event[name]), ".4g") for name, words in heads.items()}
+        rows.append({**row, "cut": flags[int(event["cut"])].replace("_", " ")})
+    caption = f"Events {limit}"
+    if count > len(rows):
+        caption += f" ({len(rows)} of {count:,}: dataset.rsf.events() has all, with their errors)"
+    return Table(rows, caption)
