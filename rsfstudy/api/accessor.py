@@ -314,20 +314,16 @@ class Accessor:
         """
         import pandas as pd
 
+        from rsfstudy.api import tables
         from rsfstudy.files import contents
-        from rsfstudy.status import LABELS, Status
+        from rsfstudy.status import Status
 
-        if not self._is_study:
-            ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
-            rows = [] if ended["status"] == Status.OK.label else [ended]
-            return pd.DataFrame(rows, columns=list(ended))
-        status = self._dataset["status"]
-        failed = status.values != int(Status.OK)
-        names = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
-        columns = {n: self._dataset[n].broadcast_like(status).values[failed] for n in names}
-        columns["status"] = [LABELS[code] for code in status.values[failed].tolist()]
-        columns["message"] = self._dataset["message"].values[failed]
-        return pd.DataFrame(columns)
+        if self._is_study:
+            axes = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
+            return tables.cells(self._dataset, self._dataset["status"] != int(Status.OK), axes)
+        ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
+        rows = [] if ended["status"] == Status.OK.label else [ended]
+        return pd.DataFrame(rows, columns=list(ended))
 
     @property
     def _is_study(self) -> bool:

@@ -1,8 +1,11 @@
-"""The events of a record of a laboratory: drops of shear stress that its noise does not explain."""
+"""Catalogues of events as datasets; and the events of a record of a laboratory: drops of shear
+stress that its noise does not explain.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +14,33 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 from scipy.stats import norm
 
-from rsfstudy.api.catalogue import Found, catalogue
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.table import read_table
+
+#: The numbers of an event, each with its error, and which part of it is missing, by its flag.
+Found = tuple[dict[str, tuple[float, float]], int]
+#: Of each quantity of an event what it is measured in, its heading in tables, and what it is.
+QUANTITIES = {
+    "time": ("D_c/V_*", "time", "time at which the event begins"),
+    "duration": ("D_c/V_*", "duration", "duration of the event"),
+    "interval": ("D_c/V_*", "interval", "time since the event before began"),
+    "peak_log10_slip_rate": ("", "lg peak rate", "decimal logarithm of peak slip rate over V_star"),
+    "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
+    "slip": ("D_c", "slip", "slip during the event"),
+    "stress_before": ("sigma_*", "", "highest shear stress before the event"),
+    "stress_after": ("sigma_*", "", "lowest shear stress after the event"),
+    "static_stress_drop": ("sigma_*", "static drop", "highest less lowest shear stress"),
+    "dynamic_stress_drop": (
+        "sigma_*",
+        "dynamic drop",
+        "highest shear stress less that at peak slip rate",
+    ),
+}
+#: What quantities are measured in: as these variables, by their scales.
+_MEASURED_AS = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+#: What part of an event is missing, by its flag.
+_CUT = ("whole", "begins_before", "lasts_beyond", "both")
 
 #: Chance that a record of Gaussian noise holds any event: one record in 10,000.
 _CHANCE = 1e-4
@@ -27,6 +53,44 @@ _FOUND = 3.1
 _FOLLOWED = 2.0
 #: Standard deviation over the median of absolute deviations of Gaussian noise.
 _NORMAL = 1.4826
+
+
+def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) -> xr.Dataset:
+    """Events as a dataset, in the units of what they were read from."""
+    rows = [numbers for numbers, _cut in found]
+    for row, earlier in zip(rows, [{}, *rows], strict=False):
+        (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
+        row["interval"] = time - before, error + unsure
+    dataset = xr.Dataset(coords={"event": np.arange(len(rows))})
+    for name, (scale, _heading, words) in QUANTITIES.items():
+        if rows and name not in rows[0]:
+            continue
+        values, errors = np.array([row[name] for row in rows]).reshape(-1, 2).T
+        units = _units(scale, about)
+        dataset[name] = "event", values, {"long_name": words, **units}
+        of_error = {"long_name": f"error estimate of {words}", **units}
+        dataset[f"{name}_error"] = "event", errors, of_error
+    flags = {
+        "long_name": "what of the event the record leaves out",
+        "flag_values": np.arange(len(_CUT), dtype=np.int8),
+        "flag_meanings": " ".join(_CUT),
+    }
+    dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
+    return dataset.assign_attrs(title="Catalogue of events", Conventions="CF-1.11")
+
+
+def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
+    """Units and scale of a quantity, where times, slip and stresses have theirs."""
+    if scale in _MEASURED_AS:
+        source = about[_MEASURED_AS[scale]]
+        return {key: str(source[key]) for key in ("units", "scale") if key in source}
+    if not scale or "scale" in about["slip"]:
+        return {"units": "1", **({"scale": scale} if scale else {})}
+    time, slip = (about[name].get("units") for name in ("time", "slip"))
+    return {"units": f"{slip} {time}-1"} if time and slip else {}
+
+
+# ---- of a record --------------------------------------------------------------------------------
 
 
 @door

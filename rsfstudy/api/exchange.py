@@ -8,22 +8,17 @@ import json
 import re
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from rsfstudy.api.trajectory import simulate
-from rsfstudy.errors import DataError
+from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import comparison
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.scales import SCALES
-
-#: Names that are none in MATLAB, and how long one may be.
-_KEYWORDS = ("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for",
-    "function", "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch",
-    "try", "while")  # fmt: skip
-_LONGEST = 63
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
@@ -59,28 +54,28 @@ def _units(values: xr.DataArray) -> str:
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
     """Write all variables of a dataset as a file of MATLAB, each with its dimensions in order, and
     the structures ``units`` and ``dimensions`` that name those of each, and ``attributes``.
+
+    Raises
+    ------
+    InvalidValue
+        For a name that is none in MATLAB; those of rsfstudy are.
     """
     from scipy.io import savemat
 
-    names: dict[str, str] = {}
-    for name in map(str, dataset.variables):
-        legal = re.sub(r"\W", "_", name, flags=re.ASCII)
-        legal = legal if re.match("[A-Za-z]", legal) and legal not in _KEYWORDS else f"x{legal}"
-        legal = legal[:_LONGEST]
-        while legal in names.values():
-            legal = f"{legal[: _LONGEST - 1]}x"
-        names[name] = legal
-    about = {
-        "units": {short: _units(dataset[name]) for name, short in names.items()},
-        "dimensions": {short: " ".join(map(str, dataset[n].dims)) for n, short in names.items()},
-        "attributes": {
-            re.sub(r"\W", "_", str(name))[:_LONGEST]: value for name, value in dataset.attrs.items()
-        },
-    }
-    data = {short: dataset[name].values for name, short in names.items()}
-    for short, values in data.items():
+    for name in map(str, (*dataset.variables, *dataset.attrs)):
+        if not re.fullmatch(r"[A-Za-z]\w{0,62}", name, re.ASCII):
+            rule = "is no name in MATLAB, which has letters, digits and _, and a letter first"
+            remedy = "Rename it, as in dataset.rename(old='new')."
+            raise InvalidValue("name", name, rule, remedy=remedy)
+    data: dict[str, Any] = {str(n): values.values for n, values in dataset.variables.items()}
+    for name, values in data.items():
         if values.dtype.kind in "OUT":
-            data[short] = np.array(values.tolist(), dtype=object)
+            data[name] = np.array(values.tolist(), dtype=object)
+    about = {
+        "units": {name: _units(dataset[name]) for name in data},
+        "dimensions": {name: " ".join(map(str, dataset[name].dims)) for name in data},
+        "attributes": dataset.attrs,
+    }
     savemat(path, about | data, long_field_names=True, oned_as="column")
 
 

@@ -11,7 +11,7 @@ from scipy.interpolate import KroghInterpolator
 from scipy.ndimage import find_objects, label
 from scipy.optimize import brentq
 
-from rsfstudy.api.catalogue import Found, catalogue
+from rsfstudy.api.events import Found, catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.scene import Scene
 

@@ -212,22 +212,27 @@ def ended(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
     return ", ".join(f"{n} {v}" for v, n in found["verdict"].value_counts().items()), wrong
 
 
-def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[str, Any]]]:
+def cells(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
+    """Some cells, one row each: their places on axes, how each ended, and the message."""
+    at = where.values
+    columns = {name: dataset[name].broadcast_like(where).values[at] for name in axes}
+    columns["status"] = [LABELS[code] for code in dataset["status"].values[at].tolist()]
+    return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
+
+
+def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
     """The first cells that failed, and the place of each on the axes."""
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
-    rows, places = [], []
-    for index in np.argwhere(failed.values)[:_MOST_FAILURES]:
-        cell = dataset[["status", "message"]].isel(dict(zip(failed.dims, index, strict=True)))
-        place = {str(d): cell[d].item() for d in failed.dims}
-        places.append(place)
-        rows.append({
-            "cell": stated(place),
-            "status": LABELS[int(cell["status"])],
-            "message": str(cell["message"].item()),
-        })  # fmt: skip
-    caption = f"{int(failed.sum())} cells failed"
-    if int(failed.sum()) > len(rows):
+    found = cells(dataset, failed, list(map(str, failed.dims)))
+    first = found[:_MOST_FAILURES]
+    places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
+    rows = [
+        {"cell": stated(place), "status": label, "message": message}
+        for place, label, message in zip(places, first["status"], first["message"], strict=True)
+    ]
+    caption = f"{len(found)} cells failed"
+    if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
     return Table(rows, caption, prose={"cell", "message"}), places
 

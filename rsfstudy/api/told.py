@@ -10,23 +10,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.api import fit_results, fit_tables, tables
+from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
 from rsfstudy.declare.wording import stated
 from rsfstudy.files import contents
 
 Piece = Table | Mapping[str, str] | str
-
-#: What is printed of events; the last has units of a rig only.
-_OF_EVENTS = {
-    "time": "time",
-    "duration": "duration",
-    "interval": "interval",
-    "slip": "slip",
-    "static_stress_drop": "static drop",
-    "dynamic_stress_drop": "dynamic drop",
-    "peak_log10_slip_rate": "lg peak rate",
-    "peak_slip_rate": "peak rate",
-}
 
 
 def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
@@ -86,7 +75,7 @@ def events(catalogue: xr.Dataset) -> Table | str:
     count = catalogue.sizes["event"]
     if not count:
         return f"no event {limit}"
-    heads = {name: words for name, words in _OF_EVENTS.items() if name in catalogue}
+    heads = {n: words for n, (_, words, _) in QUANTITIES.items() if words and n in catalogue}
     if "peak_slip_rate" in heads:
         del heads["peak_log10_slip_rate"]
     for name, words in heads.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Never
 
 import numpy as np
@@ -125,7 +125,7 @@ def simulate(
     if at is not None:
         duration = float(at[-1]) - began
     duration = _as_stated(scene) - began if duration is None else duration
-    if not _is_positive(duration):
+    if not (isinstance(duration, int | float | np.number) and 0.0 < duration < math.inf):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     accuracy = Accuracy(rtol, budget, engine=engine)
@@ -152,8 +152,14 @@ def simulate(
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
     columns |= {LOAD_POINT: load_point_of(scene, seen), FRICTION: friction_of(seen)}
-    dataset = _dataset(columns, seen[:, REGIME], recording.regimes)
-    dataset["reference_rate"] = ((), scene.reference_rate, {"units": "s-1"})
+    dataset = xr.Dataset({q.name: ("time", values, q.attributes) for q, values in columns.items()})
+    regimes = {
+        "long_name": quantity("regime").long_name,
+        "flag_values": np.arange(len(recording.regimes), dtype=np.int8),
+        "flag_meanings": " ".join(recording.regimes),
+    }
+    dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), regimes
+    dataset["reference_rate"] = (), scene.reference_rate, {"units": "s-1"}
     dataset = dataset.set_coords(["slip", "reference_rate"])
     dataset = dataset.assign_attrs(
         {
@@ -221,24 +227,6 @@ def _limit(scene: Scene) -> float:
     return norm if norm > fastest else fastest + math.log(_OVER_LOADING)
 
 
-def _dataset(
-    columns: Mapping[Quantity, np.ndarray], regime: np.ndarray, regimes: list[str]
-) -> xr.Dataset:
-    dataset = xr.Dataset()
-    for about, values in columns.items():
-        dataset[about.name] = ("time", values, about.attributes)
-    dataset["regime"] = (
-        "time",
-        regime.astype(np.int8),
-        {
-            "long_name": quantity("regime").long_name,
-            "flag_values": np.arange(len(regimes), dtype=np.int8),
-            "flag_meanings": " ".join(regimes),
-        },
-    )
-    return dataset
-
-
 def _as_stated(scene: Scene) -> float:
     """Time that the loading of a scene takes."""
     loading = scene.parts.loading
@@ -265,8 +253,3 @@ def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray 
         rule = f"must increase from {began:g} or later, and be finite"
         raise InvalidValue("times", times, rule)
     return at
-
-
-def _is_positive(value: object) -> bool:
-    """True if it is a number that can be a duration."""
-    return isinstance(value, int | float | np.number) and bool(0.0 < value < math.inf)

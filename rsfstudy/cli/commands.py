@@ -73,7 +73,7 @@ def run(given: Given) -> int:
             terminal.announce(study, given.output, given.rtol is not None, advice)
         if given.every:
             return _run_all(ready, given, left_out)
-        return OK if _run(*ready[0], given).is_fine else FAILED
+        return FAILED if _run(*ready[0], given).wrong else OK
 
 
 def _run(study: Study, compute: Callable[[], xr.Dataset], given: Given) -> Ended:
@@ -116,7 +116,7 @@ def _run_all(
                 ends.append(Ended(study.name, time.monotonic() - began, "not finished"))
     finally:
         terminal.summary([*ends, *left_out])
-    return OK if all(end.is_fine for end in ends) else FAILED
+    return FAILED if any(end.wrong for end in ends) else OK
 
 
 def rerun(given: Given) -> int:

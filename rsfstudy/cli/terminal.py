@@ -1,13 +1,12 @@
-"""What commands print of studies and their results."""
+"""What commands print: studies, how runs end, results, verdicts, and how two results compare."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -15,7 +14,7 @@ from rsfstudy.api import fit_results, fit_tables, runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
 from rsfstudy.cli.console import console, stderr
-from rsfstudy.compute.plan import Plan, estimated_cost
+from rsfstudy.compute.plan import Plan
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
 from rsfstudy.declare.wording import listed, settings, short, stated
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 
 OK, FAILED = 0, 1
 #: Most points of an axis, and most cells that ended otherwise; most characters of a value.
-_MOST_SHOWN, _MOST_ENDS, _MOST_CHARACTERS = 40, 10, 60
+_MOST_POINTS, _MOST_ENDS, _MOST_CHARACTERS = 40, 10, 60
 
 
 def declaration(study: Study, output: Path) -> None:
@@ -44,53 +43,51 @@ def declaration(study: Study, output: Path) -> None:
     console.print(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
         console.print(study.summary + "\n")
-    about = {}
-    for axis in study.axes:
-        points = axis.points
-        if len(points) > _MOST_SHOWN:
-            points = [*points[:10], "...", *points[-3:]]
-        about[f"axis {axis.dimension} ({len(axis)})"] = ", ".join(points)
     varied = {field for axis in study.axes for field in axis.fields}
     if study.rig:
         varied |= {name for name, (dims, _values) in study.rig.beside().items() if dims}
     fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied and v is not None}
-    about["fixed"] = stated({n: v for n, v in fixed.items() if v})
-    about["0 or absent"] = ", ".join(n for n, v in fixed.items() if not v)
-    if study.laboratory:
-        rig = {n: f"{v:g} {STATED[n].units}" for n, v in study.laboratory.as_dict().items()}
-        about["laboratory"] = ", ".join(f"{n} = {v}" for n, v in rig.items())
+    rig = study.laboratory.as_dict() if study.laboratory else {}
     measured = {n: v for n, v in study.measure.describe().items() if n not in varied}
     measured |= {n: f"{len(v)} of them" for n, v in measured.items() if isinstance(v, tuple | list)}
-    about["measure"] = ", ".join(f"{n} = {v}" for n, v in measured.items())
     gives = study.measure.variables
     with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
-    told = [f"{n}{words}" for n, words in with_errors.items() if not n.endswith("_error")]
-    about["gives"] = ", ".join(told)
-    about["reduced to"] = ", ".join(r.describe()["name"] for r in study.reductions)
-    about["claims"] = ", ".join(dict.fromkeys(c.id for c in study.claims))
     plan = Plan(study)
     different = len(plan.different)
     others = f", of which {different:,} differ" if different < study.size else ""
-    about["cells"] = f"{study.size:,}{others}"
-    about["cost"] = "; ".join(
-        filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
-    )
+    costs = filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
+    about = {
+        **{f"axis {axis.dimension} ({len(axis)})": _points(axis.points) for axis in study.axes},
+        "fixed": stated({n: v for n, v in fixed.items() if v}),
+        "0 or absent": ", ".join(n for n, v in fixed.items() if not v),
+        "laboratory": ", ".join(f"{n} = {v:g} {STATED[n].units}" for n, v in rig.items()),
+        "measure": ", ".join(f"{n} = {v}" for n, v in measured.items()),
+        "gives": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),
+        "reduced to": ", ".join(r.describe()["name"] for r in study.reductions),
+        "claims": ", ".join(dict.fromkeys(c.id for c in study.claims)),
+        "cells": f"{study.size:,}{others}",
+        "cost": "; ".join(costs),
+    }
     layout.show({name: text or "-" for name, text in about.items()})
+
+
+def _points(points: Sequence[str]) -> str:
+    """The points of an axis, without the middle where they are many."""
+    return ", ".join(points if len(points) <= _MOST_POINTS else [*points[:10], "...", *points[-3:]])
 
 
 def announce(study: Study, output: Path, accuracy: bool, advice: bool) -> None:
     """Print what a run at another accuracy will cost, and what would be faster."""
     plan = Plan(study)
     if accuracy:
-        work, seconds = estimated_cost(plan)
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
-        console.print(
-            f"{study.name} at rtol {study.accuracy.rtol:g}: {ratio:.2g} times "
-            f"the work of rtol {DEFAULT_RTOL:g}, about {work:,} right-hand sides, "
-            f"{cost.guessed(seconds)}",
-        )
+        words = f"{study.name}: {ratio:.2g} times the work of rtol {DEFAULT_RTOL:g}"
+        console.print(f"{words}, {cost.in_words(plan, output)}")
     if advice and (text := cost.faster(plan, output)):
         stderr.print(f"note: {text}")
+
+
+# ---- how runs end -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -116,10 +113,12 @@ class Ended:
     verdicts: str = ""
     left_out: str = ""
 
-    @property
-    def is_fine(self) -> bool:
-        """True where nothing is wrong."""
-        return not self.wrong
+
+def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
+    """End of a run, in few words."""
+    verdicts, wrong = tables.ended(dataset, runs.check(dataset))
+    wrong += [] if drawn else ["no figure"]
+    return Ended(name, seconds, ", ".join(wrong), verdicts)
 
 
 def report(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
@@ -137,45 +136,41 @@ def in_short(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
     verdicts that have moved and cells that failed.
     """
     console.print(f"{end.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
-    if overrides := contents.declaration(dataset).overrides:
-        console.print(f"  not as declared: {settings(overrides)}", soft_wrap=True)
-    claimed = f"claims: {end.verdicts or 'none applies'}"
-    where = f"in {cost.clock(end.seconds)}, wrote {' and '.join(map(str, files))}"
-    for line in (*tables.in_short(dataset), claimed, where):
+    overrides = contents.declaration(dataset).overrides
+    for line in (
+        *([f"not as declared: {settings(overrides)}"] if overrides else []),
+        *tables.in_short(dataset),
+        f"claims: {end.verdicts or 'none applies'}",
+        f"in {cost.clock(end.seconds)}, wrote {' and '.join(map(str, files))}",
+    ):
         console.print(f"  {line}", soft_wrap=True)
-    moved(runs.check(dataset))
+    _moved(runs.check(dataset))
     failures(dataset, str(files[0]))
-
-
-def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
-    """End of a run, in few words."""
-    verdicts, wrong = tables.ended(dataset, runs.check(dataset))
-    wrong += [] if drawn else ["no figure"]
-    return Ended(name, seconds, ", ".join(wrong), verdicts)
 
 
 def summary(ends: Sequence[Ended]) -> None:
     """Print how several runs ended."""
-    rows = []
+    rows, colours = [], []
     for end in ends:
         left_out = f"left out: {end.left_out.partition(' (')[0]}" if end.left_out else ""
-        rows.append({
-            "study": end.study,
-            "time": "-" if left_out else cost.clock(end.seconds),
-            "verdicts": end.verdicts or "-",
-            "status": left_out or end.wrong or "ok",
-        })  # fmt: skip
-    colours = ["yellow" if e.left_out else "green" if e.is_fine else "red" for e in ends]
+        time = "-" if left_out else cost.clock(end.seconds)
+        status = left_out or end.wrong or "ok"
+        row = {"study": end.study, "time": time, "verdicts": end.verdicts or "-", "status": status}
+        rows.append(row)
+        colours.append("yellow" if left_out else "red" if end.wrong else "green")
     layout.show(Table(rows, prose={"verdicts", "status"}, colours=colours))
+
+
+# ---- results ------------------------------------------------------------------------------------
 
 
 def results(dataset: xr.Dataset, file: str) -> int:
     """Print what a file holds, whatever it is of, and where it comes from; FAILED where cells, fits
     or a motion failed.
     """
-    attrs = dataset.attrs
-    title = attrs.get("title", "answer for one scene")
-    console.print(f"{attrs['id']}: {title}\n" if "id" in attrs else f"{title}\n", style="bold")
+    title = dataset.attrs.get("title", "answer for one scene")
+    name = f"{dataset.attrs['id']}: " if "id" in dataset.attrs else ""
+    console.print(f"{name}{title}\n", style="bold")
     layout.show(told.origin(dataset))
     for piece in told.numbers(dataset):
         layout.show(piece)
@@ -192,6 +187,20 @@ def status_of(dataset: xr.Dataset) -> int:
     return OK if dataset.attrs["status"] == Status.OK.label else FAILED
 
 
+def failures(dataset: xr.Dataset, file: str = "") -> int:
+    """Print the cells that failed, and how to reproduce one alone; FAILED if there are any."""
+    if undone := tables.undone(dataset):
+        size = dataset["status"].size
+        console.print(f"{undone} of {size} cells are not computed yet", style="red")
+    failed, places = tables.failures(dataset)
+    layout.show(failed)
+    if places and file:
+        console.print("each alone, in one process:")
+        for place in places:
+            console.print(f"  {tables.reproducing(dataset, file, place)}", soft_wrap=True)
+    return FAILED if undone or places else OK
+
+
 def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
     """Print one cell: warnings, its scene, its numbers and how it ended."""
     for text in warned:
@@ -202,96 +211,6 @@ def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
     text = f"{ending.status.label}{': ' * bool(ending.message)}{ending.message}"
     console.print(f"{text} ({ending.rhs_evaluations:,} right-hand sides)")
     return OK if ending.status.is_answer else FAILED
-
-
-def agreement(frame: pd.DataFrame) -> int:
-    """Print how a rerun agrees with its file; returns FAILED where a number is not the same."""
-    for name, (theirs, ours) in frame.attrs["differs"].items():
-        console.print(f"{name}: {theirs} then, {ours} now", style="yellow")
-    rows = [
-        {
-            "variable": row["variable"],
-            "values": str(row["values"]),
-            "identical": str(row["identical"]),
-            "largest difference": tables.number(row["largest_difference"], ".3g"),
-        }
-        for row in frame.to_dict("records")
-    ]
-    layout.show(Table(rows))
-    if not frame["values"].sum():
-        console.print("nothing to compare: no cell of the file is finished")
-        return FAILED
-    same = bool((frame["values"] == frame["identical"]).all())
-    console.print("every number is the same" if same else "not every number is the same")
-    return OK if same else FAILED
-
-
-def checked(dataset: xr.Dataset) -> int:
-    """Print the claims and the failed cells; FAILED where a verdict is not the expected one, a cell
-    failed, or none of the study's claims could be held against anything.
-    """
-    verdicts = runs.check(dataset)
-    vacuous = len(verdicts) > 0 and bool(verdicts["verdict"].eq(NOT_APPLICABLE).all())
-    status = max(claims(dataset), failures(dataset))
-    if vacuous:
-        console.print(f"nothing was checked: of {len(verdicts)} claims none applies", style="red")
-    return FAILED if vacuous else status
-
-
-def claims(dataset: xr.Dataset) -> int:
-    """Print the claims; FAILED where a verdict is not the expected one."""
-    found = runs.check(dataset)
-    overrides = contents.declaration(dataset).overrides
-    console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
-    if overrides:
-        console.print(f"not as declared: {settings(overrides)}")
-    nothing = found.empty or found["verdict"].eq(NOT_APPLICABLE).all()
-    if nothing and not tables.undone(dataset):
-        console.print("no claim applies")
-        return OK
-    return _verdicts(found)
-
-
-def all_claims(datasets: Sequence[xr.Dataset]) -> int:
-    """Print the claims of several studies in one table, in the order of their identifiers."""
-    frames = [runs.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
-    together = pd.concat([frame for frame in frames if len(frame)] or [pd.DataFrame()])
-    if together.empty:
-        return OK
-    number = together["id"].str.extract(r"(\d+)", expand=False).astype(float)
-    ordered = together.assign(number=number).sort_values("number", kind="stable")
-    status = _verdicts(ordered)
-    counts = ordered["verdict"].value_counts()
-    console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
-    return status
-
-
-def _verdicts(found: pd.DataFrame) -> int:
-    """Print a table of verdicts; FAILED where one is not the expected one."""
-    layout.show(tables.claims(found))
-    return moved(found)
-
-
-def moved(found: pd.DataFrame) -> int:
-    """Print the verdicts that are not the expected ones; FAILED if there are any."""
-    others = found[found["moved"]] if len(found) else found
-    for row in others.itertuples(index=False):
-        console.print(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
-    return FAILED if len(others) else OK
-
-
-def failures(dataset: xr.Dataset, file: str = "") -> int:
-    """Print the cells that failed, and how to reproduce one alone; FAILED if there are any."""
-    if undone := tables.undone(dataset):
-        size = dataset["status"].size
-        console.print(f"{undone} of {size} cells are not computed yet", style="red")
-    failed, places = tables.failures(dataset)
-    layout.show(failed)
-    if failed.rows and file:
-        console.print("each alone, in one process:")
-        for place in places:
-            console.print(f"  {tables.reproducing(dataset, file, place)}", soft_wrap=True)
-    return FAILED if undone or failed.rows else OK
 
 
 def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
@@ -305,74 +224,129 @@ def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
         raise DataError(f"{path}: cannot be written ({error})") from error
 
 
+# ---- verdicts -----------------------------------------------------------------------------------
+
+
+def checked(dataset: xr.Dataset) -> int:
+    """Print the claims and the failed cells; FAILED where a verdict is not the expected one, a cell
+    failed, or none of the study's claims could be held against anything.
+    """
+    status = max(claims(dataset), failures(dataset))
+    verdicts = runs.check(dataset)
+    if verdicts.empty or not verdicts["verdict"].eq(NOT_APPLICABLE).all():
+        return status
+    console.print(f"nothing was checked: of {len(verdicts)} claims none applies", style="red")
+    return FAILED
+
+
+def claims(dataset: xr.Dataset) -> int:
+    """Print the claims; FAILED where a verdict is not the expected one."""
+    found = runs.check(dataset)
+    console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
+    if overrides := contents.declaration(dataset).overrides:
+        console.print(f"not as declared: {settings(overrides)}")
+    nothing = found.empty or found["verdict"].eq(NOT_APPLICABLE).all()
+    if nothing and not tables.undone(dataset):
+        console.print("no claim applies")
+        return OK
+    layout.show(tables.claims(found))
+    return _moved(found)
+
+
+def all_claims(datasets: Sequence[xr.Dataset]) -> int:
+    """Print the claims of several studies in one table, in the order of their identifiers."""
+    frames = [runs.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
+    together = pd.concat([frame for frame in frames if len(frame)] or [pd.DataFrame()])
+    if together.empty:
+        return OK
+    number = together["id"].str.extract(r"(\d+)", expand=False).astype(float)
+    ordered = together.assign(number=number).sort_values("number", kind="stable")
+    layout.show(tables.claims(ordered))
+    status, counts = _moved(ordered), ordered["verdict"].value_counts()
+    console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    return status
+
+
+def _moved(found: pd.DataFrame) -> int:
+    """Print the verdicts that are not the expected ones; FAILED if there are any."""
+    others = found[found["moved"]] if len(found) else found
+    for row in others.itertuples(index=False):
+        console.print(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
+    return FAILED if len(others) else OK
+
+
+# ---- two results --------------------------------------------------------------------------------
+
+
+def agreement(frame: pd.DataFrame) -> int:
+    """Print how a rerun agrees with its file; returns FAILED where a number is not the same."""
+    for name, (theirs, ours) in frame.attrs["differs"].items():
+        console.print(f"{name}: {theirs} then, {ours} now", style="yellow")
+    _numbers(frame)
+    if not frame["values"].sum():
+        console.print("nothing to compare: no cell of the file is finished")
+        return FAILED
+    same = bool((frame["values"] == frame["identical"]).all())
+    console.print("every number is the same" if same else "not every number is the same")
+    return OK if same else FAILED
+
+
 def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Comparison) -> int:
-    """Print how two results files compare; 1 where a number or a status differs beyond the error
-    estimates, or there is nothing to compare.
+    """Print how two results files compare; FAILED where a number or a status differs beyond the
+    error estimates, or there is nothing to compare.
     """
     for letter, file, dataset in zip("AB", files, datasets, strict=True):
         about = contents.provenance(dataset)
         console.print(f"{letter}: {file}, {about['time']}, {about['command']}")
-    _pairs("declaration", found.declaration)
-    _pairs("made by", found.origin)
-    _cells(found)
-    _ends(found.statuses)
-    _agreement(found.numbers)
-    for why in dict.fromkeys(found.left_out.values()):
-        names = [name for name, reason in found.left_out.items() if reason == why]
-        console.print(f"not compared, because {why}: {', '.join(names)}")
-    console.print(_verdict(found), style="green" if found.agrees else "red")
-    return 0 if found.agrees else 1
-
-
-def _pairs(title: str, pairs: Mapping[str, tuple[Any, Any]]) -> None:
-    """Print what is not the same in both."""
-    heads = f"{title} differs", "A", "B"
-    told = [(n, *(brief(short(v), _MOST_CHARACTERS) for v in both)) for n, both in pairs.items()]
-    layout.show(Table([dict(zip(heads, row, strict=True)) for row in told], prose=heads))
-
-
-def _cells(found: Comparison) -> None:
-    """Print which cells both have, and which only one."""
+    for title, pairs in (("declaration", found.declaration), ("made by", found.origin)):
+        heads = f"{title} differs", "A", "B"
+        rows = [(n, *(brief(short(v), _MOST_CHARACTERS) for v in ab)) for n, ab in pairs.items()]
+        layout.show(Table([dict(zip(heads, row, strict=True)) for row in rows], prose=heads))
     both, first, second = found.cells
     console.print(f"{both:,} cells in both, {first:,} only in A, {second:,} only in B")
     for axis, alone in found.points.items():
         for letter, points in zip("AB", alone, strict=True):
             if points:
                 console.print(f"{axis} only in {letter} ({len(points)}): {listed(points)}")
+    _ends(found.statuses)
+    differs = found.numbers["identical"] < found.numbers["values"]
+    is_result = found.numbers["variable"].map(coverage) == "modelResult"
+    _numbers(found.numbers[is_result & (differs | found.numbers["beyond_errors"].notna())])
+    for why in dict.fromkeys(found.left_out.values()):
+        names = [name for name, reason in found.left_out.items() if reason == why]
+        console.print(f"not compared, because {why}: {', '.join(names)}")
+    wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
+    wrong += [f"{len(found.statuses)} cells ended otherwise"] * bool(len(found.statuses))
+    verdict = "; ".join(wrong) or "nothing differs beyond error estimates"
+    if not both:
+        verdict = "nothing to compare: no finished cell is in both"
+    console.print(verdict, style="green" if found.agrees else "red")
+    return OK if found.agrees else FAILED
 
 
 def _ends(statuses: pd.DataFrame) -> None:
     """Print the cells that ended otherwise."""
-    rows = []
-    for row in statuses[:_MOST_ENDS].to_dict("records"):
-        *place, (_, first), (_, second) = row.items()
-        cell = stated({str(name): value for name, value in place})
-        rows.append({"cell": cell, "A": first, "B": second})
+    first = statuses[:_MOST_ENDS]
+    places = first.drop(columns=["first", "second"]).to_dict("records")
+    rows = [
+        {"cell": stated({str(name): value for name, value in place.items()}), "A": a, "B": b}
+        for place, a, b in zip(places, first["first"], first["second"], strict=True)
+    ]
     layout.show(Table(rows, prose={"cell"}))
     if len(statuses) > _MOST_ENDS:
         console.print(f"and {len(statuses) - _MOST_ENDS} more")
 
 
-def _agreement(frame: pd.DataFrame) -> None:
-    """Print the numbers that have an error estimate, and the others that are not the same."""
-    rows = []
-    for row in frame.to_dict("records"):
-        known = not np.isnan(row["beyond_errors"])
-        result = coverage(row["variable"]) == "modelResult"
-        if result and (known or row["identical"] < row["values"]):
-            rows.append({
-                "variable": row["variable"],
-                "values": str(row["values"]),
-                "same": str(row["identical"]),
-                "beyond errors": f"{row['beyond_errors']:.0f}" if known else "no estimate",
-                "largest gap": tables.number(row["largest_difference"], ".3g"),
-            })  # fmt: skip
+def _numbers(frame: pd.DataFrame) -> None:
+    """Print how many numbers are the same, or differ beyond both error estimates."""
+    rows = [
+        {
+            "variable": row["variable"],
+            "values": str(row["values"]),
+            "identical": str(row["identical"]),
+            "beyond errors": tables.number(row["beyond_errors"], ".0f"),
+            "largest difference": tables.number(row["largest_difference"], ".3g"),
+        }
+        for row in frame.to_dict("records")
+    ]
     layout.show(Table(rows))
-
-
-def _verdict(found: Comparison) -> str:
-    if not found.cells[0]:
-        return "nothing to compare: no finished cell is in both"
-    wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
-    wrong += [f"{len(found.statuses)} cells ended otherwise"] if len(found.statuses) else []
-    return "; ".join(wrong) or "nothing differs beyond error estimates"
