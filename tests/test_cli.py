@@ -172,6 +172,8 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
     ran = call("run", "hard_cases", "--set", f"hard_case={label}", "--output", tmp_path, "--serial")
     assert ran.returncode == 0, ran.stderr
     assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
+    several = assignments.setting(f"hard_case={label},other , {label}", (label, "rigid"))
+    assert several == ("hard_case", [label, "other", label])
 
 
 # ---- several studies, one after the other -------------------------------------------------------

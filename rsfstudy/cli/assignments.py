@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +20,32 @@ _FLAGS = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
-    labels = {label for axis in study.axes for label in axis.labels or ()}
-    values_by_name: dict[str, Any] = {}
+    """Values of axes and fields of a study that ``--set`` states."""
+    texts = {p for axis in study.axes for p in axis.points if axis.labels or "," in p}
+    found = _each(settings, lambda text: setting(text, texts))
+    if "loading" in found:
+        given, rig = found["loading"], study.laboratory
+        several = isinstance(given, list)
+        found["loading"] = [loading(v, rig) for v in given] if several else loading(given, rig)
+    return found
+
+
+def fields(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Fields of a scene that ``--set`` states."""
+    rule = "must read FIELD=VALUE, as in law=slowness"
+    given = _each(settings, lambda text: named("--set", text, rule))
+    return {name: value(text) for name, text in given.items()}
+
+
+def _each(settings: tuple[str, ...], read: Callable[[str], tuple[str, Any]]) -> dict[str, Any]:
+    """What each of the settings states, no name twice."""
+    found: dict[str, Any] = {}
     for text in settings:
-        name, values = setting(text, labels)
-        if name in values_by_name:
+        name, given = read(text)
+        if name in found:
             raise InvalidValue("--set", text, f"sets {name} twice")
-        values_by_name[name] = values
-        if name == "loading" and isinstance(values, list):
-            values_by_name[name] = [loading(each, study.laboratory) for each in values]
-        elif name == "loading":
-            values_by_name[name] = loading(values, study.laboratory)
-    return values_by_name
+        found[name] = given
+    return found
 
 
 def loading(value: Any, laboratory: Laboratory | None) -> Any:
@@ -75,28 +89,19 @@ def named(option: str, text: str, rule: str) -> tuple[str, str]:
     return name, given
 
 
-def fields(settings: tuple[str, ...]) -> dict[str, Any]:
-    """Fields of a scene that ``--set`` states."""
-    found: dict[str, Any] = {}
-    for text in settings:
-        name, given = named("--set", text, "must read FIELD=VALUE, as in law=slowness")
-        if name in found:
-            raise InvalidValue("--set", text, f"sets {name} twice")
-        found[name] = value(given)
-    return found
-
-
 def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
-    start:stop:count:log.
+    start:stop:count:log. Labels may hold commas.
     """
     name, values = named("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
     if values in labels:
         return name, [values]
-    parts = [part.strip() for part in values.split(",")]
+    for label in sorted(labels, key=len, reverse=True):
+        values = values.replace(label, label.replace(",", "\0"))
+    parts = [part.strip().replace("\0", ",") for part in values.split(",")]
+    if not all(parts):
+        raise InvalidValue("--set", text, "leaves a value out")
     if len(parts) > 1:
-        if not all(parts):
-            raise InvalidValue("--set", text, "leaves a value out")
         return name, [value(part) for part in parts]
     return name, spaced("--set", text, values) if ":" in values else value(values)
 

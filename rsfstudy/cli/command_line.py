@@ -144,17 +144,13 @@ def show() -> None:
 
 
 @cli.command()
-@click.argument("name", required=False)
-@options.every
+@options.named
 @options.settings
 @options.output
-@options.workers
-@options.serial
-@options.scheduler
 @options.rtol
 @options.engine
 @options.budget
-@options.time_limit
+@options.computing
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
 @click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")
 @click.option("--despite-failures", is_flag=True, help="Reduce what there is where cells failed.")
@@ -164,9 +160,7 @@ def show() -> None:
     default=FORMATS[0],
     help="One NetCDF file, or a Zarr store written in pieces, which never replaces another.",
 )
-@options.figure
-@options.style
-@options.quiet
+@options.looks
 @options.rig
 def run() -> None:
     """Run a study: results, figure, slopes and claims.
@@ -177,8 +171,7 @@ def run() -> None:
 
 
 @cli.command()
-@click.argument("name", required=False)
-@options.every
+@options.named
 @options.output
 def check() -> None:
     """Hold results against published values.
@@ -188,11 +181,12 @@ def check() -> None:
 
 
 @cli.command()
-@click.argument("name", required=False)
-@options.every
-@options.drawn
-@options.figure
-@options.style
+@options.named
+@options.into(
+    "Directory of the results and of the figure, or the figure itself, such as fig.pdf.  "
+    "[default: outputs, and beside a FILE]"
+)
+@options.looks
 @click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
 @options.study
 @options.against
@@ -238,17 +232,10 @@ def compare() -> None:
     help="Only this cell, in this process, failing as it fails.",
 )
 @options.study
-@click.option(
-    "--output",
-    type=click.Path(file_okay=False),
-    callback=options.directory,
-    help="Directory to keep the new results in; nothing is written without it.",
+@options.into(
+    "Directory to keep the new results in; nothing is written without it.", file_okay=False
 )
-@options.workers
-@options.serial
-@options.scheduler
-@options.time_limit
-@options.quiet
+@options.computing
 def rerun() -> None:
     """Compute a results file anew, and compare every number.
 

@@ -4,12 +4,14 @@ laboratory, or computed by other codes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from rsfstudy.cli import options
+from rsfstudy.cli.options import F
 from rsfstudy.defaults import FIT_BUDGET
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
@@ -48,69 +50,60 @@ def simulate() -> None:
     """
 
 
-def _listed(_context: click.Context, _option: click.Parameter, text: str | None) -> tuple[str, ...]:
+def _parts(_context: click.Context, _option: click.Parameter, text: str | None) -> tuple[str, ...]:
     """Parts of a comma list."""
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
-def _quantity(_context: click.Context, _option: click.Parameter, text: str | None) -> Any:
+def _number_or_text(_context: click.Context, _option: click.Parameter, text: str | None) -> Any:
     """A number in units of records, or a text with units."""
     from rsfstudy.cli import assignments
 
     return None if text is None else assignments.number_or_text(text)
 
 
+def _listed(
+    *names: str, words: str, default: str | None = None, metavar: str = "TEXT"
+) -> Callable[[F], F]:
+    """An option that is a comma list."""
+    return click.option(*names, callback=_parts, default=default, metavar=metavar, help=words)
+
+
+def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F], F]:
+    """An option that is a number with its units; what help says of its default stands in words."""
+    about: dict[str, Any] = {"default": default, "show_default": False, "help": words}
+    return click.option(name, callback=_number_or_text, **about)
+
+
 @click.command(cls=options.Command, does="commands_fit")
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
+@_listed(
     "--columns",
-    callback=_listed,
     metavar="NAME=HEADING,...",
-    help="Which column is which, as in 'time=t (s),displacement=lp (um),friction=mu'; shear_stress "
-    "and normal_stress are others; of raw numbers, 'lp (um) * 0.1 + 5'.  "
+    words="Which column is which, as in 'time=t (s),displacement=lp (um),friction=mu'; "
+    "shear_stress and normal_stress are others; of raw numbers, 'lp (um) * 0.1 + 5'.  "
     "[default: by headings that are known]",
 )
 @click.option("--normal-stress", help="As in '20 MPa', where the record does not hold it.")
-@click.option(
-    "--stiffness",
-    callback=_quantity,
-    help="Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.",
-)
-@click.option("--slip-distance", callback=_quantity, help="First guess of D_c, as in '10 um'.")
-@click.option(
-    "--law",
-    "laws",
-    callback=_listed,
-    default="slip,slowness",
-    help="State evolution laws, a fit by each.",
-)
-@click.option(
+@_quantity("--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
+@_quantity("--slip-distance", "First guess of D_c, as in '10 um'.")
+@_listed("--law", "laws", default="slip,slowness", words="State evolution laws, a fit by each.")
+@_listed(
     "--free",
-    callback=_listed,
     default="a,b,slip_distance,mu_star,trend1",
-    help="Parameters to look for; also stiffness, step_time, trend2, alpha and others.",
+    words="Parameters to look for; also stiffness, step_time, trend2, alpha and others.",
 )
-@click.option(
-    "--step", "steps", callback=_listed, metavar="N,...", help="Steps to fit.  [default: all]"
-)
+@_listed("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
 @click.option(
     "--together", is_flag=True, help="Fit these steps, of all RECORDS, as one, by one a, b and D_c."
 )
-@click.option(
+@_quantity(
     "--before",
-    callback=_quantity,
-    default="0 um",
-    show_default=False,
-    help="Load point displacement that is fitted before a step.  [default: half the way back to "
-    "the step before]",
+    "Load point displacement that is fitted before a step.  [default: half the way back to the "
+    "step before]",
+    "0 um",
 )
-@click.option(
-    "--after",
-    callback=_quantity,
-    default="0 um",
-    show_default=False,
-    help="That after it, as in '250 um'.  [default: up to the next step]",
-)
+@_quantity("--after", "That after it, as in '250 um'.  [default: up to the next step]", "0 um")
 @options.count(
     "--windows", 1, "Windows, from half of what follows a step to all of it: how parameters differ."
 )

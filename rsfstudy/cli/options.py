@@ -4,6 +4,7 @@ check them is imported then.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import shlex
 import sys
@@ -52,30 +53,35 @@ class Command(click.Command):
         return getattr(module, str(self.name))(Given(**context.params))
 
 
-every = click.option("--all", "every", is_flag=True, help="Every named study.")
+def together(*several: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Several options as one, in their order."""
+    return lambda command: functools.reduce(lambda c, each: each(c), reversed(several), command)
 
 
-def directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
+def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
+    """An option that is a whole number, 1 or more."""
+    kind = click.IntRange(1)
+    return click.option(name, type=kind, metavar="N", default=default, help=words)
+
+
+def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
     """A directory for results."""
     from rsfstudy.files import places
 
     return places.directory(value)
 
 
-output = click.option(
-    "--output",
-    type=click.Path(file_okay=False),
-    callback=directory,
-    default=OUTPUT,
-    help="Directory of the results.",
+def into(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
+    """The option that says where results go."""
+    path = click.Path(**kind)  # type: ignore[arg-type]
+    return click.option("--output", type=path, callback=_directory, default=default, help=words)
+
+
+named = together(
+    click.argument("name", required=False),
+    click.option("--all", "every", is_flag=True, help="Every named study."),
 )
-drawn = click.option(
-    "--output",
-    type=click.Path(),
-    callback=directory,
-    help="Directory of the results and of the figure, or the figure itself, such as fig.pdf.  "
-    "[default: outputs, and beside a FILE]",
-)
+output = into("Directory of the results.", OUTPUT, file_okay=False)
 settings = click.option(
     "--set",
     "settings",
@@ -97,36 +103,31 @@ engine = click.option(
     "[default: the study's, scipy]",
 )
 
-
-def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
-    """An option that is a whole number, 1 or more."""
-    kind = click.IntRange(1)
-    return click.option(name, type=kind, metavar="N", default=default, help=words)
-
-
 budget = count(
     "--budget",
     None,
     "Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
     "[default: the study's, 500000]",
 )
-workers = count("--workers", 2, "Worker processes of this machine.")
-serial = click.option("--serial", is_flag=True, help="Compute in this process.")
-scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster.")
-time_limit = click.option(
-    "--time-limit",
-    type=float,
-    metavar="SECONDS",
-    default=TIME_LIMIT,
-    help="CPU time after which a worker gives a cell up.",
+#: Where cells are computed.
+computing = together(
+    count("--workers", 2, "Worker processes of this machine."),
+    click.option("--serial", is_flag=True, help="Compute in this process."),
+    click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
+    click.option(
+        "--time-limit",
+        type=float,
+        metavar="SECONDS",
+        default=TIME_LIMIT,
+        help="CPU time after which a worker gives a cell up.",
+    ),
+    click.option("--quiet", is_flag=True, help="Do not show how far it has come."),
 )
 study = click.option(
     "--study",
     type=click.Path(path_type=Path),
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
-quiet = click.option("--quiet", is_flag=True, help="Do not show how far it has come.")
-
 
 #: By their names in datasets.
 _ABSCISSAE = {"displacement": "load_point_displacement"}
@@ -149,11 +150,20 @@ def _style(_context: click.Context, _option: click.Parameter, value: str | None)
     return value
 
 
-style = click.option(
-    "--style",
-    metavar="FILE",
-    callback=_style,
-    help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
+#: How figures look.
+looks = together(
+    click.option(
+        "--figure",
+        "form",
+        type=click.Choice(FIGURES),
+        help="File format of figures.  [default: png]",
+    ),
+    click.option(
+        "--style",
+        metavar="FILE",
+        callback=_style,
+        help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
+    ),
 )
 
 
@@ -176,11 +186,6 @@ def fields(words: str) -> Callable[[F], F]:
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=words)
 
 
-figure = click.option(
-    "--figure", "form", type=click.Choice(FIGURES), help="File format of figures.  [default: png]"
-)
-
-
 #: What a laboratory may state, and an example of it.
 RIG = {
     "normal_stress": "5 MPa",
@@ -195,9 +200,8 @@ RIG = {
 }
 
 
-def rig(command: Any) -> Any:
-    """The options that state a laboratory."""
-    for name, example in reversed(RIG.items()):
-        words = f"Of the rig, as in '{example}'; a plain number is in SI units."
-        command = click.option(f"--{name.replace('_', '-')}", name, help=words)(command)
-    return command
+_OF_RIG = "Of the rig, as in '{}'; a plain number is in SI units."
+#: The options that state a laboratory.
+rig = together(
+    *(click.option(f"--{n.replace('_', '-')}", help=_OF_RIG.format(e)) for n, e in RIG.items())
+)
