@@ -85,6 +85,10 @@ def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
     for name in ("a", "b", "a_minus_b", r"Dc \(um\)", "mu_0", r"trend \(1/um\)"):
         row = rf"^{name} +\S.* \+- \S.*$"
         assert len(re.findall(row, said, re.MULTILINE)) == 2, name
+    short = said.split("Of all:")[1]
+    assert (
+        len(re.findall(r"^ +[12] +slowness( +[\d.]+ \+- [\d.]+){3} +ok", short, re.MULTILINE)) == 2
+    )
     assert "residuals freed of correlation are white" in said
     assert max(len(line.rstrip()) for line in said.splitlines()) <= 80
 
@@ -125,6 +129,10 @@ def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, 
     assert "step 1 of record, step 2 of record" in " ".join(ran.stdout.split())
     for name in ("a", r"Dc \(um\)", "mu_0_1", "mu_0_2", r"trend_2 \(1/um\)"):
         assert len(re.findall(rf"^{name} +\S", ran.stdout, re.MULTILINE)) == 1, name
+    found = rsfstudy.open(tmp_path / "fit.nc").squeeze()
+    assert found.rsf.scene.mu_star == float(
+        found.mu_star_1
+    )  # of the step that its velocities are of
     figure = rsfstudy.open(tmp_path / "fit.nc").rsf.plot()
     curves = [line for line in figure.axes[0].lines if line.get_label() == "slowness law"]
     symbols = [text.get_text() for text in figure.axes[-1].get_xticklabels()]

@@ -33,39 +33,59 @@ def answered(dataset: xr.Dataset) -> bool:
 
 
 def told(dataset: xr.Dataset) -> Iterator[Table | str]:
-    """All fits, and what is to be said of each."""
-    places: dict[tuple[str, ...], list[xr.Dataset]] = {}
+    """All fits, and what is to be said of each; of several steps one row each in the end."""
+    places: dict[str, list[xr.Dataset]] = {}
     for one in fit_results.cells(dataset):
-        where = tuple(f"{n} {value}" for n, value in fit_results.place(one).items())
+        where = ", ".join(f"{n} {value}" for n, value in fit_results.place(one).items())
         places.setdefault(where, []).append(one)
     measure: Any = contents.declaration(dataset).measure
-    together = measure.get("together", ())
+    together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
     for where, fits in places.items():
         if together:
-            each = ", ".join(f"step {step} of {record}" for record, step in together)
-            yield f"together: {each}; the window is that of the first"
+            yield f"together: {together}; the window is that of the first"
         for first in range(0, len(fits), _BESIDE):
-            yield _table(", ".join(where), fits[first : first + _BESIDE])
+            yield _table(where, fits[first : first + _BESIDE])
         for one in fits:
             yield from _remarks(one)
+    if len(places) > 1:
+        yield Table([_row(one) for fits in places.values() for one in fits], "Of all:")
+
+
+def _row(one: xr.Dataset) -> dict[str, str]:
+    """A fit in short."""
+    short = {called: name for name, (called, _units) in fit_results.shown(one).items()}
+    few: dict[str, str] = {
+        n: with_error(one, short[n]) for n in ("a", "b", "b1", "b2", "Dc") if n in short
+    }
+    place = {n: str(value) for n, value in fit_results.place(one).items()}
+    return {**place, "law": str(one["law"].item()), **few, "status": fit_results.status(one)}
 
 
 def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
-    has = [np.isfinite(one["rows_fitted"].item()) for one in fits]
-    window = _window(fits[has.index(True)]) if any(has) else ""
-    lines: dict[str, list[str]] = {}
-    for name, (short, units) in fit_results.shown(fits[0]).items():
-        lines[f"{short} ({units})" if units else short] = [with_error(one, name) for one in fits]
-    told = [_quality(one) if fitted else {} for one, fitted in zip(fits, has, strict=True)]
-    for heading in ("R2", "criterion", "noise", "worth"):
-        lines[heading] = [one.get(heading, "-") for one in told]
-    lines["status"] = [fit_results.status(one) for one in fits]
-    laws = [str(one["law"].item()) for one in fits]
-    rows = [
-        {"parameter": heading, **dict(zip(laws, texts, strict=True))}
-        for heading, texts in lines.items()
-    ]
-    return Table(rows, "\n".join(filter(None, (where, window))))
+    columns = {str(one["law"].item()): _column(one) for one in fits}
+    headings = next(iter(columns.values()))
+    rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
+    windows = (_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
+    return Table(rows, "\n".join(filter(None, (where, next(windows, "")))))
+
+
+def _column(one: xr.Dataset) -> dict[str, str]:
+    """The parameters of a fit, how well it explains its rows, and the noise that is left."""
+    found = {
+        f"{short} ({units})" if units else short: with_error(one, name)
+        for name, (short, units) in fit_results.shown(one).items()
+    }
+    quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
+    if np.isfinite(one["rows_fitted"].item()):
+        order = int(one["noise_order"].item())
+        process = f"AR({order})" if order else "white"
+        quality = {
+            "R2": f"{one['r_squared'].item():.4f}",
+            "criterion": f"{one['criterion'].item():.1f}",
+            "noise": f"{process}, sd {one['noise_size'].item():.2g}",
+            "worth": f"{one['effective_samples'].item():,.0f} independent rows",
+        }
+    return found | quality | {"status": fit_results.status(one)}
 
 
 def _window(one: xr.Dataset) -> str:
@@ -92,22 +112,10 @@ def with_error(one: xr.Dataset, name: str) -> str:
     size = math.floor(math.log10(max(abs(value), error)))
     if -5 <= size < 6 and digits <= 9:
         digits = max(digits, 0)
-        return f"{value:.{digits}f} +- {error:.{digits}f}"
+        return f"{value:z.{digits}f} +- {error:.{digits}f}"
     scale = 10.0**size
     digits = max(digits + size, 0)
-    return f"({value / scale:.{digits}f} +- {error / scale:.{digits}f})e{size:+03d}"
-
-
-def _quality(one: xr.Dataset) -> dict[str, str]:
-    """How well a fit explains its rows, and the noise that is left."""
-    order = int(one["noise_order"].item())
-    process = f"AR({order})" if order else "white"
-    return {
-        "R2": f"{one['r_squared'].item():.4f}",
-        "criterion": f"{one['criterion'].item():.1f}",
-        "noise": f"{process}, sd {one['noise_size'].item():.2g}",
-        "worth": f"{one['effective_samples'].item():,.0f} independent rows",
-    }
+    return f"({value / scale:z.{digits}f} +- {error / scale:.{digits}f})e{size:+03d}"
 
 
 def _remarks(one: xr.Dataset) -> Iterator[str]:

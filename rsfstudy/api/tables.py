@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ _OF_SLOPES = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
+#: Variables of columns, each with what makes a text of a value, by the headings.
+Columns = dict[str, tuple[str, Callable[[Any], str]]]
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,16 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
+def rows(dataset: xr.Dataset, dims: Iterable[Hashable], columns: Columns) -> list[dict[str, str]]:
+    """A row for each point of some dimensions: where it is, then columns of variables."""
+    dims, found = list(map(str, dims)), []
+    for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
+        one = dataset.isel(dict(zip(dims, at, strict=True)))
+        row = {with_units(one[d]): short(one[d].item()) for d in dims}
+        found.append(row | {head: form(one[n].item()) for head, (n, form) in columns.items()})
+    return found
+
+
 def headline(dataset: xr.Dataset) -> Table:
     """The headline along the axes, with its error estimate and how each cell ended; no row where
     there is none.
@@ -104,27 +117,17 @@ def headline(dataset: xr.Dataset) -> Table:
         return Table([])
     dataset = in_units_of_rig(dataset)
     name = name if name in dataset else renamed(name)
-    status, error = dataset["status"], f"{name}_error"
-    dims = [str(d) for d in status.dims]
-    at = numbers.sample({d: status.sizes[d] for d in dims}, MOST_CELLS)
-    few = dataset[[n for n in (name, error, "status") if n in dataset]].isel(at)
-    few = few.transpose(*dims).load()
-    others = bool((few["status"] != int(Status.OK)).any())
-    rows = []
-    for index in np.ndindex(few["status"].shape):
-        cell = few.isel(dict(zip(dims, index, strict=True)))
-        row = {with_units(dataset[d]): short(cell[d].item()) for d in dims}
-        row[name] = number(cell[name].item())
-        if error in few:
-            row["error"] = number(cell[error].item(), ".1e")
-        if others:
-            row["status"] = LABELS[int(cell["status"])]
-        rows.append(row)
-    units = units_of(dataset[name])
+    dims, columns = dataset["status"].dims, Columns({name: (name, number)})
+    if f"{name}_error" in dataset:
+        columns["error"] = f"{name}_error", partial(number, form=".1e")
+    at = numbers.sample({str(d): dataset.sizes[d] for d in dims}, MOST_CELLS)
+    few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
+    if (few["status"] != int(Status.OK)).any():
+        columns["status"] = "status", LABELS.__getitem__
+    units, size = units_of(dataset[name]), dataset["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
-    if len(rows) < status.size:
-        caption += f" ({len(rows)} of {status.size:,} cells)"
-    return Table(rows, caption)
+    caption += f" ({few['status'].size} of {size:,} cells)" * (few["status"].size < size)
+    return Table(rows(few, dims, columns), caption)
 
 
 def in_short(dataset: xr.Dataset) -> list[str]:
@@ -132,19 +135,13 @@ def in_short(dataset: xr.Dataset) -> list[str]:
     lines, converted = [], in_units_of_rig(dataset)
     if (name := numbers.headline(dataset)) is not None:
         values = converted[name if name in converted else renamed(name)]
-        told = np.unique(values.values[np.isfinite(values.values)])
-        least_and_most = " to ".join(
-            short(value) for value in dict.fromkeys((*told[:1], *told[-1:]))
-        )
-        units = units_of(values)
-        text = f"{values.name}: {least_and_most or 'no number'}"
-        lines.append(text + f" {units}" * bool(least_and_most and units != "1"))
+        told, units = np.unique(values.values[np.isfinite(values.values)]), units_of(values)
+        ends = " to ".join(map(short, dict.fromkeys((*told[:1], *told[-1:]))))
+        text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
+        lines.append(f"{values.name}: {text}")
     slopes = {slope: converted[slope].values.ravel().tolist() for slope in _slopes(converted)}
-    return [
-        *lines,
-        *(f"{n}: {listed(values, ', ')}" for n, values in slopes.items()),
-        tally(dataset),
-    ]
+    lines += [f"{slope}: {listed(values, ', ')}" for slope, values in slopes.items()]
+    return [*lines, tally(dataset)]
 
 
 def reductions(dataset: xr.Dataset) -> Iterator[Table]:
@@ -154,23 +151,15 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
     converted = in_units_of_rig(dataset)
     for slope in _slopes(converted):
         yield _slope(converted, slope)
-    work = ("cheapest_work", "cheapest_default_work", "cheapest_default_request")
-    if {"cheapest_integrator", *work} <= set(dataset.data_vars):
-        frame = dataset[["cheapest_integrator", *work]].reset_coords(drop=True).to_dataframe()
-        rows = [
-            {
-                "problem": str(place),
-                "digits": f"{digits:g}",
-                "cheapest": str(name),
-                "its work": f"{least:,.0f}",
-                "work of the default": f"{default:,.0f}",
-                "rtol to ask for": f"{10.0**-request:.1g}",
-            }
-            for place, digits, name, least, default, request in (
-                frame.reset_index().itertuples(index=False)
-            )
-        ]
-        yield Table(rows, prose={"problem", "cheapest"})
+    columns: Columns = {
+        "cheapest": ("cheapest_integrator", str),
+        "its work": ("cheapest_work", "{:,.0f}".format),
+        "work of the default": ("cheapest_default_work", "{:,.0f}".format),
+        "rtol to ask for": ("cheapest_default_request", lambda digits: f"{10.0**-digits:.1g}"),
+    }
+    if {name for name, _form in columns.values()} <= set(dataset.data_vars):
+        dims = dataset["cheapest_work"].dims
+        yield Table(rows(dataset, dims, columns), prose={"problem", "cheapest"})
 
 
 def _slopes(dataset: xr.Dataset) -> list[str]:
@@ -180,15 +169,12 @@ def _slopes(dataset: xr.Dataset) -> list[str]:
 
 
 def _slope(dataset: xr.Dataset, name: str) -> Table:
-    slopes = dataset[name]
-    told = {n: about for end, about in _OF_SLOPES.items() if (n := f"{name}_{end}") in dataset}
-    rows = []
-    for at in np.ndindex(slopes.shape):
-        one = dataset[[name, *told]].isel(dict(zip(slopes.dims, at, strict=True)))
-        row = {with_units(dataset[n]): short(one[n].item()) for n in (*slopes.dims, name)}
-        rows.append(row | {head: format(one[n].item(), form) for n, (head, form) in told.items()})
-    prose = {with_units(dataset[d]) for d in slopes.dims}
-    return Table(rows, slopes.attrs.get("comment", name), prose)
+    dims, words = dataset[name].dims, dataset[name].attrs.get("comment", name)
+    columns: Columns = {with_units(dataset[name]): (name, short)}
+    for end, (heading, form) in _OF_SLOPES.items():
+        if f"{name}_{end}" in dataset:
+            columns[heading] = f"{name}_{end}", f"{{:{form}}}".format
+    return Table(rows(dataset, dims, columns), words, {with_units(dataset[d]) for d in dims})
 
 
 def claims(frame: pd.DataFrame) -> Table:
