@@ -17,7 +17,7 @@ from running import call
 
 import rsfstudy
 from rsfstudy.api import fit_results
-from rsfstudy.api.fit_tables import with_error
+from rsfstudy.api.fit_results import with_error
 from rsfstudy.errors import DataError, Incomplete, InvalidValue
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"

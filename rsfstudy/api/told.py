@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api import fit_results, fit_tables, tables
+from rsfstudy.api import fit_results, tables
 from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
 from rsfstudy.declare.wording import stated
@@ -23,7 +23,7 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
     what a reader of a motion, or of another answer for one scene, looks for first.
     """
     if fit_results.is_fit(dataset):
-        yield from fit_tables.told(dataset)
+        yield from fit_results.told(dataset)
     elif not contents.is_of_a_scene(dataset):
         yield tables.headline(dataset)
         yield from tables.reductions(dataset)

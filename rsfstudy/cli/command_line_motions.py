@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
 
 
-@click.command(cls=options.Command, does="commands_simulate")
+@click.command(cls=options.Command, does="commands_motions")
 @options.fields(
     "A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
     "a loading from a CSV file, as in loading=record.csv."
@@ -75,7 +75,7 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     return click.option(name, callback=_number_or_text, **about)
 
 
-@click.command(cls=options.Command, does="commands_fit")
+@click.command(cls=options.Command, does="commands_motions")
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
 @_listed(
     "--columns",

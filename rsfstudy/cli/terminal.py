@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.api import fit_results, fit_tables, runs, tables, told
+from rsfstudy.api import fit_results, runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
 from rsfstudy.cli.console import console, stderr
@@ -183,7 +183,7 @@ def results(dataset: xr.Dataset, file: str) -> int:
 def status_of(dataset: xr.Dataset) -> int:
     """OK where every fit has numbers, or a motion ended as asked."""
     if fit_results.is_fit(dataset):
-        return OK if fit_tables.answered(dataset) else FAILED
+        return OK if fit_results.answered(dataset) else FAILED
     return OK if dataset.attrs["status"] == Status.OK.label else FAILED
 
 

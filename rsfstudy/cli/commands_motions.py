@@ -1,4 +1,4 @@
-"""What the command `simulate` does."""
+"""What the commands `simulate` and `fit` do."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from pathlib import Path
 
 import xarray as xr
 
-from rsfstudy.api import told
+from rsfstudy import plots
+from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.api import fit_results, fitting, told
+from rsfstudy.api.tables import Table
 from rsfstudy.api.trajectory import BEYOND
 from rsfstudy.api.trajectory import simulate as simulated
 from rsfstudy.cli import assignments, layout, terminal
@@ -18,6 +21,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.plots._motion import picture
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.records import read_record
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
@@ -25,11 +29,16 @@ from rsfstudy.status import Status
 _NO_PHYSICS = 3
 #: Units of the rig in what is printed.
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
+#: Most steps of a record that are listed.
+_MOST_STEPS = 24
+#: Options that `rsfstudy.fit` takes as they are.
+_TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
+    "noise", "loading", "posterior", "budget", "engine")  # fmt: skip
 
 
 def simulate(given: Given) -> int:
     """Follow one motion, draw it and write it."""
-    check_replaceable(given.output.with_suffix(".nc"), _is_motion, "motion")
+    _check_replaceable(given.output.with_suffix(".nc"), _is_motion, "motion")
     scene, laboratory = _stated(given)
     motion = simulated(
         scene,
@@ -43,24 +52,6 @@ def simulate(given: Given) -> int:
     if motion.attrs["status"] != Status.OK.label:
         return terminal.FAILED
     return _NO_PHYSICS if BEYOND in motion.attrs else terminal.OK
-
-
-def check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
-    """What is there may be an earlier one of its kind, and nothing else."""
-    if not data.exists():
-        return
-    try:
-        with xr.open_dataset(data, engine="netcdf4") as there:
-            if is_one(there):
-                return
-    except (OSError, RuntimeError, ValueError):
-        pass  # whatever it is, it is none
-    remedy = "Choose another --output, or move it away first."
-    raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)
-
-
-def _is_motion(there: xr.Dataset) -> bool:
-    return "scene" in there.attrs and "time" in there.dims
 
 
 def _stated(given: Given) -> tuple[Scene, Laboratory | None]:
@@ -103,3 +94,74 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
         layout.show(told.motion(found[0]))
         layout.show(told.events(found[1]))
     console.print(f"{said}\nwrote {given.output} and {data}")
+
+
+def fit(given: Given) -> int:
+    """Fit records, print the parameters, draw the fits and write them."""
+    data = given.output.with_suffix(".nc")
+    _check_replaceable(data, _is_fit, "fit")
+    rule = "must read NAME=HEADING, as in 'time=t (s)'"
+    columns = dict(assignments.named("--columns", text, rule) for text in given.columns) or None
+    stress = given.normal_stress
+    records = [read_record(path, columns, normal_stress=stress) for path in given.records]
+    for record in records:
+        _list_steps(record)
+    dataset = fitting.fit(
+        records,
+        steps=[_number(text) for text in given.steps],
+        command=given.command,
+        **{name: getattr(given, name) for name in _TAKEN},
+        **assignments.fields(given.settings),
+    )
+    dataset = store.write(dataset, data)
+    plots.save(dataset, given.output)
+    for piece in told.numbers(dataset):
+        layout.show(piece)
+    console.print(f"wrote {given.output} and {data}", soft_wrap=True)
+    return terminal.status_of(dataset)
+
+
+def _is_fit(there: xr.Dataset) -> bool:
+    return fit_results.is_fit(there) and "declaration" in there.attrs
+
+
+def _number(text: str) -> int:
+    if not text.isdecimal():
+        raise InvalidValue("--step", text, "must be a whole number, or several: 1,2")
+    return int(text)
+
+
+def _list_steps(record: Record) -> None:
+    """Print the steps of a record."""
+    console.print(f"{record.name}: {len(record):,} rows, {len(record.found)} steps")
+    rows = [
+        {
+            "step": str(number),
+            "time (s)": f"{step.begins:.6g}",
+            "lasts (s)": f"{step.ends - step.begins:.6g}",
+            "V0 (um/s)": f"{step.before:.6g}",
+            "V1 (um/s)": f"{step.after:.6g}",
+        }
+        for number, step in enumerate(record.found[:_MOST_STEPS], start=1)
+    ]
+    layout.show(Table(rows))
+    if (left := len(record.found) - _MOST_STEPS) > 0:
+        console.print(f"and {left} more")
+
+
+def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
+    """What is there may be an earlier one of its kind, and nothing else."""
+    if not data.exists():
+        return
+    try:
+        with xr.open_dataset(data, engine="netcdf4") as there:
+            if is_one(there):
+                return
+    except (OSError, RuntimeError, ValueError):
+        pass  # whatever it is, it is none
+    remedy = "Choose another --output, or move it away first."
+    raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)
+
+
+def _is_motion(there: xr.Dataset) -> bool:
+    return "scene" in there.attrs and "time" in there.dims
