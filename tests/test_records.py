@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import rsfstudy
@@ -51,6 +52,22 @@ def test_units_beside_headings_and_a_stated_normal_stress(tmp_path: Path) -> Non
     arrays = {"time": TIME, "displacement": MOVED, "shear_stress": SHEAR, "normal_stress": NORMAL}
     both = rsfstudy.read_record(arrays, normal_stress="10 MPa")
     np.testing.assert_allclose(both.columns["friction"], FRICTION, rtol=1e-15)
+
+
+def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
+    headings = ["Time (min)", "LP disp (mm)", "mu"]
+    path = written(tmp_path / "run.csv", headings, [TIME / 60.0, MOVED * 1e-3, FRICTION], ",")
+    columns = {"time": "Time (min)", "displacement": "LP disp (mm)", "friction": "mu"}
+    for told in (None, columns):
+        record = rsfstudy.read_record(pd.read_csv(path), told)
+        for name, values in rsfstudy.read_record(path, told).columns.items():
+            np.testing.assert_array_equal(record.columns[name], values)
+    with pytest.raises(
+        InvalidValue, match=r"^column = 'mu': is unknown. Choices: time, .*friction"
+    ):
+        rsfstudy.read_record(path, {"mu": "mu"})
+    with pytest.raises(InvalidValue, match="heading = 't': heads no column"):
+        rsfstudy.read_record(pd.read_csv(path), {"time": "t (s)"})
 
 
 @pytest.mark.parametrize(

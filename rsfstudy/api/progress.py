@@ -25,34 +25,23 @@ def shown(name: str, show: bool) -> Iterator[Progress]:
     console = Console(stderr=True)
     if not show:
         yield lambda _done, _all: None
-    elif console.is_terminal or console.is_jupyter:
-        with _bar(name, console) as update:
-            yield update
-    else:
+    elif not (console.is_terminal or console.is_jupyter):
         yield _lines(name, console)
+    else:
+        cells = (bars.MofNCompleteColumn(), bars.TextColumn("cells"))
+        times = (bars.TimeElapsedColumn(), bars.TimeRemainingColumn())
+        told = (bars.TextColumn("{task.description}"), bars.BarColumn(), *cells, *times)
+        bar = bars.Progress(*told, console=console)
+        task = bar.add_task(name, total=None)
 
+        def update(done: int, total: int) -> None:
+            bar.start()  # only now, because a run may fail before its first report
+            bar.update(task, completed=done, total=total)
 
-@contextlib.contextmanager
-def _bar(name: str, console: Console) -> Iterator[Progress]:
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TextColumn("cells"),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    bar = bars.Progress(*columns, console=console)
-    task = bar.add_task(name, total=None)
-
-    def update(done: int, total: int) -> None:
-        bar.start()  # only now, because a run may fail before its first report
-        bar.update(task, completed=done, total=total)
-
-    try:
-        yield update
-    finally:
-        bar.stop()
+        try:
+            yield update
+        finally:
+            bar.stop()
 
 
 def _lines(name: str, console: Console) -> Progress:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.doors import check_file, door
@@ -55,10 +56,11 @@ def read_record(
 
     Parameters
     ----------
-    source : str, Path or mapping
+    source : str, Path, mapping or pandas.DataFrame
         A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
         the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
-        recorded. Plain arrays are in s, um, and MPa.
+        recorded. Plain arrays are in s, um, and MPa; with units in their names, as in ``LP disp
+        (um)``, they are read as a file with such a header.
     columns : mapping of str to str or (heading, units), optional
         Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
         "s")``. Without it headings are known by how they begin, and state their units, as in
@@ -88,24 +90,31 @@ def read_record(
     >>> record = rsfstudy.read_record("run.csv", normal_stress="20 MPa")
     >>> record.steps().to_dataframe()
     """
+    for key in columns or ():
+        _check_known(key)
     if isinstance(source, str | Path):
         check_file("record", source)
         if not Path(source).exists():
             raise DataError(f"there is no file {source}")
         binary = _is_binary(Path(source))
         found = _of_xlook(Path(source), columns) if binary else _of_text(Path(source), columns)
-    elif isinstance(source, Mapping):
-        found = {key: Column(np.asarray(v, dtype=float), "") for key, v in source.items()}
+    elif isinstance(source, Mapping | pd.DataFrame):
+        arrays = {str(key): np.asarray(v, dtype=float) for key, v in source.items()}
+        found = _of_arrays(arrays, columns)
     else:
-        remedy = "Give the path of a file, or a mapping of arrays."
+        remedy = "Give the path of a file, a mapping of arrays, or a DataFrame."
         raise InvalidValue("record", source, "is no record", remedy=remedy)
     values = {}
     for key, column in found.items():
-        if key not in _UNITS:
-            raise InvalidValue("column", key, "is unknown", choices=_UNITS)
+        _check_known(key)
         column.check(key, ~np.isfinite(column.values), "must be a finite number")
         values[key] = column.values * _scale(key, column.units)
     return _record(values, normal_stress, name or _name(source))
+
+
+def _check_known(key: str) -> None:
+    if key not in _UNITS:
+        raise InvalidValue("column", key, "is unknown", choices=_UNITS)
 
 
 def _name(source: Any) -> str:
@@ -151,16 +160,37 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
         header = file.readline()
     between = next((c for c in "\t;," if c in header), None)
     headings = [text.strip() for text in header.rstrip("\n").split(between)]
+    lines = _lines(headings, columns, f"{path}, line 1")
+    read = read_table(path, {key: line[:2] for key, line in lines.items()})
+    return {key: _scaled(column, *lines[key][2:]) for key, column in read.items()}
+
+
+def _of_arrays(
+    arrays: Mapping[str, np.ndarray], columns: Mapping[str, Any] | None
+) -> Mapping[str, Column]:
+    """Columns of arrays by name, or by headings where they, or `columns`, state units."""
+    if columns is None and not any("(" in key or "[" in key for key in arrays):
+        return {key: Column(values, "") for key, values in arrays.items()}
+    found = {}
+    for key, (heading, units, *line) in _lines([*arrays], columns, "record").items():
+        if heading not in arrays:
+            raise InvalidValue("heading", heading, "heads no column", choices=arrays)
+        found[key] = _scaled(Column(arrays[heading], units), *line)
+    return found
+
+
+def _lines(
+    headings: Sequence[str], columns: Mapping[str, Any] | None, place: str
+) -> dict[str, tuple[str, str, float, float]]:
+    """Heading, units, scale and offset of each column: as they are told, or by known headings."""
     if columns is not None:
-        lines = {key: _told(key, of, headings) for key, of in columns.items()}
-        read = read_table(path, {key: line[:2] for key, line in lines.items()})
-        return {key: _scaled(column, *lines[key][2:]) for key, column in read.items()}
-    wanted: dict[str, tuple[str, str]] = {}
+        return {key: _told(key, of, headings) for key, of in columns.items()}
+    wanted: dict[str, tuple[str, str, float, float]] = {}
     for text in headings:
         match = _HEADING.fullmatch(text)
         for key, begins in _HEADINGS.items():
             if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                wanted[key] = _told(key, text, headings)[:2]
+                wanted[key] = _told(key, text, headings)
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (
@@ -168,10 +198,9 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
             "columns={'time': 't (s)', 'displacement': 'lp (um)', 'friction': 'mu'}."
         )
         rule = "does not name time and displacement"
-        raise InvalidValue("header", header.strip()[:200], rule, remedy=remedy).at(
-            f"{path}, line 1"
-        )
-    return read_table(path, wanted)
+        told = ", ".join(headings)[:200]
+        raise InvalidValue("header", told, rule, remedy=remedy).at(place)
+    return wanted
 
 
 def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str, float, float]:
