@@ -436,3 +436,9 @@ def test_a_rig_is_stated_by_three_at_least():
     status, said = called(["show", "limit_cycles", "--normal-stress", "5 MPa"])
     assert status == 2
     assert "--slip-distance" in said
+
+
+def test_the_stiffness_of_a_rig_takes_the_place_of_an_axis():
+    scales = ("--normal-stress=10 MPa", "--slip-distance=15 um", "--reference-velocity=1 um/s")
+    _code, said = called(["show", "slide_hold_slide", *scales, "--stiffness", "20 MPa/mm"])
+    assert "axis stiffness (1) 20 MPa/mm" in said

@@ -52,7 +52,7 @@ def show(given: Given) -> int:
 
 def run(given: Given) -> int:
     """Run a study, or all."""
-    studies = [_declared(name, given, given.engine, given.budget) for name in _names(given)]
+    studies = [_declared(name, given) for name in _names(given)]
     left_out = _left_out(studies) if given.every and given.engine is None else []
     studies = [study for study in studies if study.name not in {end.study for end in left_out}]
     keeping = Keeping(
@@ -230,19 +230,24 @@ def _names(given: Given) -> list[str]:
     return list(names.names()) if given.every else [given.name]
 
 
-def _declared(
-    name: str, given: Given, engine: str | None = None, budget: int | None = None
-) -> Study:
-    """A study with the values that options set, on the rig that they state."""
+def _declared(name: str, given: Given) -> Study:
+    """A study with the values that options set, on the rig that they state, whose stiffness takes
+    the place of those on an axis.
+    """
     study, stated = catalogue.load(name), given.rig
-    if {*stated} - {"load_velocity"} and study.laboratory is None:
-        study = lattice.on(study, assignments.laboratory(stated))
-        study = replace(study, overrides={**study.overrides, **stated})
-        stated = {name: text for name, text in stated.items() if name == "load_velocity"}
+    varied = {field for axis in study.axes for field in axis.fields}
+    taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
+    if {*stated} - taken and study.laboratory is None:
+        rig = {name: text for name, text in stated.items() if name not in taken}
+        study = lattice.on(study, assignments.laboratory(rig))
+        study = replace(study, overrides={**study.overrides, **rig})
+        stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {"load_velocity": "m/s", **{name: about.units for name, about in STATED.items()}}
     texts = {n: t if number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignments.overrides(study, given.settings)
-    return runs.declaration(study, changes, rtol=given.rtol, engine=engine, budget=budget)
+    return runs.declaration(
+        study, changes, rtol=given.rtol, engine=given.engine, budget=given.budget
+    )
 
 
 @contextlib.contextmanager

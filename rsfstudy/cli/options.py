@@ -26,6 +26,8 @@ class Given(SimpleNamespace):
     """Arguments and options of one call of a command, by their names."""
 
     variable: str | None = None
+    engine: Any = None
+    budget: Any = None
 
     @property
     def command(self) -> str:
