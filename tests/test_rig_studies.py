@@ -162,6 +162,8 @@ def test_coordinates_are_in_the_units_stated_and_dimensionless_ones_stand_beside
     assert results["reference_rate"].dims == ()
     assert float(results["slip_distance"]) == pytest.approx(1e-5)
     assert results["slip_distance"].attrs["units"] == "m"
+    shown = results.rsf.in_units(length="um").rsf.to_dataframe().attrs["constant"]
+    assert shown["slip_distance"] == pytest.approx(10.0, rel=EXACT)
 
 
 def test_results_survive_their_file(tmp_path):

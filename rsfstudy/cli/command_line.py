@@ -247,6 +247,7 @@ def rerun() -> None:
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--csv", is_flag=True, help="Without what never changes.")
 @click.option("--mat", is_flag=True, help="For MATLAB: every variable.")
+@click.option("--units", nargs=3, metavar="STRESS LENGTH TIME", help="Of a rig, as in MPa um s.")
 @click.option(
     "--output", type=click.Path(path_type=Path), help="The file to write.  [default: beside FILE]"
 )

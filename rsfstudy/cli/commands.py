@@ -38,6 +38,7 @@ from rsfstudy.rig.units import number
 
 _ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
 _RESULTS = (".nc", ".zarr")
+_UNITS = ("stress", "length", "time")
 
 
 def show(given: Given) -> int:
@@ -211,6 +212,8 @@ def export(given: Given) -> int:
         if path.exists():
             raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
     dataset = store.read_any(given.file)
+    if given.units:
+        dataset = dataset.rsf.in_units(**dict(zip(_UNITS, given.units, strict=True)))
     for ending, path in paths.items():
         try:
             writers[ending](dataset, path)

@@ -72,6 +72,9 @@ def _held(
         return stated
     variable = dataset[held_as].variable.to_base_variable()
     held = variable * float(factor(held_as, variable.attrs.get("units", units), units))
+    known = np.unique(held.values[np.isfinite(held.values)])
+    if known.size == 1:  # that of the rig, which cells without need of it do not tell
+        held = xr.Variable((), known[0])
     if stated is not None and not np.allclose(held, stated, rtol=_ROUNDING, atol=0.0):
         rule = f"contradicts that of the dataset, {_range(held)} {units}"
         remedy = "Each cell is converted by its own: state another to the scenes."
@@ -188,6 +191,11 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
             raise DataError(f"{text} first, as in dataset.isel({other}=0)")
         kept = {key: value for key, value in values.attrs.items() if key != "scale"}
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
+    held = {"sigma_star": "sigma_*", "slip_distance": "D_c", "reference_velocity": "V_*"}
+    for name in set(held) & set(dataset.coords) - set(dataset.dims):  # beside the axes
+        one = xr.Variable((), 1.0) * by[held[name]].factor
+        words = dataset[name].attrs | {"units": by[held[name]].units}
+        result[name] = one.dims, one.values, words
     for name in logarithms:
         result = result.assign(_slip_rate(dataset, name, by["V_*"]))
     new = {str(name): renamed(str(name)) for name in measured}
