@@ -298,7 +298,10 @@ def _check_free(free: Sequence[str], laws: Sequence[str], scene: Scene) -> None:
             wrong.add("alpha")
         for name in free:
             if name in wrong:
-                raise InvalidValue("free", name, f"is no parameter with law={law!r}")
+                remedy = "Fit laws of one and of two states one after the other."
+                remedy += " Two states have b1, b2, slip_distance and slip_distance_2."
+                rule = f"is no parameter with law={law!r}"
+                raise InvalidValue("free", name, rule, remedy=remedy if name[0] in "bs" else "")
 
 
 def _micrometres(name: str, value: Any) -> float:

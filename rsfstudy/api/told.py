@@ -66,7 +66,11 @@ def motion(dataset: xr.Dataset) -> dict[str, str]:
     if "instability_time" in dataset:
         since = f"{float(dataset['instability_time']):.6g} {unit}"
         told["beyond the instability norm"] = f"no physics after {since}"
-    return told | {"friction at the end": f"{float(friction[-1]):.6g}"}
+    told["friction at the end"] = f"{float(friction[-1]):.6g}"
+    ratio = dataset.rsf.scene.stiffness_ratio
+    sliding = "stable" if ratio > 1.0 else "unstable"
+    told["stiffness"] = f"{ratio:.4g} of the critical: steady sliding at V_* is {sliding}"
+    return told
 
 
 def events(catalogue: xr.Dataset) -> Table | str:

@@ -91,7 +91,8 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
 @_listed(
     "--free",
     default="a,b,slip_distance,mu_star,trend1",
-    words="Parameters to look for; also stiffness, step_time, trend2, alpha and others.",
+    words="Parameters to look for; also stiffness, step_time, trend2, alpha; of two states b1, b2 "
+    "and slip_distance_2 in place of b; of law=family law_exponent.",
 )
 @_listed("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
 @click.option(
