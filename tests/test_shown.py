@@ -127,4 +127,8 @@ def test_the_accessor_shows_numbers_and_verdicts():
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1)
-    assert "load_velocity_ratio = 2" in motion.rsf._repr_html_()
+    shown = motion.rsf._repr_html_()
+    for words in ("load_velocity_ratio = 2", "peak friction", "no event faster than 20 V_*"):
+        assert words in shown
+    for part in (motion.isel(time=0), motion.isel(time=slice(0)), motion[["slip"]]):
+        assert "load_velocity_ratio = 2" in part.rsf._repr_html_()

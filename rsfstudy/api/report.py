@@ -149,8 +149,7 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
     numbers = html(dataset)
     # the accessor, which this module cannot import: it shows these tables
     if contents.is_of_a_scene(dataset):
-        is_motion = "load_point_displacement" in dataset
-        figure = _figure(path, dataset.rsf.plot) if is_motion else ""
+        figure = _figure(path, dataset.rsf.plot) if told.is_motion(dataset) else ""
         status = str(dataset.attrs["status"]).removeprefix(Status.OK.label)
         return _Result(path, title, "", status, (figure, numbers))
     about = contents.declaration(dataset)

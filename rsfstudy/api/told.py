@@ -27,12 +27,18 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
     elif not contents.is_of_a_scene(dataset):
         yield tables.headline(dataset)
         yield from tables.reductions(dataset)
-    elif "load_point_displacement" in dataset:
+    elif is_motion(dataset):
         yield motion(dataset)
         yield events(dataset.rsf.events())
     else:
         plain = {n: v for n, v in dataset.data_vars.items() if not v.dims}
         yield {str(name): repr(value.item()) for name, value in plain.items()}
+
+
+def is_motion(dataset: xr.Dataset) -> bool:
+    """True of a motion, or a part of one that still holds what is told of it."""
+    told = {"load_point_displacement", "friction_coefficient", "log10_slip_rate", "shear_stress"}
+    return dataset.sizes.get("time", 0) > 0 and {*told, "slip"} <= set(dataset.variables)
 
 
 def origin(dataset: xr.Dataset) -> dict[str, str]:
@@ -49,9 +55,7 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def motion(dataset: xr.Dataset) -> dict[str, str]:
-    """What a reader of a motion looks for first, if it moved at all."""
-    if not dataset.sizes["time"]:
-        return {}
+    """What a reader of a motion looks for first."""
     time, friction = dataset["time"], dataset["friction_coefficient"]
     rate, per = dataset.get("slip_rate"), "V_*"
     if rate is None:
