@@ -38,7 +38,7 @@ _TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "a
 
 def simulate(given: Given) -> int:
     """Follow one motion, draw it and write it."""
-    _check_replaceable(given.output.with_suffix(".nc"), _is_motion, "motion")
+    _check_replaceable(given.output.with_suffix(".nc"), told.is_motion, "motion")
     scene, laboratory = _stated(given)
     motion = simulated(
         scene,
@@ -99,7 +99,7 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
 def fit(given: Given) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
     data = given.output.with_suffix(".nc")
-    _check_replaceable(data, _is_fit, "fit")
+    _check_replaceable(data, fit_results.is_fit, "fit")
     rule = "must read NAME=HEADING, as in 'time=t (s)'"
     columns = dict(assignments.named("--columns", text, rule) for text in given.columns) or None
     stress = given.normal_stress
@@ -119,10 +119,6 @@ def fit(given: Given) -> int:
         layout.show(piece)
     console.print(f"wrote {given.output} and {data}", soft_wrap=True)
     return terminal.status_of(dataset)
-
-
-def _is_fit(there: xr.Dataset) -> bool:
-    return fit_results.is_fit(there) and "declaration" in there.attrs
 
 
 def _number(text: str) -> int:
@@ -161,7 +157,3 @@ def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: s
         pass  # whatever it is, it is none
     remedy = "Choose another --output, or move it away first."
     raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)
-
-
-def _is_motion(there: xr.Dataset) -> bool:
-    return "scene" in there.attrs and "time" in there.dims

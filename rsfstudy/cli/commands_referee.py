@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +25,7 @@ def problems(given: Given) -> int:
 
 def verify(given: Given) -> int:
     """Hold files against answers; FAILED where one does not pass."""
-    columns = theirs.column_map(given.columns) if given.columns else None
-    found = [_verdict(file, given.problem, columns, given.digits) for file in given.files]
+    found = [_verdict(file, given) for file in given.files]
     for file, one in zip(given.files, found, strict=True):
         _tell(file, one)
     console.print(_to_quote(found), style="bold")
@@ -36,22 +34,19 @@ def verify(given: Given) -> int:
     return terminal.OK if all(one.passes for one in found) else terminal.FAILED
 
 
-def _verdict(
-    file: Path, stated: str | None, columns: Mapping[str, tuple[str, str]] | None, digits: float
-) -> Verdict:
-    number = stated or file.name[:2]
-    there = shipped()
-    if stated is not None and not stated.isdecimal():
-        posed, path = read(Path(stated)), None
+def _verdict(file: Path, given: Given) -> Verdict:
+    number, there, path = given.problem or file.name[:2], shipped(), None
+    if given.problem and not number.isdecimal():
+        posed = read(Path(number))
     elif number.isdecimal() and int(number) in there:
         posed = read(there[int(number)])
         path = there[int(number)].with_suffix(".csv")
     else:
         remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
         raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
+    columns = theirs.column_map(given.columns) if given.columns else None
     told = theirs.read(file, posed, columns)
-    problem, answer = known(posed, path)
-    return verdict(problem, answer, told, digits)
+    return verdict(*known(posed, path), told, given.digits)
 
 
 def _tell(file: Path, one: Verdict) -> None:
