@@ -120,6 +120,8 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     assert drawn.returncode == 0, drawn.stderr
     assert "not as declared" in ran.stdout
     assert settings[1].split("=")[0] in ran.stdout
+    # a slope needs more than one point
+    assert ("no zeta: among these cells" in ran.stdout) == (settings[1] == "b_over_a=1.5")
 
 
 def test_plot_draws_beside_a_file(results, tmp_path):

@@ -162,6 +162,13 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(rows(dataset, dims, columns), prose={"problem", "cheapest"})
 
 
+def unreduced(dataset: xr.Dataset) -> list[str]:
+    """Names of the reductions that found no cells that they are for."""
+    declared = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    there = tuple(map(str, dataset.data_vars))
+    return [name for name in declared if not any(n.startswith(name) for n in there)]
+
+
 def _slopes(dataset: xr.Dataset) -> list[str]:
     """Names of the reductions that have a standard error."""
     named = [reduction["name"] for reduction in contents.declaration(dataset).reductions]

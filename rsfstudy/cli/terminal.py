@@ -125,6 +125,10 @@ def report(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
     """Print what a run ends with: slopes, claims, failures and where the files are."""
     for table in tables.reductions(dataset):
         layout.show(table)
+    if lacking := tables.unreduced(dataset):
+        console.print(
+            f"no {', '.join(lacking)}: among these cells are none, or too few, to draw on"
+        )
     claims(dataset)
     failures(dataset, str(files[0]))
     console.print(f"{end.study}: {tables.tally(dataset)}")
