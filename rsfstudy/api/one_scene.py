@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import xarray as xr
 from rsfstudy.compute import provenance
 from rsfstudy.doors import door
 from rsfstudy.errors import NoAnswer
-from rsfstudy.measures import Measure, Value
+from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
@@ -158,7 +157,9 @@ def to_si(
 
 
 def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
-    """A measure's named numbers as a small dataset that bears the names of the lattice."""
+    """A measure's named numbers as a small dataset that bears the names of the lattice; those that
+    are None are missing.
+    """
     check_scene(scene)
     check_engine(accuracy.engine)
     outcome = measure(scene, accuracy)
@@ -166,9 +167,16 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
         warnings.warn(text, NoAnswer, stacklevel=4)
-    numbers = {**outcome.values, "rhs_evaluations": outcome.rhs_evaluations}
-    dataset = _dataset(measure, numbers, scene.reference_rate)
-    dataset.attrs = {
+    own, inner = {about.name: about for about in measure.quantities}, measure.inner_coordinates
+    variables: dict[str, Any] = {}
+    for name, dims in measure.variables.items():
+        values = outcome.values.get(name)
+        if values is None:
+            values = np.full([len(inner[dim]) for dim in dims], np.nan)
+        variables[name] = dims, values, quantity(name, own).attributes
+    variables["rhs_evaluations"] = (), outcome.rhs_evaluations
+    rate = (), scene.reference_rate, {"units": "s-1"}
+    about = {
         "scene": json.dumps(scene.describe()),
         "rtol": accuracy.rtol,
         "engine": accuracy.engine,
@@ -176,18 +184,4 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "message": outcome.message,
         **provenance.attributes(f"rsfstudy.{measure.name}"),
     }
-    return dataset
-
-
-def _dataset(measure: Measure, numbers: Mapping[str, Value | None], rate: float) -> xr.Dataset:
-    """The numbers of a measure, those that are None missing."""
-    own = {about.name: about for about in measure.quantities}
-    inner = measure.inner_coordinates
-    variables: dict[str, Any] = {}
-    for name, dims in measure.variables.items():
-        values = numbers.get(name)
-        if values is None:
-            values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = (dims, values, quantity(name, own).attributes)
-    variables["rhs_evaluations"] = ((), numbers["rhs_evaluations"])
-    return xr.Dataset(variables, {**inner, "reference_rate": ((), rate, {"units": "s-1"})})
+    return xr.Dataset(variables, {**inner, "reference_rate": rate}, about)
