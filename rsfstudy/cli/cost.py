@@ -35,7 +35,7 @@ def in_words(plan: Plan, output: Path) -> str:
     kept = output / f"{plan.study.name}.cells.sqlite"
     took = journal.timed(kept)
     if took is None or not _alike(plan, took) or not took.seconds:
-        return text + guessed(guess)
+        return f"{text}at a guess {clock(guess)} on one core, but ten times as long is possible"
     cells = len(plan.different)
     known = [took.seconds[key] for key in plan.named(plan.different) if key in took.seconds]
     if len(known) == cells:
@@ -58,11 +58,6 @@ def faster(plan: Plan, output: Path) -> str:
         return f"--engine compiled is about {_FASTER[measure]} times faster here"
     each = ", ".join(f"{times} times with {name}" for name, times in _FASTER.items())
     return f"--engine compiled is faster as a rule: about {each}"
-
-
-def guessed(seconds: float) -> str:
-    """A time that nothing but a count of right-hand sides speaks for."""
-    return f"at a guess {clock(seconds)} on one core, but ten times as long is possible"
 
 
 def clock(seconds: float) -> str:
