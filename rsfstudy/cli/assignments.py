@@ -89,6 +89,13 @@ def named(option: str, text: str, rule: str) -> tuple[str, str]:
     return name, given
 
 
+def columns(text: str | None) -> dict[str, str] | None:
+    """Which heading stands above which quantity, of ``time=t (s),friction=mu``."""
+    rule = "must read NAME=HEADING, as in 'time=t (s),friction=mu'"
+    parts = (part for part in (text or "").split(",") if part.strip())
+    return dict(named("--columns", part.strip(), rule) for part in parts) or None
+
+
 def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
     start:stop:count:log. Labels may hold commas.

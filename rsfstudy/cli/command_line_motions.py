@@ -77,10 +77,10 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
 
 @click.command(cls=options.Command, does="commands_motions")
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
-@_listed(
+@click.option(
     "--columns",
     metavar="NAME=HEADING,...",
-    words="Which column is which, as in 'time=t (s),displacement=lp (um),friction=mu'; "
+    help="Which column is which, as in 'time=t (s),displacement=lp (um),friction=mu'; "
     "shear_stress and normal_stress are others; of raw numbers, 'lp (um) * 0.1 + 5'.  "
     "[default: by headings that are known]",
 )

@@ -100,8 +100,7 @@ def fit(given: Given) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
     data = given.output.with_suffix(".nc")
     _check_replaceable(data, fit_results.is_fit, "fit")
-    rule = "must read NAME=HEADING, as in 'time=t (s)'"
-    columns = dict(assignments.named("--columns", text, rule) for text in given.columns) or None
+    columns = assignments.columns(given.columns)
     stress = given.normal_stress
     records = [read_record(path, columns, normal_stress=stress) for path in given.records]
     for record in records:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsfstudy.cli import terminal
+from rsfstudy.cli import assignments, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.cli.options import Given
 from rsfstudy.errors import InvalidValue
@@ -44,7 +44,7 @@ def _verdict(file: Path, given: Given) -> Verdict:
     else:
         remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
         raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
-    columns = theirs.column_map(given.columns) if given.columns else None
+    columns = assignments.columns(given.columns)
     told = theirs.read(file, posed, columns)
     return verdict(*known(posed, path), told, given.digits)
 

@@ -28,22 +28,7 @@ class Told(NamedTuple):
     last_place: float
 
 
-def column_map(text: str) -> dict[str, tuple[str, str]]:
-    """Names, headings and units, of ``time=t (s), friction=mu``."""
-    found = {}
-    for part in text.split(","):
-        name, equals, heading = (word.strip() for word in part.partition("="))
-        heading, _, units = heading.partition("(")
-        if not (name and equals and heading.strip()):
-            rule = "must read NAME=HEADING (UNITS), as in 'time=t (s), friction=mu'"
-            raise InvalidValue("--columns", part.strip(), rule)
-        found[name] = heading.strip(), units.rstrip(") ")
-    return found
-
-
-def read(
-    path: Path, problem: Problem, columns: Mapping[str, tuple[str, str]] | None = None
-) -> dict[str, Told]:
+def read(path: Path, problem: Problem, columns: Mapping[str, str] | None = None) -> dict[str, Told]:
     """The columns that a problem asks for, in SI units.
 
     Raises
@@ -51,14 +36,6 @@ def read(
     InvalidValue
         For a column that is missing, units of another kind, a gap, other times or another length.
     """
-    if columns is not None and path.is_file():
-        header = path.read_text(encoding="utf-8", errors="replace").partition("\n")[0]
-        whole = {
-            name: (f"{heading} ({units})", units) for name, (heading, units) in columns.items()
-        }
-        columns = {
-            name: whole[name] if whole[name][0] in header else columns[name] for name in whole
-        }
     table = read_table(path, columns)
     asked = {*problem.columns, *_UNITS}
     found = {key: _plain(key, column, problem) for key, column in table.items() if key in asked}
@@ -91,10 +68,7 @@ def _instead(name: str, problem: Problem, found: Mapping[str, Told]) -> np.ndarr
 
 def _plain(key: str, column: Column, problem: Problem) -> Told:
     """A column in SI units."""
-    wrong = ~np.isfinite(column.values)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InvalidValue(key, float(column.values[row]), "must be a number").at(column.place(row))
+    column.check(key, ~np.isfinite(column.values), "must be a number")
     units = problem.units.get(key) or _UNITS[key]
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
@@ -114,7 +88,7 @@ def _last_place(values: np.ndarray) -> float:
 
 def _check_rows(column: Column, told: np.ndarray, rows: np.ndarray, problem: Problem) -> None:
     wrong = np.abs(told - rows) > _LATE * np.abs(rows).max()
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        rule = f"must be {rows[row]:g} {problem.units[problem.key]}: nothing is interpolated"
-        raise InvalidValue(problem.key, float(told[row]), rule).at(column.place(row))
+    wanted = f"{rows[np.argmax(wrong)]:g} {problem.units[problem.key]}"
+    column._replace(values=told).check(
+        problem.key, wrong, f"must be {wanted}: nothing is interpolated"
+    )

@@ -11,7 +11,7 @@ import numpy as np
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.table import Column, read_table
+from rsfstudy.rig.table import Column, read_table, selected
 from rsfstudy.slider.history import History, sampled
 
 #: What a record may hold, and the units of the slider.
@@ -26,7 +26,7 @@ def history(
     record: Any,
     laboratory: Laboratory | None = None,
     *,
-    columns: Mapping[str, tuple[str, str]] | None = None,
+    columns: Mapping[str, Any] | None = None,
     name: str = "history",
 ) -> History:
     """A loading history that was sampled: ``Scene(loading=history(record))``.
@@ -47,8 +47,9 @@ def history(
     laboratory : Laboratory, optional
         The rig whose units are used. Without it all are those of the slider: ``D_c/V_*``, ``D_c``,
         ``V_*``, ``sigma_*``.
-    columns : mapping of str to (str, str), optional
-        What the columns are called in the record, and their units, as in ``{"time": ("t", "s")}``.
+    columns : mapping of str to (str, str) or str, optional
+        What the columns are called in the record, and their units, as in ``{"time": ("t", "s")}``
+        or ``{"time": "t (s)"}``.
         Without it arrays are in units of the slider, or in SI units where a laboratory is given;
         variables have an attribute ``units``.
     name : str
@@ -94,7 +95,7 @@ def history(
 
 
 def _columns(
-    record: Any, columns: Mapping[str, tuple[str, str]] | None, laboratory: Laboratory | None
+    record: Any, columns: Mapping[str, Any] | None, laboratory: Laboratory | None
 ) -> dict[str, Column]:
     """Columns of a record, of whatever kind."""
     if isinstance(record, str | Path):
@@ -104,21 +105,22 @@ def _columns(
         remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
         raise InvalidValue("record", record, "is no record", remedy=remedy)
     names = [*record.variables] if is_dataset else [*record]
+    if columns is None:  # a dataset may hold more
+        columns = {n: (n,) for n in names if n in _SCALES or not is_dataset}
     found = {}
-    for key, (theirs, units) in (columns or {n: (n, "") for n in names if n in _SCALES}).items():
-        if theirs not in names:
-            raise InvalidValue("column", theirs, "is not in the record", choices=map(str, names))
-        values = np.asarray(record[theirs], dtype=float)
+    for key, told in columns.items():
+        name, units, scale, offset = selected(told, names)
+        if name not in names:
+            raise InvalidValue("column", name, "is not in the record", choices=map(str, names))
+        values = np.asarray(record[name], dtype=float)
         if values.ndim != 1:
             raise InvalidValue(key, values.shape, "must lie along one dimension")
-        units = units or (str(record[theirs].attrs.get("units", "")) if is_dataset else "")
-        if is_dataset and not units and laboratory is not None:
-            rule = "has no units"
-            raise InvalidValue(key, theirs, rule, remedy="Set its attribute units.")
-        found[key] = Column(values, units)
-    if columns is None and not is_dataset and len(found) < len(names):
-        unknown = next(name for name in names if name not in _SCALES)
-        raise InvalidValue("column", unknown, "is unknown", choices=_SCALES)
+        if is_dataset and not units:
+            units = str(record[name].attrs.get("units", ""))
+            if not units and laboratory is not None:
+                rule, remedy = "has no units", "Set its attribute units."
+                raise InvalidValue(key, name, rule, remedy=remedy)
+        found[key] = Column(values * scale + offset, units)
     return found
 
 

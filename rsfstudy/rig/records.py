@@ -13,7 +13,7 @@ import pandas as pd
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.table import Column, read_table
+from rsfstudy.rig.table import HEADING, Column, Selected, read_table, selected
 from rsfstudy.rig.units import factor, in_si
 
 #: SI units of what a record may hold, and what turns them into those of `Record`.
@@ -34,10 +34,6 @@ _HEADINGS = {
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",
 }
-_NUMBER = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
-#: A heading with the scale and the offset of what is below it.
-_LINE = re.compile(rf"(.*\S)\s*\*\s*(-?){_NUMBER}(?:([-+]){_NUMBER})?")
-_HEADING = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 #: Layout of xlook's files: bytes before the headers of columns and of each, how many there are, and
 #: where columns begin.
 _HEAD, _HEADER, _COLUMNS = 36, 84, 32
@@ -155,14 +151,13 @@ def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Rec
 
 
 def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Columns of a text file, by headings that are known."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        header = file.readline()
-    between = next((c for c in "\t;," if c in header), None)
-    headings = [text.strip() for text in header.rstrip("\n").split(between)]
-    lines = _lines(headings, columns, f"{path}, line 1")
-    read = read_table(path, {key: line[:2] for key, line in lines.items()})
-    return {key: _scaled(column, *lines[key][2:]) for key, column in read.items()}
+    """Columns of a text file, by headings that are known or named."""
+
+    def select(headings: list[str], place: str) -> dict[str, Selected]:
+        told = _known(headings, place) if columns is None else columns
+        return {key: _selected(key, of, headings) for key, of in told.items()}
+
+    return read_table(path, select)
 
 
 def _of_arrays(
@@ -171,26 +166,23 @@ def _of_arrays(
     """Columns of arrays by name, or by headings where they, or `columns`, state units."""
     if columns is None and not any("(" in key or "[" in key for key in arrays):
         return {key: Column(values, "") for key, values in arrays.items()}
-    found = {}
-    for key, (heading, units, *line) in _lines([*arrays], columns, "record").items():
+    headings, found = [*arrays], {}
+    for key, of in (columns or _known(headings, "record")).items():
+        heading, units, scale, offset = _selected(key, of, headings)
         if heading not in arrays:
-            raise InvalidValue("heading", heading, "heads no column", choices=arrays)
-        found[key] = _scaled(Column(arrays[heading], units), *line)
+            raise InvalidValue("heading", heading, "heads no column", choices=headings)
+        found[key] = Column(arrays[heading] * scale + offset, units)
     return found
 
 
-def _lines(
-    headings: Sequence[str], columns: Mapping[str, Any] | None, place: str
-) -> dict[str, tuple[str, str, float, float]]:
-    """Heading, units, scale and offset of each column: as they are told, or by known headings."""
-    if columns is not None:
-        return {key: _told(key, of, headings) for key, of in columns.items()}
-    wanted: dict[str, tuple[str, str, float, float]] = {}
+def _known(headings: list[str], place: str) -> dict[str, str]:
+    """Headings of the usual files, by what stands below them."""
+    wanted: dict[str, str] = {}
     for text in headings:
-        match = _HEADING.fullmatch(text)
+        match = HEADING.fullmatch(text)
         for key, begins in _HEADINGS.items():
             if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                wanted[key] = _told(key, text, headings)
+                wanted[key] = text
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (
@@ -198,35 +190,19 @@ def _lines(
             "columns={'time': 't (s)', 'displacement': 'lp (um)', 'friction': 'mu'}."
         )
         rule = "does not name time and displacement"
-        told = ", ".join(headings)[:200]
-        raise InvalidValue("header", told, rule, remedy=remedy).at(place)
+        raise InvalidValue("header", ", ".join(headings)[:200], rule, remedy=remedy).at(place)
     return wanted
 
 
-def _told(key: str, told: Any, headings: Sequence[str]) -> tuple[str, str, float, float]:
-    """Heading and units of a column, with the scale and the offset of its numbers; of one text,
-    units stand in brackets behind the heading, in the file too or not, and then "* 0.1 + 5".
-    """
-    if not isinstance(told, str):
-        heading, units, scale, offset = (*told, 1.0, 0.0)[:4] if len(told) != 3 else (*told, 0.0)
-        return str(heading), str(units), float(scale), float(offset)
-    scale, offset = 1.0, 0.0
-    line = None if told in headings else _LINE.fullmatch(told)
-    if line:
-        told, scale = line[1], float(line[2] + line[3])
-        offset = float(line[4] + line[5]) if line[4] else 0.0
-    match = _HEADING.fullmatch(told)
-    units = (match[2] or "").strip() if match else ""
-    if not units and key != "friction":
-        whole = f"{told} ({_USUAL.get(key, 'MPa')})"
+def _selected(key: str, told: Any, headings: Sequence[str]) -> Selected:
+    """A column that is named, which states its units: only those of friction go without saying."""
+    found = selected(told, headings)
+    if not found.units and key != "friction" and isinstance(told, str):
+        whole = f"{found.heading} ({_USUAL.get(key, 'MPa')})"
         remedy = f"Write them in the file, as in {whole}, or here: --columns '{key}={whole},...' "
         remedy += f"(columns={{'{key}': '{whole}', ...}})."
         raise InvalidValue("heading", told, "states no units", remedy=remedy)
-    return told if told in headings or not match else match[1], units, scale, offset
-
-
-def _scaled(column: Column, scale: float, offset: float) -> Column:
-    return column._replace(values=column.values * scale + offset)
+    return found
 
 
 def _is_binary(path: Path) -> bool:
@@ -263,12 +239,12 @@ def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Col
         raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
     known = [heading for heading, _units, _values in headings]
     for key, told in columns.items():
-        heading, units, *line = _told(key, told, known)
+        heading, units, scale, offset = _selected(key, told, known)
         places = [n for n, h in enumerate(known, 1) if heading in (str(n), h)]
         if len(places) != 1:
             raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)
-        column = _scaled(Column(headings[places[0] - 1][2], units, places[0]), *line)
-        found[key] = column._replace(values=np.cumsum(column.values)) if key == "time" else column
+        values = headings[places[0] - 1][2] * scale + offset
+        found[key] = Column(np.cumsum(values) if key == "time" else values, units, places[0])
     shortest = min(len(column.values) for column in found.values())
     if any(len(column.values) - shortest > 1 for column in found.values()):
         rule = "have lengths that differ by more than one"

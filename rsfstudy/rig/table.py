@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,43 @@ from rsfstudy.rig.units import number
 #: What numbers without surprises are made of.
 _PLAIN = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE = "velocity (um/s), distance (um), a (1)"
+_NUMBER = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+#: A heading with the scale and the offset of what is below it.
+_RAW = re.compile(rf"(.*\S)\s*\*\s*(-?){_NUMBER}(?:([-+]){_NUMBER})?")
+#: A heading, with its units in brackets or without.
+HEADING = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+
+
+class Selected(NamedTuple):
+    """A column that is wanted of a file: its heading, its units, and what raw numbers are
+    multiplied by and then added to.
+    """
+
+    heading: str
+    units: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+def selected(told: Any, headings: Sequence[str]) -> Selected:
+    """The column that is named by heading, units, scale and offset; or by a text such as ``lp (um)
+    * 0.1 + 5``, whose units stand in brackets, in the file too or not.
+    """
+    if not isinstance(told, str):
+        heading, units, *numbers = (*told, "")[: max(2, len(told))]
+        return Selected(str(heading), str(units), *map(float, numbers))
+    raw = None if told in headings else _RAW.fullmatch(told)
+    scale, offset = 1.0, 0.0
+    if raw:
+        told, scale, offset = (
+            raw[1],
+            float(raw[2] + raw[3]),
+            float((raw[4] or "") + (raw[5] or "0")),
+        )
+    match = HEADING.fullmatch(told)
+    units = (match[2] or "").strip() if match else ""
+    heading = told if told in headings or not match else match[1]
+    return Selected(heading, units, scale, offset)
 
 
 class Column(NamedTuple):
@@ -58,19 +96,18 @@ class Column(NamedTuple):
 
 
 @door
-def read_table(
-    path: str | Path, columns: Mapping[str, tuple[str, str]] | None = None
-) -> dict[str, Column]:
+def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
     """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
     stands.
 
     Parameters
     ----------
     path : str or Path
-    columns : mapping of str to (str, str), optional
+    columns : mapping of str to (str, str) or str, optional
         Name, heading in the file and units of each column that is wanted, as in ``{"time":
-        ("t", "s")}``. Without it the first line names all columns with their units, as in
-        ``velocity (um/s), distance (um)``.
+        ("t", "s")}`` or ``{"time": "t (s)"}``. Without it the first line names all columns with
+        their units, as in ``velocity (um/s), distance (um)``. Or a function that gives each
+        `Selected`, of the headings and of the place where they stand.
 
     Raises
     ------
@@ -103,9 +140,13 @@ def read_table(
                 rule = f"has {len(row)} fields, and the header {len(header)}"
                 raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
         lines = np.array([n for n, _row in rows], dtype=int)
-    wanted = _as_headed(headings, f"{path}, line {line}") if columns is None else columns
+    select = columns if callable(columns) else _as_headed
+    if isinstance(columns, Mapping):
+        wanted = {name: selected(told, headings) for name, told in columns.items()}
+    else:
+        wanted = select(headings, f"{path}, line {line}")
     found = {}
-    for name, (heading, units) in wanted.items():
+    for name, (heading, units, scale, offset) in wanted.items():
         if headings.count(heading) != 1:
             rule = f"heads {headings.count(heading)} columns, and must head one"
             raise InvalidValue("column", heading, rule, choices=headings).at(f"{path}, line {line}")
@@ -116,7 +157,7 @@ def read_table(
                 column.values[n] = _number(name, row[place], column, n)
         else:
             column.values[:] = values[:, place]
-        found[name] = column
+        found[name] = column._replace(values=column.values * scale + offset)
     return found
 
 
@@ -143,9 +184,9 @@ def _delimiter(header: str) -> str:
     )
 
 
-def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:
-    """Name, heading and units of each column, by a header that states them."""
-    found: dict[str, tuple[str, str]] = {}
+def _as_headed(headings: list[str], place: str) -> dict[str, Selected]:
+    """All columns by their names, by a header that states them with their units."""
+    found: dict[str, Selected] = {}
     for n, heading in enumerate(headings, start=1):
         stated = headed(heading)
         if stated is None:
@@ -155,7 +196,7 @@ def _as_headed(headings: list[str], place: str) -> dict[str, tuple[str, str]]:
         name, units = stated
         if name in found:
             raise InvalidValue("column", name, "stands twice in the header").at(place)
-        found[name] = heading, units
+        found[name] = Selected(heading, units)
     return found
 
 
