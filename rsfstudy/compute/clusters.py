@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import logging
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
@@ -20,22 +19,6 @@ from rsfstudy.errors import RunError, brief
 _HANGS = 600
 #: What ends a run in order, where it is handled.
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-@contextlib.contextmanager
-def _script_not_imported() -> Iterator[None]:
-    """Keep worker processes from importing the user's script, which would start the study again.
-
-    Multiprocessing finds the script by these two names. What the script defines still reaches the
-    workers, by value.
-    """
-    main: dict[str, Any] = vars(sys.modules["__main__"])
-    hidden = {name: main[name] for name in {"__file__", "__spec__"} & set(main)}
-    main.update(dict.fromkeys(hidden))
-    try:
-        yield
-    finally:
-        main.update(hidden)
 
 
 @contextlib.contextmanager
@@ -106,8 +89,8 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
         ),
     }
-    with _script_not_imported(), dask.config.set(quiet), contextlib.ExitStack() as stack:
-        with _interrupts_held():  # by itself, because it unblocks signals
+    with dask.config.set(quiet), contextlib.ExitStack() as stack:
+        with _interrupts_held():  # before workers start, because it unblocks signals
             resource_tracker.ensure_running()
         started = stack.enter_context(contextlib.ExitStack())
         started.enter_context(_interrupts_held())
@@ -123,7 +106,11 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
             )
         except Exception as error:
             why = str(error).rstrip(".")
-            raise RunError(f"a worker process could not be started ({why})") from error
+            raise RunError(
+                f"a worker process could not be started ({why}). Worker processes import the "
+                'script that starts them: call what runs below `if __name__ == "__main__":`, or '
+                "compute in this process, --serial (workers=0)"
+            ) from error
         stack.enter_context(cluster)
         started.close()
         client = stack.enter_context(Client(cluster))
