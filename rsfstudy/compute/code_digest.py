@@ -19,7 +19,7 @@ import pickle
 import site
 import sys
 import sysconfig
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -37,16 +37,16 @@ _INSTALLED = tuple(
         site.getusersitepackages(),
     }
 )
-#: Attributes that Python and msgspec make for classes and dataclasses, which decide no number.
-_MADE = {
-    *("__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__"),
-    *("__annotate__", "__annotate_func__", "__annotations_cache__", "__firstlineno__"),
-    *("__static_attributes__", "__match_args__", "__slotnames__", "__abstractmethods__"),
-    *("__dataclass_fields__", "__dataclass_params__", "__repr__", "__eq__"),
-    *("__hash__", "__setattr__", "__delattr__", "__replace__", "__getstate__", "__setstate__"),
-    *("_abc_impl", "__msgspec_cache__"),
-}
 _PLAIN = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
+#: What containers, and what wraps functions, are made of.
+_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+    (property, lambda value: (value.fget, value.fset)),
+    (functools.cached_property, lambda value: value.func),
+    (functools.partial, lambda value: (value.func, value.args, value.keywords)),
+    (classmethod | staticmethod, lambda value: value.__wrapped__),
+    (Mapping, lambda value: tuple(value.items())),
+    (list, tuple),
+)
 
 
 def of_sources(sources: Mapping[str, bytes]) -> str:
@@ -110,21 +110,14 @@ class _Walk:
             yield from self._function(value)
         elif isinstance(value, type):
             yield from self._class(value)
-        elif isinstance(value, property):
-            yield from self.parts((value.fget, value.fset), names)
-        elif isinstance(value, functools.cached_property):
-            yield from self.parts(value.func, names)
-        elif isinstance(value, functools.partial):
-            yield from self.parts((value.func, value.args, value.keywords), names)
-        elif hasattr(value, "__wrapped__"):  # class methods and static methods among them
-            yield from self.parts(value.__wrapped__, names)
-        elif isinstance(value, Mapping | list):
-            pairs = value.items() if isinstance(value, Mapping) else value
-            yield from self.parts(tuple(pairs), names)
         elif isinstance(value, set | frozenset):
             yield from sorted(map(repr, value))
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
+        elif kept := next((parts for kind, parts in _PARTS if isinstance(value, kind)), None):
+            yield from self.parts(kept(value), names)
+        elif hasattr(value, "__wrapped__"):  # a cached function
+            yield from self.parts(value.__wrapped__, names)
         else:
             yield from self._class(type(value))
             yield from self._state(value, names)
@@ -162,9 +155,8 @@ class _Walk:
         if not _is_followed(kind.__module__):
             return
         yield from self.parts(kind.__bases__, ())
-        made = _MADE | ({"__init__"} if _inits_itself(kind) else set())
         for name, value in sorted(vars(kind).items()):
-            if name not in made:
+            if not _is_generated(name, value):
                 yield name
                 yield from self.parts(value, ())
 
@@ -193,10 +185,12 @@ def _is_documented(code: CodeType) -> bool:
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
 
 
-def _inits_itself(kind: type) -> bool:
-    """True if a class is a dataclass whose ``__init__`` was made for it."""
-    params = vars(kind).get("__dataclass_params__")
-    return params is not None and params.init
+def _is_generated(name: str, value: Any) -> bool:
+    """True of what Python, dataclasses and msgspec make for a class, which decides no number."""
+    if name == "_abc_impl" or name.startswith("__annot"):
+        return True
+    made = getattr(getattr(value, "__code__", None), "co_qualname", "").startswith("__create_fn__")
+    return made or (name.startswith("__") and not callable(value))
 
 
 def _names(code: CodeType) -> Iterator[str]:
