@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from rsfstudy.declare.study import Study
@@ -23,7 +22,7 @@ from rsfstudy.files.lattice import attributes, coordinates, variables
 from rsfstudy.files.store import ZARR, seal
 from rsfstudy.status import Status
 
-#: Numbers in one piece: 32 MB of float64.
+#: Numbers in one piece, 32 MB of float64: whole rows along the first axis, one at least.
 _NUMBERS = 4_000_000
 #: How stores are written; consolidated metadata have no specification in Zarr's format 3.
 _STORE: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
@@ -85,52 +84,26 @@ def _as_objects(dataset: xr.Dataset) -> xr.Dataset:
 
 def _write_lattice(study: Study, read: Read, path: Path) -> int:
     """Write the variables of the lattice; the number of cells that are finished."""
-    from dask.array.core import normalize_chunks, slices_from_chunks
-
-    width = Layout(study.measure).width
-    chunk = _chunk(study.shape, _NUMBERS // width)
-    template = _template(study, Columns.pending(1, width), chunk)
-    template.to_zarr(path, mode="w-", compute=False, **_STORE)
-    finished = 0
-    for region in slices_from_chunks(normalize_chunks(chunk, study.shape)):
-        shape = tuple(part.stop - part.start for part in region)
-        start = int(np.ravel_multi_index([part.start for part in region], study.shape))
-        columns = read(start, start + math.prod(shape))
-        slab = xr.Dataset(variables(study, columns, shape))
-        where = dict(zip(study.dimensions, region, strict=True))
-        slab.to_zarr(path, region=where, **_STORE)
-        back = xr.open_dataset(path, **ZARR)[list(slab)].isel(where)
-        if not slab.equals(back.drop_vars(list(back.coords))):
+    width, first, finished = Layout(study.measure).width, study.dimensions[0], 0
+    length, *within = study.shape
+    row = math.prod(within)  # of cells
+    rows = min(length, max(1, _NUMBERS // (width * row)))
+    coords = _as_objects(xr.Dataset(coords=coordinates(study)))
+    # a chunk of the store that is lost reads as pending
+    pending = variables(study, Columns.pending(1, width), (1,) * len(study.shape))
+    encoding = {
+        name: {"chunks": (rows, *within, *v.shape[len(study.shape) :]), "fill_value": v.flat[0]}
+        for name, (_dims, v, _about) in pending.items()
+    }
+    how: dict[str, Any] = {"mode": "w-", "encoding": encoding}
+    for start in range(0, length, rows):
+        some = slice(start, min(start + rows, length))
+        columns = read(some.start * row, some.stop * row)
+        slab = variables(study, columns, (some.stop - start, *within))
+        coords.isel({first: some}).assign(slab).to_zarr(path, **how, **_STORE)
+        how = {"append_dim": first}
+        back = xr.open_dataset(path, **ZARR)[list(slab)].isel({first: some})
+        if not xr.Dataset(slab).equals(back.drop_vars(list(back.coords))):
             raise DataError(f"{path} was not written: what was read back differs.")
         finished += int((columns.status != int(Status.PENDING)).sum())
     return finished
-
-
-def _template(study: Study, pending: Columns, chunk: tuple[int, ...]) -> xr.Dataset:
-    """The lattice without its numbers: each variable holds one, that of a pending cell, as often
-    as it takes. A chunk of the store that is lost reads as pending too.
-    """
-    import dask.array
-
-    one_cell = variables(study, pending, (1,) * len(chunk))
-    lattice = {}
-    for name, (dims, values, about) in one_cell.items():
-        inner = values.shape[len(chunk) :]
-        full = dask.array.full(
-            study.shape + inner,
-            values.flat[0],
-            chunks=chunk + inner,
-            dtype="T" if values.dtype == object else values.dtype,
-        )
-        lattice[name] = (dims, full, about, {"fill_value": values.flat[0]})
-    return _as_objects(xr.Dataset(lattice, coordinates(study)))
-
-
-def _chunk(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
-    """The largest slab of consecutive cells with no more than `most` of them."""
-    for place, length in enumerate(shape):
-        within = math.prod(shape[place + 1 :])
-        if within <= most:
-            along = min(length, most // within)
-            return (1,) * place + (along, *shape[place + 1 :])
-    return (1,) * len(shape)
