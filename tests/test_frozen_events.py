@@ -1,14 +1,13 @@
 """All engines tell what they told when `frozen_events.json` was written: a change of code that is
-not to change numbers changes none. `python tests/gate.py freeze` writes the file anew, after a
-change that is to; `python tests/gate.py compare` says what that changes.
+not to change numbers changes none. `python tests/telling.py freeze` writes the file anew, after a
+change that is to.
 """
 
 import json
 
 import pytest
 from frozen_scenes import MOTIONS
-from gate import FROZEN
-from telling import Told, apart, told
+from telling import FROZEN, Told, apart, told
 
 from rsfstudy import Scene
 from rsfstudy.motion.engines import ENGINES
@@ -17,8 +16,8 @@ from rsfstudy.slider.registry import SLOTS
 
 #: What numbers may differ by, relative to what `telling.apart` says. Last bits are another CPU's
 #: own (its exponentials, the order of its sums, whether it fuses multiplication and addition): by
-#: `gate.py sensitivity` none of them moves an event by more than a tenth of this, a root that ends
-#: an iteration earlier included.
+#: `telling.py sensitivity` none of them moves an event by more than a tenth of this, a root that
+#: ends an iteration earlier included.
 WITHIN = 1e-12
 #: The same where steps end. A step is as long as its error estimate says, which is a difference of
 #: slopes: rounding is 1e-9 of it where it just meets a tolerance of 7e-9.
