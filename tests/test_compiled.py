@@ -1,14 +1,13 @@
 """The compiled engine: the same physics, told by the same events, whatever the parts of a scene."""
 
 import ctypes
-import importlib
-import importlib.util
 import itertools
 import math
 import os
 import subprocess
 import sys
 import types
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,223 +27,20 @@ from rsfstudy.errors import DataError, Incomplete, InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import building, machine
-from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.engines import COMPILED, ENGINES, SCIPY, compiling
-from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.recording import READ, Recording
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
-from rsfstudy.slider.equations import between_ruptures, rigid
+from rsfstudy.motion.engines import COMPILED, ENGINES, compiling
+from rsfstudy.slider import laws
+from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
-from rsfstudy.slider.parts import Part, is_flag
 from rsfstudy.slider.places import LAW
-from rsfstudy.slider.registry import SLOTS
 from rsfstudy.status import Status
 
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
-#: Accuracy of the motions that are compared, and what they may differ by. Both engines take the
-#: same steps but for rounding, which an unstable motion amplifies, a rupture most of all.
-ALIKE, APART, APART_BY_RUPTURES = 1e-8, 1e-6, 1e-4
-#: Two engines that take the same steps; what plain Python tells is held to frozen events.
-BOTH = (SCIPY, COMPILED)
 
 
-def parts_of_examples() -> list[type[Part]]:
-    """The parts of a user's own in the examples outside of the package."""
-    found = []
-    for file in sorted((Path(__file__).parent / "extensions").glob("*.py")):
-        spec = importlib.util.spec_from_file_location(f"example_{file.stem}", file)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-        own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]
-        found += [p for p in own if p.__module__ == spec.name]
-    forget_examples()
-    return found
-
-
-def forget_examples() -> None:
-    """Other tests in this process know the examples as parts of study files."""
-    for slot in SLOTS:
-        for name, part in list(slot.own.items()):
-            if part.__module__.startswith("example_"):
-                del slot.own[name]
-    for name, stepper in list(engines._OWN.items()):
-        if stepper.__module__.startswith("example_"):
-            del engines._OWN[name]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def examples_are_forgotten():
-    yield
-    forget_examples()
-
-
-def fields_of(part: type[Part], slot: str) -> dict:
-    """What calls a part into a scene."""
-    if slot == "dynamics" and part.__module__.startswith("rsfstudy."):
-        called_by = part.called_by
-        return {called_by: True if is_flag(part, called_by) else 1e-3} if called_by else {}
-    return {slot: part.name if part.__module__.startswith("rsfstudy.") else part}
-
-
-BASES = {
-    "law": laws.Law,
-    "normal_stress": normal_stress.NormalStress,
-    "fluid": fluid.Fluid,
-    "dynamics": dynamics.Dynamics,
-    "loading": loading.Loading,
-}
-STRESSES, FLUIDS = list(normal_stress.PARTS.values()), list(fluid.PARTS.values())
-#: Each law in each dynamics; every two of the other parts meet in some of them.
-OURS = [
-    {
-        **fields_of(law, "law"),
-        **fields_of(STRESSES[(number + number // 3) % len(STRESSES)], "normal_stress"),
-        **fields_of(FLUIDS[number // 2 % 2], "fluid"),
-        **fields_of(acting, "dynamics"),
-    }
-    for number, (law, acting) in enumerate(
-        itertools.product(laws.PARTS.values(), dynamics.PARTS.values())
-    )
-]
-#: Stress that acts on the state, alone, beside what normal stress does, and in ruptures.
-OURS += [
-    {"law": "slip", "normal_stress": "constant", "stress_dependence": 0.5},
-    {"law": "composite", "normal_stress": "variable", "stress_dependence": 2.0},
-    {"law": "perrin_rice_zheng", "normal_stress": "variable", "inertia": True,
-     "stress_dependence": 1.0},
-]  # fmt: skip
-THEIRS = [
-    fields_of(part, slot)
-    for part in parts_of_examples()
-    for slot, base in BASES.items()
-    if issubclass(part, base)
-]
-
-
-def named(fields: dict) -> str:
-    return " ".join(str(getattr(value, "name", value)) for value in fields.values())
-
-
-def told(scene: Scene, by: str, **options) -> tuple[list, Meter]:
-    """Events of a motion by an engine, and the work."""
-    load = scene.log_load_rate if scene.load_velocity else -1.0
-    watches = (
-        maximum("log_slip_rate"),
-        minimum("log_slip_rate", waits=True),
-        rise("log_slip_rate", load),
-        fall("log_slip_rate", load, waits=True),
-        maximum("spring_stress"),
-        fall("state", -0.01),
-        settling(1e-3, ends=True),
-    )
-    meter, events = Meter(60_000, engine=by), []
-    try:
-        for event in follow(scene, Accuracy(ALIKE), meter, watches, clock=True, **options):
-            events.append(event)
-            # what went before an event that can wait may be told, and its work counted, later
-            if len(events) >= 24 and event.watch is not None and not event.watch.waits:
-                break
-    except Halt as halt:
-        events.append(halt.status)
-    return events, meter
-
-
-def agree(one: list, other: list, within: float = APART) -> None:
-    """Row by row the same, but for rounding and what the motion makes of it."""
-    assert [kind_of(event) for event in other] == [kind_of(event) for event in one]
-    for a, b in zip(one, other, strict=True):
-        # settled is told at the end of a step, and steps end elsewhere where a last bit differs
-        if isinstance(a, Status) or a.kind is Kind.SETTLED:
-            continue
-        assert b.time == pytest.approx(a.time, rel=within, abs=1e-9, nan_ok=True)
-        assert b.slip == pytest.approx(a.slip, rel=within, abs=1e-7, nan_ok=True)
-        for name in (
-            "log_slip_rate",
-            "spring_stress",
-            "friction",
-            "psi",
-            "state",
-            "coefficient",
-            "psis",
-        ):
-            theirs, ours = getattr(b.point, name), getattr(a.point, name)
-            assert theirs == pytest.approx(ours, rel=within, abs=0.1 * within), name
-        assert b.point.normal_stress == pytest.approx(a.point.normal_stress, rel=within)
-
-
-def kind_of(event) -> object:
-    return event if isinstance(event, Status) else (event.kind, event.watch, event.regime)
-
-
-# ---- the same events -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("fields", [*OURS, *THEIRS], ids=named)
-def test_every_part_tells_the_same_events(fields):
-    """Ours in all combinations, and each of the examples of a user's own."""
-    more = {} if "loading" in fields else {"load_velocity_ratio": 2.0}
-    scene = Scene(stiffness_ratio=0.8 if "inertia" in fields else 1.3, **fields, **more)
-    (one, plain), (other, compiled) = (told(scene, by, until=300.0) for by in BOTH)
-    assert len(one) > 3
-    agree(one, other, APART_BY_RUPTURES if scene.has_mass else APART)
-    assert compiled.spent == pytest.approx(plain.spent, rel=0.02, abs=30)
-    assert compiled.steps == pytest.approx(plain.steps, rel=0.02, abs=3)
-    assert set(compiled.by_regime) == set(plain.by_regime)
-
-
-@pytest.mark.parametrize("backward", [False, True])
-def test_paths_forward_and_backward(backward):
-    scene = Scene(stiffness_ratio=1.2, load_velocity_ratio=3.0)
-    equations, start = between_ruptures(scene, clock=False), (0.01, 0.004)
-    rows = []
-    for by in BOTH:
-        meter = Meter(5_000, engine=by)
-        watches = (
-            maximum("log_slip_rate"),
-            minimum("log_slip_rate"),
-            fall("log_slip_rate", 0.1),
-            rise("psi", 0.02),
-            fall("psi", 0.0),
-        )
-        path = along(equations, start, 1e-8, meter, watches, backward=backward)
-        rows.append(list(itertools.islice(path, 2)))
-    agree(*rows)
-    assert all(math.isnan(event.slip) for event in rows[1])
-
-
-def test_a_rigid_slider_recorded_at_slips():
-    scene, asked = Scene(load_velocity_ratio=10.0), np.array([0.0, 0.5, 1.0, 3.0])
-    rows, tables = [], []
-    for by in BOTH:
-        meter, recording = Meter(5_000, engine=by), Recording(at=asked)
-        watches, begin = [fall("friction", 0.03)], (0.05,)
-        equations = rigid(scene, scene.log_load_rate)
-        path = along(equations, begin, 1e-8, meter, watches, recording=recording)
-        rows.append(list(itertools.islice(path, 3)))
-        tables.append(recording.seen(scene)[:, 1:])
-    agree(*rows)
-    assert [event.kind for event in rows[1]] == [Kind.START, Kind.FALL, Kind.SAMPLED]
-    assert tables[1] == pytest.approx(tables[0], rel=APART, abs=0.1 * APART)
-    assert tables[1][:, READ.index("slip") - 1].tolist() == asked.tolist()
-
-
-def test_trajectories_are_the_same():
-    one, other = (simulate(Scene(**CYCLE), duration=40.0, engine=by) for by in BOTH)
-    assert other.attrs["engine"] == COMPILED
-    assert (np.diff(other.time) > 0.0).all()
-    assert other.sizes["time"] == pytest.approx(one.sizes["time"], rel=0.02)
-    assert set(np.unique(other["regime"])) == set(np.unique(one["regime"])) == {1, 2}
-    for name in ("log10_slip_rate", "shear_stress", "state_variable"):
-        for extreme in ("min", "max"):
-            theirs, ours = (float(getattr(motion[name], extreme)()) for motion in (other, one))
-            assert theirs == pytest.approx(ours, rel=1e-4)
-    assert float(other["time"][-1]) == pytest.approx(40.0, rel=1e-12)
+# ---- the same answers; events are held to frozen ones, those of a user's parts in test_extensions
 
 
 @pytest.mark.parametrize("rows", [8, 9, 10, 11, 12, 13])
@@ -258,25 +54,29 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
     assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
 
 
-# ---- the same answers ----------------------------------------------------------------------------
+def asked() -> Iterator[tuple[Measure, Scene, Accuracy]]:
+    """Random scenes, dilatant ones, every other law, and falls of normal stress."""
+    for measure, scene, accuracy in agreement.random_scenes(24):
+        yield measure, scene, replace(accuracy, rtol=max(accuracy.rtol, 1e-7))
+    for law in ("slip", "slowness"):
+        like = Scene(law=law, fluid="dilatant", dilatancy=0.001, inertia=law == "slip")
+        for question in sorted(QUESTIONS):
+            yield QUESTIONS[question].measure, random_scene(like, question, 2), Accuracy(1e-4)
+        for stress in ({"normal_stress": "imposed", "alpha": 0.56}, {"alpha": 0.4, "phi": 55.0}):
+            scene = Scene(law=law, inertia=True, stiffness_ratio=1.25, **stress)
+            fall = CriticalStep(of="normal_stress_step", direction="down")
+            yield fall, scene, Accuracy(1e-6)
+    for law in sorted(set(laws.PARTS) - {"slip", "slowness"}):
+        heavy = Scene(law=law, inertia=True, stiffness_ratio=1.25)
+        for of in ("load_velocity_ratio", "displacement_step"):
+            yield CriticalStep(of=of), heavy, Accuracy(1e-6)
+        cycling = heavy.with_(stiffness_ratio=0.8, load_velocity_ratio=2.0)
+        yield LimitCycle(phases=2), cycling, Accuracy(1e-6)
 
 
-@pytest.mark.parametrize("sample", range(24))
-def test_random_scenes_end_alike_within_their_errors(sample):
-    measure, scene, accuracy = next(
-        one for number, one in enumerate(agreement.random_scenes(24)) if number == sample
-    )
-    one = agreement.compared(measure, scene, replace(accuracy, rtol=max(accuracy.rtol, 1e-7)))
-    assert one.same_end, one.what
-    assert not one.worst > 1.0, one.what
-
-
-@pytest.mark.parametrize("question", sorted(QUESTIONS))
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-def test_dilatant_faults_end_alike_within_their_errors(question, law):
-    like = Scene(law=law, fluid="dilatant", dilatancy=0.001, inertia=law == "slip")
-    scene = random_scene(like, question, 2)
-    one = agreement.compared(QUESTIONS[question].measure, scene, Accuracy(1e-4))
+@pytest.mark.parametrize(("measure", "scene", "accuracy"), asked())
+def test_both_engines_end_alike_within_their_errors(measure, scene, accuracy):
+    one = agreement.compared(measure, scene, accuracy)
     assert one.same_end, one.what
     assert not one.worst > 1.0, one.what
 

@@ -2,7 +2,6 @@
 
 import math
 
-import agreement
 import pytest
 
 from rsfstudy import Scene
@@ -67,12 +66,3 @@ def test_normal_stress_that_is_lost_is_told_however_steep_the_law():
     numbers = {"a": 0.022, "b_over_a": 1.58, "stiffness_ratio": 1.618, "load_velocity_ratio": 1.947}
     scene = Scene(law="perrin_rice_zheng", inertia=True, period=1.04, **fields, **numbers)
     assert StepResponse()(scene, Accuracy(1e-4)).status is Status.NORMAL_STRESS_LOST
-
-
-@pytest.mark.parametrize("law", sorted(set(laws.PARTS) - {"slip", "slowness"}))
-@pytest.mark.parametrize("question", ["rate step", "displacement step", "cycle"])
-def test_both_engines_agree_within_their_errors(question, law):
-    measure, fields = QUESTIONS[question]
-    one = agreement.compared(measure, Scene(law=law, inertia=True, **fields), Accuracy(1e-6))
-    assert one.same_end, one.what
-    assert not one.worst > 1.0, one.what

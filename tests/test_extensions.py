@@ -14,8 +14,10 @@ from types import SimpleNamespace
 import cloudpickle
 import numpy as np
 import pytest
+from frozen_scenes import Motion
 from rsfstudy.named_studies._phase_plane import scene_of
 from running import call, run, same_numbers
+from telling import apart, told
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
@@ -92,6 +94,22 @@ def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
     agreed = rsfstudy.rerun(example.file, study=example.study, workers=0, progress=False)
     assert (agreed["values"] == agreed["identical"]).all()
     assert agreed.attrs["differs"] == {}
+
+
+@pytest.mark.parametrize(
+    "name", ["steep_law", "saturating_law", "hold_and_reload", "stress_weakening"]
+)
+def test_its_motions_are_the_same_compiled(name, outside):
+    """As ours are held to frozen events: SciPy's stepper takes the same steps but for rounding."""
+    *_others, scene = catalogue.load(str(outside[name].study)).scenes()
+    stepped = {"rest_time": 30.0} if name == "hold_and_reload" else {"load_velocity_ratio": 2.0}
+    scene = scene.with_(**stepped)
+    motion = Motion({"a": scene.a}, until=300.0, rtol=1e-8)
+    one, other = (told(motion, engine, scene) for engine in ("scipy", "compiled"))
+    assert len(one.kinds) > 3
+    along, of_steps = apart(motion, one, other)
+    assert along < 1e-12
+    assert of_steps < 1e-8
 
 
 def test_a_cell_by_the_command(outside):

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import agreement
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -224,15 +223,6 @@ def test_a_rise_may_take_more_from_the_state_than_it_gives_to_friction():
     value, _error, outcome = found(Scene(**IMPOSED, alpha=0.56, stiffness_ratio=3.0), RISE)
     assert 2.0 < value < 3.0
     assert outcome.values["slip_rate_after_step"] > 1.0
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("stress", STRESSES[1:], ids=str)
-def test_both_engines_agree_within_their_errors(law, stress):
-    scene = Scene(law=law, inertia=True, stiffness_ratio=1.25, **stress)
-    one = agreement.compared(FALL, scene, Accuracy(1e-6))
-    assert one.same_end, one.what
-    assert not one.worst > 1.0, one.what
 
 
 # ---- what is said of steady sliding after the step ----------------------------------------------
