@@ -15,13 +15,13 @@ from in_time import InTime
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.events import Kind, maximum, minimum
+from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import starting
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
@@ -84,47 +84,29 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
     follow(scene, 1e-10, until)
 
 
-def cycle(
-    scene: Scene, rtol: float, number: int, accuracy: Accuracy | None = None
-) -> tuple[float, float]:
-    """Recurrence interval, and spring stress drop in a sigma_*, of one stick-slip cycle."""
-    accuracy, meter = accuracy or Accuracy(rtol, 10**7), Meter(10**7)
-    # spring stress turns where V = V_0; an arrest may pass that between two regimes
-    turning, times, trough = (maximum("spring_stress"), minimum("spring_stress")), [], math.inf
-    for event in course.follow(scene, accuracy, meter, turning, clock=True):
-        trough = min(trough, event.point.spring_stress)
-        if event.kind is not Kind.MAXIMUM:
-            continue
-        times.append(event.time)
-        if len(times) == number + 1:
-            return times[-1] - times[-2], (event.point.spring_stress - trough) / scene.a
-        trough = math.inf
-    raise AssertionError
+def cycle(law: str, accuracy: Accuracy) -> tuple[float, float]:
+    """Recurrence interval, and spring stress drop in a sigma_*."""
+    scene = Scene(law=law, normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0,
+                  inertia=True)  # fmt: skip
+    found = LimitCycle(phases=2)(scene, accuracy).values
+    return found["recurrence_interval"], found["static_stress_drop"] / scene.a
 
 
 #: Constant normal stress, b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*: recurrence interval and stress drop
-#: in a sigma_* from an integration in extended precision; which cycle.
+#: in a sigma_* from an integration in extended precision, after 3 cycles and after 10.
 REFERENCES = {
-    "slip": (27.3903182296427, 40.16070456254199, 3),
-    "slowness": (23.9399987067, 37.127939244, 10),
+    "slip": (27.3903182296427, 40.16070456254199),
+    "slowness": (23.9399987067, 37.127939244),
 }
 
 
 @pytest.mark.parametrize("law", sorted(REFERENCES))
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-7, 1e-9])
 def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
-    scene = Scene(
-        law=law,
-        normal_stress="constant",
-        stiffness_ratio=0.8,
-        load_velocity_ratio=2.0,
-        inertia=True,
-    )
-    recurrence, drop, number = REFERENCES[law]
-    ours = cycle(scene, rtol, number)
     # the references are given to 12 digits
-    assert ours[0] == pytest.approx(recurrence, rel=rtol + 1e-12)
-    assert ours[1] == pytest.approx(drop, rel=rtol + 1e-11)
+    allowed = [rtol + 1e-12, rtol + 1e-11]
+    for ours, exact, rel in zip(cycle(law, Accuracy(rtol)), REFERENCES[law], allowed, strict=True):
+        assert ours == pytest.approx(exact, rel=rel)
 
 
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
@@ -139,16 +121,11 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
         remaining_slip = property(lambda _self: 1e-9)
         solver = property(lambda _self: 1e-11)
 
-    exact, _drop, number = REFERENCES["slip"]
-
-    def error(weight):
-        scene = Scene(
-            normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
-        )
-        switched = Switched(1e-9, 10**7, weight=weight)
-        return abs(cycle(scene, 1e-9, number, switched)[0] / exact - 1.0)
-
-    errors = {weight: error(weight) for weight in (1e-3, 2e-3)}
+    exact, _drop = REFERENCES["slip"]
+    errors = {
+        weight: abs(cycle("slip", Switched(1e-9, 10**7, weight=weight))[0] / exact - 1.0)
+        for weight in (1e-3, 2e-3)
+    }
     for weight, error in errors.items():
         assert 0.001 < error / (12.2 * weight) ** 3 < 0.002
     assert 4.0 < errors[2e-3] / errors[1e-3] < 16.0
@@ -236,9 +213,6 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
 def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
     """d(sigma)**2 = ds**2 + (slant ds)**2."""
     assert path_metric(slant) * math.hypot(1.0, slant) == pytest.approx(1.0, rel=1e-15)
-
-
-def test_no_slant_is_too_steep():
     assert path_metric(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
 
 
@@ -343,44 +317,27 @@ def test_mass_follows_a_displacement_step_within_the_inertial_time():
     assert begun.point.spring_stress == scene.spring_stress_step
 
 
-def test_work_budget_ends_a_motion():
-    with pytest.raises(Halt, match="more than 500 right-hand sides") as halted:
-        follow(Scene(stiffness_ratio=1.1, load_velocity_ratio=1.2), 1e-9, lambda _event: False, 500)
-    assert halted.value.status is Status.WORK_BUDGET_SPENT
-
-
-def test_slip_without_mass_that_runs_away_is_named():
-    with pytest.raises(Halt, match="beyond 10.120") as halted:
-        follow(
-            Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0), 1e-9, lambda _event: False, 10**4
-        )
-    assert halted.value.status is Status.SLIP_RATE_UNBOUNDED
+#: phi = 33 degrees is just above atan(0.6): slowed down, normal stress grows without bound.
+LOCKS = {"law": "slowness", "b_over_a": 8.1, "a": 0.066, "mu_star": 0.6, "phi": 33.0, "alpha": 0.0,
+         "load_velocity_ratio": 0.3}  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("displacement", "status"),
-    [(-47.0, Status.SHEAR_STRESS_REVERSED), (-106.0, Status.NORMAL_STRESS_LOST)],
-)
-def test_displacement_steps_that_end_friction_are_named(displacement, status):
-    with pytest.raises(Halt) as halted:
-        starting(Scene(displacement_step=displacement))
+    ("fields", "budget", "message", "status"),
+    [
+        ({"stiffness_ratio": 1.1, "load_velocity_ratio": 1.2}, 500,
+         "more than 500 right-hand sides", Status.WORK_BUDGET_SPENT),
+        ({"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}, 10**4, "beyond 10.120",
+         Status.SLIP_RATE_UNBOUNDED),
+        (LOCKS, 10**6, "normal stress grew", Status.LOCKED),
+        ({"displacement_step": -47.0}, 10, None, Status.SHEAR_STRESS_REVERSED),
+        ({"displacement_step": -106.0}, 10, None, Status.NORMAL_STRESS_LOST),
+    ],
+)  # fmt: skip
+def test_what_ends_a_motion_is_named(fields, budget, message, status):
+    with pytest.raises(Halt, match=message) as halted:
+        follow(Scene(**fields), 1e-9, lambda event: event.point.log_slip_rate > 300.0, budget)
     assert halted.value.status is status
-
-
-def test_a_slider_that_locks_is_named():
-    """phi = 33 degrees is just above atan(0.6): slowed down, normal stress grows without bound."""
-    scene = Scene(
-        law="slowness",
-        b_over_a=8.1,
-        a=0.066,
-        mu_star=0.6,
-        phi=33.0,
-        alpha=0.0,
-        load_velocity_ratio=0.3,
-    )
-    with pytest.raises(Halt, match="normal stress grew") as halted:
-        follow(scene, 1e-6, lambda event: event.point.log_slip_rate > 30.0)
-    assert halted.value.status is Status.LOCKED
 
 
 @pytest.mark.parametrize("engine", [SCIPY, PYTHON])

@@ -159,14 +159,16 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
     """An integrator's trial steps may ask for anything; the answer is never NaN and never
     raises.
     """
-    for scene in (Scene(), Scene(law="slowness"), Scene(normal_stress="constant")):
+    scenes = Scene(), Scene(law="slowness"), Scene(normal_stress="constant")
+    fluid = Scene(fluid="dilatant"), Scene(fluid="dilatant", displacement_step=1.0)
+    for scene in (*scenes, *fluid):
         massive = scene.with_(inertia=True)
-        for wild in (-1e6, -2.0, -1.7320508, 3.0, 1e6):
+        for wild, psi in itertools.product((-1e6, -2.0, -1.7320508, 3.0, 1e6), (-50.0, 0.0, 50.0)):
+            pores = [wild, psi][: scene.states - 1]
             for system in (between_ruptures(s, clock=True) for s in (scene, massive)):
-                for psi in (-50.0, 0.0, 50.0):
-                    assert all(map(math.isfinite, system.rates([wild, psi, 0.0])))
+                assert all(map(math.isfinite, system.rates([wild, psi, *pores, 0.0])))
             for x in (-1e4, 0.0, 1e4):
-                assert all(map(math.isfinite, in_rupture(massive).rates([wild, x, wild])))
+                assert all(map(math.isfinite, in_rupture(massive).rates([wild, x, wild, *pores])))
 
 
 def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(monkeypatch):

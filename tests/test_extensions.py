@@ -23,7 +23,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.linear_stability import LinearStability
@@ -339,16 +339,6 @@ def test_edited_code_is_refused_with_the_journal(tmp_path):
     same_numbers(rsfstudy.run(study, fresh=True, **options).drop_attrs(), before.drop_attrs())
 
 
-def test_a_worker_that_lacks_a_module_is_told(tmp_path, monkeypatch, cluster):
-    text = EXAMPLES[0].with_name("saturating_law.py").read_text()
-    (tmp_path / "only_here.py").write_text(text.replace('"saturating"', '"only_here"'))
-    monkeypatch.syspath_prepend(tmp_path)
-    import only_here
-
-    with pytest.raises(RunError, match="a worker cannot load the measure, or a part.*'only_here'"):
-        run(only_here.study, client=cluster)
-
-
 # ---- in a notebook, or anywhere -----------------------------------------------------------------
 
 
@@ -550,16 +540,6 @@ def test_overrides_by_class_whatever_their_order():
         assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
     with pytest.raises(InvalidValue, match="override = 'factor': is neither an axis nor a field"):
         study.with_(factor=[1.0])
-
-
-def test_built_in_scenes_are_what_they_were():
-    """Whatever is known in this process."""
-    Scene(law=Doubled, dynamics=Sticky)
-    scene = Scene(alpha=0.3)
-    assert tuple(scene.as_dict()) == PLAIN
-    assert pickle.loads(pickle.dumps(scene)) == scene
-    study = Study(name="n", title="t", base=scene, axes=[Axis("phi", [60])], measure=Held())
-    assert set(study.describe()["base"]) == set(PLAIN)
 
 
 # ---- figures ------------------------------------------------------------------------------------

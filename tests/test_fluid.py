@@ -2,9 +2,7 @@
 one friction relation for steady sliding, its stability and motions.
 """
 
-import json
 import math
-import pickle
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -215,19 +213,6 @@ def test_number_of_unknowns(fields):
     assert "with_auxiliary" in wet.__qualname__
 
 
-def test_trial_states_outside_of_the_physics_give_finite_rates():
-    for scene in (dilatant(), dilatant(law="slowness"), dilatant(displacement_step=1.0)):
-        massive = scene.with_(inertia=True)
-        for wild in (-1e6, -2.0, 3.0, 1e6):
-            for pressure in (-50.0, 1.0, 50.0):
-                for system in (between_ruptures(s, clock=True) for s in (scene, massive)):
-                    rates = system.rates([wild, 0.0, wild, pressure, 0.0])
-                    assert all(map(math.isfinite, rates))
-                for x in (-1e4, 0.0, 1e4):
-                    rates = in_rupture(massive).rates([wild, x, wild, wild, pressure])
-                    assert all(map(math.isfinite, rates))
-
-
 # ---- measures ------------------------------------------------------------------------------------
 
 
@@ -306,15 +291,6 @@ def test_several_states_and_a_fluid():
 # ---- scenes --------------------------------------------------------------------------------------
 
 
-def test_a_scene_with_a_fluid_is_a_scene():
-    scene = dilatant(0.003, 0.7, inertia=True)
-    assert pickle.loads(pickle.dumps(scene)) == scene
-    assert Scene(**scene.as_dict()) == scene
-    assert scene.with_(drainage=2.0).drainage == 2.0
-    assert scene.with_(fluid="drained") == Scene(inertia=True)
-    assert scene.effects == ("inclined_driving", "linker_dieterich", "dilatancy", "inertia")
-
-
 def tight(log_slip_rate, states, share, p):
     opening = share * (p[FLUID] * log_slip_rate - states[0])
     return opening, -opening
@@ -349,21 +325,6 @@ def test_a_fluid_of_your_own(law):
     assert np.abs(stability.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
     slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
     np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
-
-
-def without(value, names):
-    """A declaration, as a version that did not know some fields would have written it."""
-    if isinstance(value, dict):
-        return {k: without(v, names) for k, v in value.items() if k not in names}
-    return [without(v, names) for v in value] if isinstance(value, list) else value
-
-
-def test_files_from_before_there_was_a_fluid_are_restored():
-    dataset = run(SMALL)
-    declared = without(json.loads(dataset.attrs["declaration"]), {"fluid", "dilatancy", "drainage"})
-    assert "fluid" not in declared["base"]
-    older = dataset.drop_vars("fluid").assign_attrs(declaration=json.dumps(declared))
-    assert study_of(older).base == SMALL.base
 
 
 def test_a_study_of_fluids_is_restored():

@@ -34,21 +34,6 @@ SLIDERS = {
 OSCILLATES = {"oscillation_amplitude": 0.02, "oscillation_period": 8.0, "stiffness_ratio": 2.0}
 
 
-def test_a_rupture_feels_it_too():
-    """Stick-slip: normal stress is on its sine in all regimes."""
-    scene = Scene(
-        **SLIDERS["imposed, mass"],
-        stiffness_ratio=0.5,
-        oscillation_amplitude=0.02,
-        oscillation_period=30.0,
-    )
-    motion = simulate(scene, duration=150.0, engine=COMPILED)
-    assert set(np.unique(motion.regime)) == {1, 2}
-    assert set(motion) == set(simulate(Scene(load_velocity_ratio=2.0), duration=1.0))
-    expected = 1.0 + 0.02 * np.sin(2.0 * np.pi * motion.time / 30.0)
-    assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-8)
-
-
 @pytest.mark.parametrize("rtol", [1e-3, 1e-7])
 def test_the_amplitude_does_not_drift(rtol):
     """After 300 periods it is off by less than the accuracy, and no more than after 30."""

@@ -13,69 +13,12 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import laws, registry, stability, steady
-from rsfstudy.slider.equations import evolution_of, relation_of
+from rsfstudy.slider import registry, stability, steady
+from rsfstudy.slider.equations import evolution_of
 from rsfstudy.slider.fluid.dilatant import Dilatant
-from rsfstudy.slider.laws.slowness import SlownessLaw
 from rsfstudy.slider.normal_stress.variable import Variable
 from rsfstudy.slider.places import DYNAMICS, FLUID, LAW, NORMAL_STRESS, A
 from rsfstudy.status import Status
-
-C = 0.5
-
-
-def weakened(friction, ratio, change, p):
-    """The state loses c dtau/sigma_* where shear stress rises (Nagata et al. 2012)."""
-    return C * friction, C
-
-
-@dataclass(frozen=True, kw_only=True)
-class StressWeakened(SlownessLaw):
-    name = "stress_weakened"
-    state_effect = staticmethod(weakened)
-
-
-@pytest.fixture(autouse=True)
-def one_more_law(monkeypatch):
-    monkeypatch.setitem(laws.PARTS, StressWeakened.name, StressWeakened)
-
-
-@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.0}, {}])
-def test_a_state_effect_is_part_of_the_friction_relation(effects):
-    """With shear stress alone, k_cr is that of the slowness law over 1 + c; the shifts of several
-    effects add up.
-    """
-    scene = Scene(law="stress_weakened", **effects)
-    usual = relation_of(scene.with_(law="slowness"))(0.1)
-    value, slope, shift, shift_slope = relation_of(scene)(0.1)
-    assert value == pytest.approx(usual[0] + C * 0.1, rel=1e-14)
-    assert (slope, shift_slope) == pytest.approx((usual[1] + C, usual[3] + C), rel=1e-14)
-    assert shift == pytest.approx(usual[2] + C * 0.1, rel=1e-14)
-    if effects.get("normal_stress") == "constant":
-        ratio = scene.critical_stiffness / scene.with_(law="slowness").critical_stiffness
-        assert ratio == pytest.approx(1.0 / (1.0 + C), rel=1e-12)
-
-
-@pytest.mark.parametrize("law", ["stress_weakened", *sorted(laws.PARTS)])
-@pytest.mark.parametrize(
-    "effects",
-    [
-        {"normal_stress": "constant"},
-        {"alpha": 0.56},
-        {"normal_stress": "constant", "inertia": True},
-    ],
-)
-def test_everything_follows_from_a_law(law, effects):
-    """The critical stiffness is that of the assembled equations, and steps are critical."""
-    scene = Scene(law=law, load_velocity_ratio=1.5, **effects)
-    found = LinearStability()(scene, Accuracy())
-    assert found.status is Status.OK
-    values = found.values
-    assert values["critical_stiffness_from_growth"] == pytest.approx(
-        values["critical_stiffness"], rel=1e-6
-    )
-    stiffer = scene.with_(load_velocity_ratio=None, stiffness_ratio=1.1)
-    assert CriticalStep()(stiffer, Accuracy(1e-4)).status is Status.OK
 
 
 def test_orbits_of_another_law_need_not_close_at_critical_stiffness():

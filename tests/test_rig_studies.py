@@ -123,27 +123,6 @@ LATTICE = (
 )
 
 
-OTHER = {
-    "normal_stress": "5e6 Pa", "slip_distance": "0.01 mm", "reference_velocity": "1e-6 m/s",
-    "stiffness": "10 GPa/m",
-}  # fmt: skip
-
-
-def test_a_change_of_units_changes_no_dimensionless_number():
-    """The same quantities, written otherwise, along axes and fixed."""
-    one = study(*LATTICE, RIG.axis("load_velocity", ["1 um/s", "3 mm/s"]), initial_stress="50 kPa")
-    rig = Laboratory(**OTHER)
-    two = study(
-        rig.axis("normal_stress", ["10 bar", "50 bar", "0.02 GPa"]), LATTICE[1],
-        rig.axis("stiffness", ["1e4 MPa/m", "30 kPa/um"]),
-        rig.axis("hold_time", ["0 ms", "1e4 ms"]),
-        rig.axis("load_velocity", ["1e-4 cm/s", "0.3 cm/s"]),
-        laboratory=rig, initial_stress="0.05 MPa",
-    )  # fmt: skip
-    for ours, theirs in zip(one.scenes(), two.scenes(), strict=True):
-        assert numbers(ours) == pytest.approx(numbers(theirs), rel=1e-12)
-
-
 # ---- files ---------------------------------------------------------------------------------------
 
 
