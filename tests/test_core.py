@@ -39,11 +39,9 @@ from rsfstudy.status import Status
 def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio):
     """H = Omega - ln Omega + lambda (w - ln w) is conserved at constant normal stress, k = k_cr."""
     scene = Scene(
-        law="slowness",
-        normal_stress="constant",
-        b_over_a=1.7,
+        law="slowness", normal_stress="constant", b_over_a=1.7,
         load_velocity_ratio=load_velocity_ratio,
-    )
+    )  # fmt: skip
     weakening, held = 0.7, []
 
     def invariant(point):
@@ -136,12 +134,9 @@ def peaks(displacement, accuracy):
     integrated implicitly from where mass is 1e-6 of that.
     """
     scene = Scene(
-        law="slowness",
-        stiffness_ratio=0.95,
-        load_velocity_ratio=1.5,
-        inertia=True,
+        law="slowness", stiffness_ratio=0.95, load_velocity_ratio=1.5, inertia=True,
         displacement_step=displacement,
-    )
+    )  # fmt: skip
     full, meter, begin = by_inertial_time(scene), Meter(10**6), None
     for event in course.follow(scene, accuracy, meter, [maximum("log_slip_rate"), EACH_STEP]):
         if event.kind is Kind.MAXIMUM:

@@ -23,10 +23,9 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.regimes import error_of_slow_manifold, on_slow_manifold
+from rsfstudy.motion.regimes import error_of_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
-from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -73,8 +72,9 @@ def test_eq_10_is_approached_from_below_as_the_norm_grows():
 def test_eq_14_displacement_step_at_a_large_norm(stiffness_ratio, b_over_a):
     """D_c/lambda for every stiffness k >= k_cr, load point held, constant normal stress."""
     scene = Scene(
-        b_over_a=b_over_a, stiffness_ratio=stiffness_ratio, instability_norm=1e12, **CONSTANT
-    )
+        b_over_a=b_over_a, stiffness_ratio=stiffness_ratio, instability_norm=1e12,
+        **CONSTANT,
+    )  # fmt: skip
     value, error, _outcome = found(scene, DISPLACEMENT)
     left = (scene.instability_norm / scene.inertial_time) ** (-(b_over_a - 1.0) / stiffness_ratio)
     assert value == pytest.approx(1.0 / (b_over_a - 1.0), abs=20 * left + error + 1e-8)
@@ -153,8 +153,8 @@ def test_requested_tolerance_is_met(law, rtol):
 )
 def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_ratio, alpha, phi, of):
     scene = Scene(
-        law=law, b_over_a=1.0 + weakening, stiffness_ratio=stiffness_ratio, alpha=alpha, phi=phi
-    )
+        law=law, b_over_a=1.0 + weakening, stiffness_ratio=stiffness_ratio, alpha=alpha, phi=phi,
+    )  # fmt: skip
     measure = CriticalStep(of=of)
     loose, tight = measure(scene, Accuracy(1e-6)), measure(scene, Accuracy(1e-10))
     assert loose.status is tight.status
@@ -169,8 +169,8 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
 def test_a_large_step_that_motions_find_is_as_accurate_as_asked_for():
     """They find its logarithm, whose error is four times as large in the ratio of velocities."""
     scene = Scene(
-        law="slowness", b_over_a=1.21, stiffness_ratio=0.97, radiation_damping=1e-6,
-        alpha=0.4, phi=55.0,
+        law="slowness", b_over_a=1.21, stiffness_ratio=0.97, radiation_damping=1e-6, alpha=0.4,
+        phi=55.0,
     )  # fmt: skip
     exact, its_error, _outcome = found(scene, rtol=1e-6)
     value, error, _outcome = found(scene, rtol=1e-4)
@@ -242,15 +242,10 @@ SLOW_NORMS = [("slip", 3.0, 1.9, 1.5), ("slip", 3.0, 1.9, 4.0), ("slowness", 3.0
 
 def whose_norm_is_slow(law, b_over_a, stiffness_ratio, rate, norm) -> Scene:
     return Scene(
-        law=law,
-        b_over_a=b_over_a,
-        stiffness_ratio=stiffness_ratio,
-        inertia=True,
-        instability_norm=norm,
-        period=1000.0,
-        reference_rate=norm * 2.0 * math.pi / 1000.0 / rate,
+        law=law, b_over_a=b_over_a, stiffness_ratio=stiffness_ratio, inertia=True,
+        instability_norm=norm, period=1000.0, reference_rate=norm * 2.0 * math.pi / 1000.0 / rate,
         **CONSTANT,
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("case", SLOW_NORMS)
@@ -288,37 +283,23 @@ def test_mass_counts_at_a_norm_just_above_the_loading_rate():
 #: Scenes in which the tolerance used to decide the status: (fields, direction, status).
 DECIDED = [
     (
-        {
-            "law": "slowness",
-            "a": 0.021181644904389653,
-            "b_over_a": 1.137092583705905,
-            "mu_star": 0.5552661225537985,
-            "period": 0.7568223330364047,
-            "reference_rate": 1.1289390053970302e-08,
-            "phi": 53.38530796435979,
-            "alpha": 0.0617045668824441,
-            "stiffness_ratio": 1.8731115660211108,
-            "load_velocity_ratio": 11.030784157843362,
-        },
+        {"law": "slowness", "a": 0.021181644904389653, "b_over_a": 1.137092583705905,
+         "mu_star": 0.5552661225537985, "period": 0.7568223330364047,
+         "reference_rate": 1.1289390053970302e-08, "phi": 53.38530796435979,
+         "alpha": 0.0617045668824441, "stiffness_ratio": 1.8731115660211108,
+         "load_velocity_ratio": 11.030784157843362},
         "down",
         Status.STABLE_FOR_ALL_STEPS,  # the critical path starts beyond the end of shear stress
     ),
     (
-        {
-            "law": "slowness",
-            "a": 0.0074952301383459955,
-            "b_over_a": 3.409016633081082,
-            "period": 0.11388174879575831,
-            "reference_rate": 1.2408525574485156e-08,
-            "stiffness_ratio": 1.5381593043991868,
-            "load_velocity_ratio": 6.78099797865174,
-            "inertia": True,
-            **CONSTANT,
-        },
+        {"law": "slowness", "a": 0.0074952301383459955, "b_over_a": 3.409016633081082,
+         "period": 0.11388174879575831, "reference_rate": 1.2408525574485156e-08,
+         "stiffness_ratio": 1.5381593043991868, "load_velocity_ratio": 6.78099797865174,
+         "inertia": True, **CONSTANT},
         "up",
         Status.OK,  # the jump of slip rate, which mass delays
     ),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("fields", "direction", "status"), DECIDED)
@@ -338,15 +319,10 @@ def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
     attracts little: it is not known to much more than seven digits, whatever is asked for.
     """
     scene = Scene(
-        law="slip",
-        a=0.007085837776968529,
-        b_over_a=1.2474392015687674,
-        mu_star=0.8169914402658061,
-        period=45.49055212614619,
-        reference_rate=1.9386488840293015e-07,
-        phi=84.62982593790218,
+        law="slip", a=0.007085837776968529, b_over_a=1.2474392015687674, mu_star=0.8169914402658061,
+        period=45.49055212614619, reference_rate=1.9386488840293015e-07, phi=84.62982593790218,
         alpha=0.4888343561900566,
-    )
+    )  # fmt: skip
     value, error, outcome = found(scene, direction="down")
     tight = CriticalStep(direction="down")(scene, Accuracy(1e-9))
     assert abs(value - tight.values["critical_velocity_ratio"]) <= error
@@ -378,32 +354,16 @@ def test_mass_moves_the_boundary_where_it_acts():
         ({"inertia": True, "instability_norm": 1e3}, RATE, "up", Status.NORM_UNREACHABLE),
         ({}, DISPLACEMENT, "down", Status.STABLE_FOR_ALL_STEPS),
         # a critical path exists for a large step, but steady sliding is unstable already
-        (
-            {"law": "slowness", "b_over_a": 5.0, "stiffness_ratio": 0.8},
-            RATE,
-            "up",
-            Status.UNSTABLE_AT_ANY_STEP,
-        ),
+        ({"law": "slowness", "b_over_a": 5.0, "stiffness_ratio": 0.8}, RATE, "up",
+         Status.UNSTABLE_AT_ANY_STEP),
         # every orbit closes at k = k_cr: what rounding makes of a deep down-swing does not count
         (CONSTANT, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
         # phi close to atan(mu_*): normal stress outgrows strength
-        (
-            {
-                "law": "slowness",
-                "a": 0.066,
-                "b_over_a": 8.1,
-                "mu_star": 0.6,
-                "phi": 33.0,
-                "alpha": 0.0,
-                "stiffness_ratio": 0.37,
-            },
-            RATE,
-            "up",
-            Status.LOCKED,
-        ),
+        ({"law": "slowness", "a": 0.066, "b_over_a": 8.1, "mu_star": 0.6, "phi": 33.0,
+          "alpha": 0.0, "stiffness_ratio": 0.37}, RATE, "up", Status.LOCKED),
         ({"law": "slowness", **CONSTANT}, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
     ],
-)
+)  # fmt: skip
 def test_answers_without_a_number(fields, of, direction, status):
     outcome = CriticalStep(of=of, direction=direction)(Scene(**fields), Accuracy())
     assert outcome.status is status

@@ -184,36 +184,22 @@ def test_cycles_near_their_onset_are_waited_for(law, load, drop):
 #: unknowns, time as the clock), to the digits it gives.
 NEARLY_STOPPED = [
     (
-        {
-            "law": "slip",
-            "a": 0.008794017206350683,
-            "b_over_a": 4.941051988536554,
-            "mu_star": 0.6383162760615213,
-            "period": 407.6129114047208,
-            "reference_rate": 3.2171954288536213e-10,
-            "phi": 54.42406958714466,
-            "alpha": 0.5377004681414724,
-            "stiffness_ratio": 0.3804142175724484,
-            "load_velocity_ratio": 86.431987832162,
-        },
+        {"law": "slip", "a": 0.008794017206350683, "b_over_a": 4.941051988536554,
+         "mu_star": 0.6383162760615213, "period": 407.6129114047208,
+         "reference_rate": 3.2171954288536213e-10, "phi": 54.42406958714466,
+         "alpha": 0.5377004681414724, "stiffness_ratio": 0.3804142175724484,
+         "load_velocity_ratio": 86.431987832162},
         0.798761,
     ),
     (
-        {
-            "law": "slowness",
-            "a": 0.004822260947305701,
-            "b_over_a": 5.36849678524829,
-            "mu_star": 0.6052299536973429,
-            "period": 2.621331736312295,
-            "reference_rate": 8.347835049891749e-07,
-            "phi": 38.97235270206339,
-            "alpha": 0.44646546358794825,
-            "stiffness_ratio": 0.573530636703891,
-            "load_velocity_ratio": 1.2036896528515733,
-        },
+        {"law": "slowness", "a": 0.004822260947305701, "b_over_a": 5.36849678524829,
+         "mu_star": 0.6052299536973429, "period": 2.621331736312295,
+         "reference_rate": 8.347835049891749e-07, "phi": 38.97235270206339,
+         "alpha": 0.44646546358794825, "stiffness_ratio": 0.573530636703891,
+         "load_velocity_ratio": 1.2036896528515733},
         49.20716,
     ),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("fields", "interval"), NEARLY_STOPPED)
@@ -316,13 +302,9 @@ def test_a_cycle_that_does_not_repeat_loosely_is_followed_as_asked():
     repeats; at 1e-7 they do. The interval is that of a cycle known to 1e-9, within its error.
     """
     scene = Scene(
-        law="slip",
-        normal_stress="constant",
-        inertia=True,
-        stiffness=0.0061621392251526965,
-        a=0.009975485653594105,
-        b_over_a=2.9636256702801482,
-    )
+        law="slip", normal_stress="constant", inertia=True, stiffness=0.0061621392251526965,
+        a=0.009975485653594105, b_over_a=2.9636256702801482,
+    )  # fmt: skip
     found, fine = (
         LimitCycle(phases=2)(scene, Accuracy(rtol, engine="compiled")) for rtol in (1e-7, 1e-9)
     )

@@ -9,6 +9,7 @@ import pytest
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
@@ -18,6 +19,7 @@ from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 
@@ -182,3 +184,54 @@ def test_time_without_a_clock_is_not_known():
     event = next(event for event in motion if event.watch is not None)
     assert math.isnan(event.time)
     assert math.isnan(event.slip)
+
+
+IMPOSED = {"normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 1.2}
+INCLINED = {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0, "stiffness_ratio": 1.2}
+
+
+@pytest.mark.parametrize("law", ["slip", "two_slowness_states", "cut_off"])
+@pytest.mark.parametrize("still", [IMPOSED, INCLINED], ids=["imposed", "inclined"])
+@pytest.mark.parametrize(
+    "idle",
+    [
+        {"normal_stress_step": 0.0}, {"oscillation_amplitude": 0.0}, {"normal_stress_ramp": 0.0},
+        {"velocity_ramp": 0.0}, {"hold_time": 0.0}, {"velocity_steps": 0.0},
+        {"radiation_damping": 0.0}, {"stress_dependence": 0.0}, {"inertia": False},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
+    """No unknown, no term, no other number, not even a function."""
+    if "stress_dependence" in idle and still is IMPOSED:
+        still = {**still, "normal_stress": "constant", "alpha": None}
+    plain = Scene(law=law, **still)
+    scene = plain.with_(**idle)
+    assert scene == plain
+    assert scene.numbers == plain.numbers
+    assert scene.functions is plain.functions
+    assert scene.states == plain.states
+
+
+@pytest.mark.parametrize("law", ["slip", "two_slowness_states"])
+@pytest.mark.parametrize("still", [IMPOSED, INCLINED], ids=["imposed", "inclined"])
+@pytest.mark.parametrize(
+    "change",
+    [{"normal_stress_step": 0.3}, {"oscillation_amplitude": 0.3}, {"normal_stress_ramp": 0.1}],
+    ids=str,
+)
+def test_steady_sliding_and_its_stability_are_those_before_normal_stress_changes(
+    change, still, law
+):
+    of_law = {"b1_over_a": 1.5} if law.startswith("two") else {}
+    still = Scene(law=law, **of_law, **still, load_velocity_ratio=3.0)
+    scene = still.with_(**change)
+    assert scene.critical_stiffness == still.critical_stiffness
+    assert scene.stiffness == still.stiffness
+    if "normal_stress_step" in change:  # after which sliding is steady at another stress
+        return
+    rates = growth_rates(still, still.log_load_rate)
+    assert growth_rates(scene, scene.log_load_rate) == pytest.approx(rates)
+    one, other = (LinearStability()(which, Accuracy()) for which in (scene, still))
+    assert one.status is other.status is Status.OK
+    assert dict(one.values) == pytest.approx(dict(other.values), rel=1e-12, nan_ok=True)

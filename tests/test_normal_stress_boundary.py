@@ -285,11 +285,9 @@ def test_the_survey_ends_where_steady_sliding_does():
 def test_a_search_that_loses_its_way_is_no_error():
     """Load point velocities between which the cycle that touches the norm comes and goes."""
     scene = Scene(
-        b_over_a=4.850646610655874,
-        stiffness_ratio=1.7752455184374996,
-        alpha=0.032329397553491325,
+        b_over_a=4.850646610655874, stiffness_ratio=1.7752455184374996, alpha=0.032329397553491325,
         phi=51.744165699143586,
-    )
+    )  # fmt: skip
     accuracy = replace(Accuracy(1e-7), budget=40_000)
     outcome = CriticalStep(direction="down")(scene, accuracy)
     assert outcome.status in (Status.OK, Status.STABLE_FOR_ALL_STEPS, Status.WORK_BUDGET_SPENT)

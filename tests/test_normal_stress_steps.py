@@ -53,15 +53,6 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
         assert point.log_slip_rate == pytest.approx(excess / scene.a, abs=1e-12)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_a_step_of_nothing_is_none(case):
-    """Every number of the equations is that of the scene without it."""
-    still = Scene(load_velocity_ratio=2.0, **CASES[case])
-    assert still.with_(normal_stress_step=0.0).numbers == still.numbers
-    segments = protocol([{"velocity": 2.0, "normal_stress": 1.0}])
-    assert Scene(loading=segments, **CASES[case]).acting(0).numbers == still.numbers
-
-
 def test_driving_that_is_inclined_adds_to_what_is_imposed():
     """``s = 1 + e + cot(phi) g`` along a whole motion, to rounding."""
     scene = Scene(phi=55.0, normal_stress_step=0.1, load_velocity_ratio=3.0, stiffness_ratio=2.0)
@@ -69,12 +60,6 @@ def test_driving_that_is_inclined_adds_to_what_is_imposed():
     deviation = motion["shear_stress"] - scene.mu_star
     expected = 1.1 + deviation / math.tan(math.radians(55.0))
     assert np.allclose(motion["normal_stress_ratio"], expected, rtol=1e-12, atol=0)
-
-
-def test_critical_stiffness_is_that_before_the_step():
-    for case in CASES.values():
-        still = Scene(**case)
-        assert still.with_(normal_stress_step=0.3).stiffness == still.stiffness
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])

@@ -11,13 +11,11 @@ import pytest
 from rsfstudy import Axis, Scene, Study, simulate
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import Kind, settling
 from rsfstudy.motion.meter import Meter
-from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 CASES = {
@@ -48,35 +46,6 @@ def test_the_amplitude_does_not_drift(rtol):
         assert abs(relief / 0.02) < 2.0 * math.pi * periods * rtol
     assert max(off) < 0.5 * rtol
     assert off[1] < 3.0 * off[0] + 1e-12
-
-
-def test_none_is_the_scene_without_it():
-    """No unknown, no term, no other number."""
-    still = Scene(load_velocity_ratio=2.0)
-    none = still.with_(oscillation_amplitude=0.0)
-    assert none == still
-    assert none.numbers == still.numbers
-    assert none.states == 1
-    assert none.functions is still.functions
-    again = still.with_(oscillation_amplitude=0.1).with_(oscillation_amplitude=0.0)
-    assert again == still
-
-
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("law", ["slip", "two_slowness_states"])
-def test_steady_sliding_and_its_stability_are_those_without_it(law, case):
-    of_law = {"b1_over_a": 1.5} if law.startswith("two") else {}
-    still = Scene(law=law, **of_law, **CASES[case], load_velocity_ratio=3.0, stiffness_ratio=1.2)
-    scene = still.with_(oscillation_amplitude=0.3)
-    assert scene.critical_stiffness == still.critical_stiffness
-    assert scene.stiffness == still.stiffness
-    rates = growth_rates(still, still.log_load_rate)
-    assert growth_rates(scene, scene.log_load_rate) == pytest.approx(rates)
-    one, other = (LinearStability()(which, Accuracy()) for which in (scene, still))
-    assert dict(one.values) == pytest.approx(dict(other.values), rel=1e-15, nan_ok=True)
-    assert one.status is Status.OK
-    one, other = (RigidResponse()(which, Accuracy()) for which in (scene, still))
-    assert one.values["evolution_distance"] == pytest.approx(other.values["evolution_distance"])
 
 
 def test_it_fades_in():

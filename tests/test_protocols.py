@@ -53,13 +53,6 @@ def test_protocols_are_what_their_fields_say():
     assert protocol(rows).lasts == 2.0 + 8.0 + 2.0
 
 
-def test_no_hold_and_no_step_are_none():
-    for idle in ({"hold_time": 0.0}, {"velocity_steps": 0.0}):
-        assert Scene(**STIFF, **idle) == Scene(**STIFF)
-    calm = Scene(**STIFF, hold_time=10.0).with_(hold_time=0.0, displacement_step=0.5)
-    assert calm == Scene(**STIFF, displacement_step=0.5)
-
-
 def test_a_field_of_a_protocol_is_an_axis():
     """Where it calls for no protocol, what is left is the step of other scenes."""
     study = Study(

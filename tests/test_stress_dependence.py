@@ -16,9 +16,8 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import laws, stability
+from rsfstudy.slider import stability
 from rsfstudy.slider.equations import relation_of
-from rsfstudy.slider.friction import plain
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.status import Status
@@ -56,15 +55,6 @@ def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
     shift, small = relation_of(scene)(g)[2], cot_phi(scene) * g
     series = g * (1.0 - small / 2.0 + small**2 / 3.0)
     assert shift == pytest.approx(series, rel=1e-15 + abs(small) ** 3)
-
-
-def test_without_it_nothing_is_added():
-    """Not even a function."""
-    for law in laws.PARTS:
-        for effects in ({}, CONSTANT):
-            usual, idle = Scene(law=law, **effects), Scene(law=law, stress_dependence=0, **effects)
-            assert idle.functions is usual.functions
-    assert Scene(**CONSTANT).functions.friction.strength is plain
 
 
 def worn(friction, ratio, change, p):
