@@ -70,14 +70,6 @@ def test_a_motion_knows_its_scene(scene, tmp_path):
     assert in_si.rsf.scene == scene
 
 
-def test_two_protocols_of_one_name_are_told_apart_by_their_segments():
-    motions = []
-    for velocity in (2.0, 3.0):
-        loading = rsfstudy.protocol([{"velocity": velocity}], "same")
-        motions.append(rsfstudy.simulate(Scene(loading=loading), duration=0.1, rtol=1e-3))
-    assert [motion.rsf.scene.load_velocity for motion in motions] == [2.0, 3.0]
-
-
 def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     scene = Scene(stiffness_ratio=0.8)
     with pytest.warns(NoAnswer):

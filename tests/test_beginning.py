@@ -9,10 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from running import run
 
-import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures.triggered import Triggered
-from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.regimes import starting
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
@@ -59,16 +57,6 @@ def test_steps_come_on_top():
     assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
     assert after.spring_stress == scene.stiffness * 0.5
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)
-
-
-def test_the_limit_cycle_is_the_same_from_wherever_it_is_come_to():
-    scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    usual, healed = (
-        rsfstudy.limit_cycle(start, engine=COMPILED)
-        for start in (scene, scene.with_(initial_state=0.03, initial_stress=0.01))
-    )
-    errors = usual.recurrence_interval_error + healed.recurrence_interval_error
-    assert abs(usual.recurrence_interval - healed.recurrence_interval) <= errors
 
 
 def test_it_may_be_an_axis():

@@ -23,9 +23,10 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.regimes import error_of_slow_manifold
+from rsfstudy.motion.regimes import error_of_slow_manifold, on_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
+from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"

@@ -26,6 +26,12 @@ SCENES = {
     "record": Scene(**IMPOSED, stiffness=0.01, loading=RECORD),
     "ramp": Scene(**IMPOSED, stiffness=0.01, normal_stress_ramp=0.2, ramp_duration=8.0),
     "oscillation": Scene(**IMPOSED, stiffness=0.01, oscillation_amplitude=0.1),
+    "train": Scene(**IMPOSED, stiffness=0.01, oscillation_amplitude=0.05, oscillation_begin=3.0,
+                   oscillation_period=8.0, oscillation_cycles=1.1, oscillation_phase=30.0),
+    "train of the load point": Scene(
+        **PLAIN, stiffness=0.01, velocity_oscillation=0.05, oscillation_begin=3.0,
+        oscillation_period=8.0, oscillation_cycles=1.1, oscillation_phase=30.0,
+    ),
 }  # fmt: skip
 WHAT = ["shear_stress", "log10_slip_rate", "slip", "state_variable", "load_point_displacement"]
 

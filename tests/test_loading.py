@@ -16,7 +16,6 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.stability import growth_rates
@@ -75,24 +74,6 @@ def test_a_cut_changes_nothing(fields, cut):
         assert again.time == pytest.approx(event.time, rel=2e-6)
         assert again.slip == pytest.approx(event.slip, rel=2e-6)
         assert again.point.spring_stress == pytest.approx(event.point.spring_stress, abs=2e-6)
-
-
-def test_a_cut_in_the_second_half_of_a_rupture_keeps_its_momentum():
-    """Stress has dropped, and the slider is still fast."""
-    fields = {"stiffness_ratio": 0.5, "inertia": True}
-    whole = told(scene((1.0, 0.1, 20.0), **fields), minimum("spring_stress"), until=19.0)
-    arrest = next(e for e in whole if e.kind is Kind.MINIMUM and e.point.spring_stress < -0.4)
-    falling = fall("spring_stress", 0.9 * arrest.point.spring_stress)
-    fast = next(
-        e
-        for e in told(scene((1.0, 0.1, 20.0), **fields), falling, until=19.0)
-        if e.watch is falling
-    )
-    assert fast.regime == IN_RUPTURE
-    cut = told(scene((1.0, 0.1, fast.time), **fields), minimum("spring_stress"), until=19.0)
-    again = next(e for e in cut if e.kind is Kind.MINIMUM and e.point.spring_stress < -0.4)
-    assert again.slip == pytest.approx(arrest.slip, rel=1e-5)
-    assert again.point.spring_stress == pytest.approx(arrest.point.spring_stress, rel=1e-5)
 
 
 @pytest.mark.parametrize(

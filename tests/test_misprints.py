@@ -1,5 +1,5 @@
-"""Each misprint that `studies/MISPRINTS.md` corrects: the corrected formula holds, the printed one
-does not.
+"""Misprints that `studies/MISPRINTS.md` corrects: the corrected formula holds, the printed one does
+not.
 """
 
 import math
@@ -12,7 +12,7 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.slider.equations import evolution_of, log_slip_rate_at, relation_of
+from rsfstudy.slider.equations import evolution_of, relation_of
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
@@ -58,31 +58,6 @@ def test_eq_11():
     assert quoted is not None
     numbers = [float(n) for n in re.findall(r"\d\.\d", quoted[1])]
     np.testing.assert_allclose(100.0 * short[1:], numbers, atol=0.051)
-
-
-def test_eq_13():
-    scene = Scene(alpha=0.56, b_over_a=2.0, stiffness_ratio=1.0)
-    jump = scene.stiffness / (scene.b_over_a - 1.0)
-    state = -scene.alpha * math.log1p(cot_phi(scene) * jump)
-    held = (1.0 - cot_phi(scene) * (scene.mu_star + state)) * jump - state
-    corrected = held / scene.a / (1.0 + cot_phi(scene) * jump)
-    assert corrected == pytest.approx(log_slip_rate_at(scene, jump, 0.0), rel=1e-12)
-    assert math.exp(corrected) == pytest.approx(2.6975, abs=5e-5)
-    printed = (1.0 - cot_phi(scene) * (scene.mu_star + state) * jump - state) / scene.a
-    assert abs(printed / (1.0 + cot_phi(scene) * jump) - corrected) > 1.0
-
-
-def test_eq_17a():
-    """The corrected stress starts with the direct effect and ends in steady state."""
-    scene = Scene(normal_stress="constant", law="slowness")
-    x = math.log(200.0)
-
-    def stress(slip: float) -> float:
-        evolving = scene.b * math.log1p(math.expm1(x) * math.exp(-slip))
-        return scene.mu_star + (scene.a - scene.b) * x + evolving
-
-    assert stress(0.0) == pytest.approx(scene.mu_star + scene.a * x, rel=1e-14)
-    assert stress(60.0) == pytest.approx(scene.mu_star + (scene.a - scene.b) * x, rel=1e-12)
 
 
 def test_the_axis_of_figure_5():

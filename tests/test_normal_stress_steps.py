@@ -10,13 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rsfstudy import Laboratory, Scene, protocol, simulate
+from rsfstudy import Laboratory, Scene, simulate
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.regimes import starting
-from rsfstudy.slider.point import Point
 
 CASES = {
     "imposed": {"normal_stress": "imposed", "alpha": 0.3},
@@ -90,25 +88,6 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
         assert reaches_norm(stepped, Accuracy(1e-9), Meter(100_000)) is reached
-
-
-@pytest.mark.parametrize("inertia", [False, True])
-@pytest.mark.parametrize("case", CASES)
-def test_a_cut_after_a_step_changes_nothing(case, inertia):
-    """A protocol that says the same again: as far as the tolerance of both tells."""
-    scene = Scene(inertia=inertia, stiffness_ratio=1.5, **CASES[case])
-    once = protocol([{"velocity": 2.0, "normal_stress": 1.02, "duration": 6.0}])
-    first = {"velocity": 2.0, "normal_stress": 1.02, "duration": 2.5}
-    twice = protocol([first, {"velocity": 2.0, "duration": 3.5}])
-    whole, cut = (_at(scene.with_(loading=kind), 6.0) for kind in (once, twice))
-    assert whole.spring_stress == pytest.approx(cut.spring_stress, abs=1e-6)
-    assert whole.normal_stress == pytest.approx(cut.normal_stress, rel=1e-6)
-    assert whole.log_slip_rate == pytest.approx(cut.log_slip_rate, abs=1e-6)
-
-
-def _at(scene: Scene, time: float) -> Point:
-    *_earlier, end = follow(scene, Accuracy(1e-9), Meter(100_000), until=time)
-    return end.point
 
 
 def test_units_of_the_rig():

@@ -1,10 +1,8 @@
 """Protocols of the laboratory are segments of loading: identities, then what they cost."""
 
 import copy
-import cProfile
 import json
 import pickle
-import pstats
 
 import cloudpickle
 import numpy as np
@@ -84,21 +82,6 @@ def test_a_very_long_hold_ends_when_it_should(engine):
     assert events[-1].time == 1e10 + 40.0
     motion = simulate(scene, duration=1e10 + 40.0, engine=engine)
     assert (np.diff(motion.time) > 0.0).all()
-
-
-def test_work_grows_with_the_number_of_segments():
-    """Ten times the segments take ten times the right-hand sides, and calls of any function."""
-    work, calls = [], []
-    for segments in (1, 100, 1000):  # the first brings in what is imported late
-        scene = Scene(
-            **STIFF, velocity_steps=segments, velocity_ratio=2.0, displacement_between_steps=1.0
-        )
-        with cProfile.Profile() as profile:
-            motion = simulate(scene, duration=0.75 * segments, rtol=1e-4)
-        calls.append(pstats.Stats(profile).total_calls)
-        work.append(motion.attrs["rhs_evaluations"])
-    assert work[2] == pytest.approx(10.0 * work[1], rel=0.05)
-    assert calls[2] == pytest.approx(10.0 * calls[1], rel=0.1)
 
 
 def test_protocols_differ_by_their_segments(tmp_path):

@@ -190,20 +190,6 @@ def test_slip_rate_jumps_where_it_begins():
         assert x[first + 1] - x[first] == pytest.approx(jump, rel=1e-3)
 
 
-@pytest.mark.parametrize("field", ["oscillation_amplitude", "velocity_oscillation"])
-def test_a_motion_that_ended_within_a_train_goes_on(field):
-    stressed = IMPOSED if field.startswith("osc") else {}
-    scene = Scene(**STABLE, **stressed, **{field: 0.05}, **TRAIN)
-    whole = simulate(scene, duration=30.0, engine=COMPILED)
-    for cut in (1.0, BEGIN, 10.0, END, 25.0):
-        part = simulate(scene, duration=cut, engine=COMPILED)
-        rest = simulate(scene, duration=30.0 - cut, start=part, engine=COMPILED)
-        assert float(rest.shear_stress[-1]) == pytest.approx(
-            float(whole.shear_stress[-1]), abs=1e-8
-        )
-        assert float(rest.slip[-1]) == pytest.approx(float(whole.slip[-1]), abs=1e-6)
-
-
 def test_what_is_not_stated_is_no_part_of_names_and_declarations():
     """Keys of cells are those of before there were trains."""
     kept = {

@@ -167,16 +167,3 @@ def test_a_motion_that_begins_beyond_the_norm_says_so():
     at = motion.sel(time=float(motion.instability_time), method="nearest")
     # samples are a few tenths of a power of ten apart
     assert float(at.log10_slip_rate) == pytest.approx(6.0, abs=0.5)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_values_at_times_that_were_asked_for(engine):
-    """As accurate as the motion: those of motions that end there, a hold within it included."""
-    scene = Scene(normal_stress="constant", stiffness_ratio=3.0, hold_time=4.0)
-    times = [0.0, 1.0, 4.0, 4.5, 20.0]
-    motion = rsfstudy.simulate(scene, times=times, rtol=1e-9, engine=engine)
-    np.testing.assert_array_equal(motion.time, times)
-    for at, stress in zip(times[1:], motion.shear_stress[1:], strict=True):
-        ends = rsfstudy.simulate(scene, duration=at, rtol=1e-9, engine=engine).shear_stress[-1]
-        assert float(stress) == pytest.approx(float(ends), abs=1e-8)
-    assert motion.load_point_displacement[-1] == pytest.approx(16.0, abs=1e-9)
