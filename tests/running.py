@@ -28,6 +28,7 @@ from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.compute import cells, plan
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.engines import COMPILED
@@ -50,6 +51,17 @@ HANGS = 1200.0
 def run(study=SMALL, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def study_of(name, measure, *axes, base=None, **fields) -> Study:
+    """A study, of scenes as they are by default unless told otherwise."""
+    return Study(name=name, title=name, base=base or Scene(), axes=axes, measure=measure, **fields)
+
+
+def claimed(**fields) -> Claim:
+    """A claim that something is 1, to a tenth."""
+    usual = {"id": "C1", "statement": "", "source": "", "where": {}, "published": 1.0}
+    return Claim(**usual | {"tolerance": 0.1, "reason": ""} | fields)
 
 
 def cell_key(scene, measure) -> bytes:

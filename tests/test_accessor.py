@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from running import claimed
 
 import rsfstudy
 import rsfstudy.api.accessor  # datasets of others have it too, whichever test is the first
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider import laws
@@ -24,11 +24,8 @@ STUDY = Study(
     axes=[Axis("law", ["slip", "slowness"]), Axis("stiffness_ratio", [0.8, 1.2])],
     measure=CriticalStep(),
     claims=[
-        Claim(
-            id="S1", statement="a step", source="mathematics", variable="critical_velocity_ratio",
-            where={"law": "slip", "stiffness_ratio": 1.2}, published=1.0, tolerance=0.0,
-            relation="above", reason="it leads away",
-        )
+        claimed(variable="critical_velocity_ratio", where={"law": "slip", "stiffness_ratio": 1.2},
+                tolerance=0.0, relation="above")
     ],
 )  # fmt: skip
 SI = {"normal_stress": 1e8, "slip_distance": 1e-5}

@@ -7,9 +7,9 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import run
+from running import run, study_of
 
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.regimes import starting
 
@@ -62,12 +62,11 @@ def test_steps_come_on_top():
 def test_it_may_be_an_axis():
     """A slider that is stressed enough goes unstable by itself, under a load point at rest."""
     found = run(
-        Study(
-            name="stressed",
-            title="Stress at the beginning",
+        study_of(
+            "stressed",
+            Triggered(),
+            Axis("initial_stress", [0.003, 0.01]),
             base=Scene(stiffness_ratio=0.5, load_velocity_ratio=0.0, normal_stress="constant"),
-            axes=[Axis("initial_stress", [0.003, 0.01])],
-            measure=Triggered(),
         )
     )
     assert found.unstable.values.tolist() == [0.0, 1.0]

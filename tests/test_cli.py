@@ -10,12 +10,11 @@ import pytest
 import xarray as xr
 from faulty import declared
 from running import SMALL as LATTICE
-from running import call, named_results
+from running import call, claimed, named_results
 
 import rsfstudy
 from rsfstudy.cli import assignments
 from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.claims import Claim
 from rsfstudy.files import store
 from rsfstudy.motion import engines
 from rsfstudy.status import Status
@@ -205,16 +204,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     the others are run, and a table says what became of each.
     """
     monkeypatch.setenv("COLUMNS", "150")
-    claim = Claim(
-        id="C1",
-        statement="the total is 3",
-        source="nowhere",
-        variable="total",
-        where={"b_over_a": 2.0},
-        published=3.0,
-        tolerance=0.1,
-        reason="a test",
-    )
+    claim = claimed(variable="total", where={"b_over_a": 2.0}, published=3.0)
     catalogued(
         replace(declared("raises", at=(2.5,)), name="failing"),
         replace(declared(), name="moving", claims=[claim]),

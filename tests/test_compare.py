@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from running import call, run
+from running import call, run, study_of
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures import Measure, Outcome
@@ -24,12 +24,12 @@ RATIOS = [1.5, 2.0, 2.5, 3.0]
 
 
 def study(*axes, measure=None, **fields):
-    return Study(
-        name="stiffness",
-        title="Critical stiffness",
+    return study_of(
+        "stiffness",
+        measure or LinearStability(),
+        *axes,
+        Axis("b_over_a", RATIOS),
         base=Scene(**fields),
-        axes=[*axes, Axis("b_over_a", RATIOS)],
-        measure=measure or LinearStability(),
     )
 
 

@@ -22,7 +22,7 @@ import click
 import numpy as np
 import pytest
 import xarray as xr
-from running import SMALL, call, run
+from running import SMALL, call, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, read_record
@@ -42,12 +42,11 @@ JUNK = [
     object(), int, np.ones(2), np.array("x", dtype=object), np.datetime64("2020"), xr.Dataset(),
     lambda: 1, ValueError("x"), Path("."), Path("a" * 5000), io.StringIO("a"),
 ]  # fmt: skip
-LATTICE = Study(
-    name="lattice",
-    title="A lattice",
-    base=Scene(),
-    axes=[Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])],
-    measure=LinearStability(),
+LATTICE = study_of(
+    "lattice",
+    LinearStability(),
+    Axis("law", ["slip", "slowness"]),
+    Axis("b_over_a", [1.5, 2.0, 3.0]),
 )
 
 

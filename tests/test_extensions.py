@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from frozen_scenes import Motion
 from rsfstudy.named_studies._phase_plane import scene_of
-from running import call, run, same_numbers
+from running import call, run, same_numbers, study_of
 from telling import apart, told
 
 import rsfstudy
@@ -485,8 +485,7 @@ def test_two_parts_of_one_scene_share_no_field():
 def test_a_field_that_would_be_mistaken_in_a_file(name):
     part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
     with pytest.raises(InvalidValue, match=f"field = '{name}': is the name of something else"):
-        Study(name="n", title="t", base=Scene(law=part), axes=[Axis("phi", [60])],
-              measure=LinearStability())  # fmt: skip
+        study_of("n", LinearStability(), Axis("phi", [60]), base=Scene(law=part))
 
 
 @dataclass(frozen=True)
@@ -507,18 +506,19 @@ def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
     """Here, and on workers that have only what they are sent; numbers, flags and texts of cells
     without them are left out.
     """
-    study = Study(
-        name="zipped", title="t", base=Scene(),
-        axes=[
-            Axis("case", {
+    study = study_of(
+        "zipped",
+        Held(),
+        Axis(
+            "case",
+            {
                 "ours": {"inertia": True},
                 "mine": {"dynamics": Sticky, "grip": 5.0},
                 "odd": {"law": Doubled, "is_odd": True, "loading": Steplike},
-            }),
-            Axis("b_over_a", [2.0, 3.0]),
-        ],
-        measure=Held(),
-    )  # fmt: skip
+            },
+        ),
+        Axis("b_over_a", [2.0, 3.0]),
+    )
     here = run(study)
     assert here.held.isel(b_over_a=0).values.tolist() == [0.0, 5.0, 10.0]
     assert here.dynamics.values.tolist() == ["", "sticky", ""]
@@ -564,14 +564,11 @@ def squares(dataset, axes):
 )
 def test_figures_that_are_none(plot, complaint):
     with pytest.raises(InvalidValue, match=complaint):
-        Study(
-            name="n", title="t", base=Scene(), axes=[Axis("phi", [60])], measure=Held(), plot=plot
-        )
+        study_of("n", Held(), Axis("phi", [60]), plot=plot)
 
 
 def test_a_module_or_a_function_draws(tmp_path):
-    study = Study(name="n", title="t", base=Scene(), axes=[Axis("phi", [60, 70])], measure=Held(),
-                  plot=squares)  # fmt: skip
+    study = study_of("n", Held(), Axis("phi", [60, 70]), plot=squares)
     dataset = run(study)
     assert json.loads(dataset.attrs["declaration"])["plot"] == "squares"
     assert plots.figure(dataset, squares).axes[0].get_title() == "squares"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, HANGS, QUIET, call, run, run_with_failures
+from running import FAULTY, HANGS, QUIET, call, run, run_with_failures, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -322,12 +322,11 @@ def test_a_missing_cell_is_refused_all_the_same():
 
 def test_the_run_passes_it_on(tmp_path):
     """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
-    study = Study(
-        name="budgeted",
-        title="One cell fails",
+    study = study_of(
+        "budgeted",
+        CriticalStep(of="displacement_step"),
+        Axis("b_over_a", [2.0, 2.5, 3.0, 3.5, 4.0]),
         base=Scene(normal_stress="constant"),
-        axes=[Axis("b_over_a", [2.0, 2.5, 3.0, 3.5, 4.0])],
-        measure=CriticalStep(of="displacement_step"),
         reductions=[LinearFit(name="slope", of="critical_displacement", on="a_over_b_minus_a")],
     )
     failing = CriticalStep.find

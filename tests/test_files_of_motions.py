@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call
+from running import call, study_of
 from scipy.io import loadmat
 
 import rsfstudy
@@ -136,9 +136,7 @@ def test_a_table_has_no_columns_that_never_change():
 def test_a_table_of_a_study_has_a_row_a_cell():
     axis = rsfstudy.Axis("stiffness_ratio", [0.5, 0.6, 0.7])
     measure = LimitCycle(phases=5)
-    study = rsfstudy.Study(
-        name="three", title="Three", base=SCENE, axes=[axis], measure=measure
-    )  # fmt: skip
+    study = study_of("three", measure, axis, base=SCENE)
     results = rsfstudy.run(
         study, workers=0, output=None, progress=False, engine="compiled", rtol=1e-3
     )

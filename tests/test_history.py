@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from extensions.order_four import OrderFour
-from running import called, run
+from running import called, run, study_of
 
 import rsfstudy
 from rsfstudy import (
     Axis,
     Laboratory,
     Scene,
-    Study,
     history,
     protocol,
     read_protocol,
@@ -171,12 +170,11 @@ def test_a_history_is_data():
     assert pickle.loads(pickle.dumps(one)) == copy.deepcopy(one) == one
     assert one.digest in repr(one)
     assert len(repr(one)) < 120
-    study = Study(
-        name="records",
-        title="Two records",
+    study = study_of(
+        "records",
+        StepResponse(peaks=2, phases=2),
+        Axis("loading", [one, other]),
         base=Scene(**PLAIN),
-        axes=[Axis("loading", [one, other])],
-        measure=StepResponse(peaks=2, phases=2),
     )
     assert study.shape == (2,)
     found = run(study, rtol=1e-4)
@@ -206,10 +204,12 @@ def test_results_hold_the_loadings_of_their_study(tmp_path):
     """
     steps = protocol([{"velocity": 3.0, "duration": 5.0}, {"velocity": 0.5}], "steps")
     record = history(wave(20))
-    study = Study(
-        name="records", title="A record and steps", base=Scene(**PLAIN),
-        axes=[Axis("loading", [record, steps])], measure=StepResponse(peaks=2, phases=2),
-    )  # fmt: skip
+    study = study_of(
+        "records",
+        StepResponse(peaks=2, phases=2),
+        Axis("loading", [record, steps]),
+        base=Scene(**PLAIN),
+    )
     run(study, rtol=1e-4, output=tmp_path, engine=COMPILED)
     Scene(**PLAIN, loading=history(wave(30)))
     results = rsfstudy.open(tmp_path / "records.nc")

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, called, run
+from running import call, called, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
@@ -147,10 +147,9 @@ def test_results_say_their_units():
 
 
 def test_axes_of_results_are_in_units_of_the_rig_too():
-    study = Study(
-        name="held", title="Holds", base=RIG.scene(**LAW), measure=Healing(phases=2),
-        axes=[Axis("hold_time", [10.0, 100.0])],
-    )  # fmt: skip
+    study = study_of(
+        "held", Healing(phases=2), Axis("hold_time", [10.0, 100.0]), base=RIG.scene(**LAW)
+    )
     shown = RIG.in_units(run(study, rtol=1e-4), length="um", time="min")
     assert shown.hold_time.attrs["units"] == "min"
     assert shown.hold_time.values == pytest.approx([10.0 / 6.0, 100.0 / 6.0])

@@ -9,12 +9,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import asked_for, call, run, same_numbers
+from running import asked_for, call, claimed, run, same_numbers, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute.plan import Plan
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.files import contents, restore
 from rsfstudy.files.lattice import coordinates
@@ -22,12 +21,12 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.status import Status
 
-BOTH = Study(
-    name="both",
-    title="Steps up and down",
+BOTH = study_of(
+    "both",
+    CriticalStep(of="displacement_step"),
+    Axis("direction", ["up", "down"]),
+    Axis("b_over_a", [2.0, 3.0]),
     base=Scene(normal_stress="constant"),
-    axes=[Axis("direction", ["up", "down"]), Axis("b_over_a", [2.0, 3.0])],
-    measure=CriticalStep(of="displacement_step"),
 )
 
 
@@ -182,11 +181,8 @@ def test_cells_differ_even_where_a_measure_does_not_say_so():
 
 
 def test_claims_and_selection_reach_a_place_on_the_axis():
-    claim = Claim(
-        id="X1", statement="down", source="here", variable="critical_displacement_stable",
-        where={"direction": "down", "b_over_a": 2.0},
-        published=0.0, relation="below", tolerance=0.0, reason="against the drive",
-    )  # fmt: skip
+    claim = claimed(id="X1", variable="critical_displacement_stable", published=0.0, tolerance=0.0,
+                    relation="below", where={"direction": "down", "b_over_a": 2.0})  # fmt: skip
     declared = replace(BOTH, claims=[claim])
     assert rsfstudy.check(run(declared)).verdict.tolist() == ["reproduced"]
     assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [

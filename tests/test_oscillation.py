@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 import pytest
+from running import study_of
 
-from rsfstudy import Axis, Scene, Study, simulate
+from rsfstudy import Axis, Scene, simulate
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
@@ -72,12 +73,11 @@ def test_it_never_settles(slider):
 
 
 def test_it_is_an_axis_and_a_file_holds_it():
-    study = Study(
-        name="oscillates",
-        title="Oscillates",
+    study = study_of(
+        "oscillates",
+        LinearStability(),
+        Axis("oscillation_amplitude", [0.0, 0.1]),
         base=Scene(normal_stress="imposed"),
-        axes=[Axis("oscillation_amplitude", [0.0, 0.1])],
-        measure=LinearStability(),
     )
     scenes = list(study.scenes())
     assert [scene.states for scene in scenes] == [1, 3]

@@ -6,11 +6,10 @@ import re
 
 import numpy as np
 import pytest
-from running import run, run_with_failures
+from running import claimed, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.quantity import Output, Quantity
@@ -246,8 +245,7 @@ def test_declarations_that_make_no_lattice(declared, complaint):
 
 def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
-    claim = Claim(id="T1", statement="", source="", variable="message", published=2.0,
-                  tolerance=0.0, reason="", where={"b_over_a": 2.0})  # fmt: skip
+    claim = claimed(id="T1", variable="message", where={"b_over_a": 2.0})
     with pytest.raises(InvalidValue, match="is no place of the lattice, in claim T1"):
         run(study(Own(), claims=[claim]))
 

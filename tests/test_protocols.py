@@ -8,7 +8,7 @@ import cloudpickle
 import numpy as np
 import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
-from running import run
+from running import run, study_of
 
 from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
 from rsfstudy.measures.healing import Healing
@@ -53,12 +53,8 @@ def test_protocols_are_what_their_fields_say():
 
 def test_a_field_of_a_protocol_is_an_axis():
     """Where it calls for no protocol, what is left is the step of other scenes."""
-    study = Study(
-        name="held",
-        title="Holds",
-        base=Scene(**STIFF),
-        axes=[Axis("hold_time", [0.0, 10.0, 100.0])],
-        measure=Healing(phases=2),
+    study = study_of(
+        "held", Healing(phases=2), Axis("hold_time", [0.0, 10.0, 100.0]), base=Scene(**STIFF)
     )
     found = run(study, rtol=1e-5)
     assert [bool(x) for x in found.healing.notnull()] == [False, True, True]
@@ -89,12 +85,11 @@ def test_protocols_differ_by_their_segments(tmp_path):
 
     def study(velocity: float) -> Study:
         loading = protocol([{"velocity": velocity, "duration": 1.0}, {"velocity": 1.0}], "own")
-        return Study(
-            name="told_apart",
-            title="Two protocols",
+        return study_of(
+            "told_apart",
+            StepResponse(peaks=2, phases=2),
+            Axis("b_over_a", [2.0]),
             base=Scene(**STIFF, loading=loading),
-            axes=[Axis("b_over_a", [2.0])],
-            measure=StepResponse(peaks=2, phases=2),
         )
 
     peaks = [
@@ -144,12 +139,12 @@ def test_protocols_are_pickled_by_their_segments(last):
 def test_protocols_are_points_of_an_axis():
     rows = [{"velocity": 3.0, "distance": 20.0}, {"velocity": 1.0}]
     up, higher = protocol(rows, "up"), protocol([{"velocity": 9.0}], "higher")
-    study = Study(
-        name="two_protocols",
-        title="Two protocols, two steps",
+    study = study_of(
+        "two_protocols",
+        VelocityStep(phases=2),
+        Axis("loading", [up, higher]),
+        Axis("step_number", [1, 2]),
         base=Scene(**STIFF),
-        axes=[Axis("loading", [up, higher]), Axis("step_number", [1, 2])],
-        measure=VelocityStep(phases=2),
     )
     found = run(study, rtol=1e-4)
     assert found.loading.values.tolist() == ["up", "higher"]

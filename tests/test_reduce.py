@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import Parting
 from rsfstudy.named_studies.rigid_response import Spread
 from rsfstudy.named_studies.stability_map import CyclingEdge
+from running import claimed
 from scipy.stats import linregress
 
 from rsfstudy.declare.claims import Claim, verdicts
@@ -199,17 +200,8 @@ def test_linear_fit_agrees_with_scipy(slope, noise):
 
 
 def claim(**fields) -> Claim:
-    defaults = {
-        "id": "C0",
-        "statement": "a claim",
-        "source": "nowhere",
-        "variable": "critical_velocity_ratio",
-        "where": {"a_over_b_minus_a": 1.0},
-        "published": 2.0,
-        "tolerance": 0.1,
-        "reason": "none",
-    }
-    return Claim(**{**defaults, **fields})
+    usual = {"variable": "critical_velocity_ratio", "where": {"a_over_b_minus_a": 1.0}}
+    return claimed(**usual | {"published": 2.0} | fields)
 
 
 @pytest.mark.parametrize(
@@ -237,27 +229,29 @@ def test_an_expected_difference_does_not_move():
     assert verdicts(lattice(np.full(5, 3.0)), off, {}).moved[0]
 
 
-def test_claims_do_not_apply_to_a_lattice_with_more_dimensions():
-    table = verdicts(lattice(np.full((2, 5), 2.0)), [claim()], {})
-    assert table.verdict[0] == "not applicable"
+PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
 
 
-def test_claims_on_places_that_are_not_there_do_not_apply():
-    table = verdicts(lattice(np.full(5, 9.0)), [claim(where={"a_over_b_minus_a": 0.7})], {})
-    assert (table.verdict[0], table.moved[0]) == ("not applicable", False)
-
-
-def test_a_claim_on_a_status_that_is_not_known_yet_is_undecided():
-    pending = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
-    on_status = claim(variable="status", where={"b_over_a": 2.0}, published=0.0)
-    assert verdicts(pending, [on_status], {}).verdict[0] == "undecided"
-
-
-def test_claims_do_not_apply_to_another_scene():
-    table = verdicts(lattice(np.full(5, 9.0)), [claim()], {"stiffness_ratio": 1.1})
-    assert table.verdict[0] == "not applicable"
-    other_axis = verdicts(lattice(np.full(5, 9.0)), [claim()], {"b_over_a": [2.0]})
-    assert other_axis.verdict[0] == "differs"
+@pytest.mark.parametrize(
+    ("dataset", "of", "overrides", "verdict"),
+    [
+        (lattice(np.full((2, 5), 2.0)), {}, {}, "not applicable"),
+        (lattice(np.full(5, 9.0)), {"where": {"a_over_b_minus_a": 0.7}}, {}, "not applicable"),
+        (lattice(np.full(5, 9.0)), {}, {"stiffness_ratio": 1.1}, "not applicable"),
+        (lattice(np.full(5, 9.0)), {}, {"b_over_a": [2.0]}, "differs"),
+        (PENDING, {"variable": "status", "where": {"b_over_a": 2.0}}, {}, "undecided"),
+        (reduced(lattice(1.0 + X), (FIT,)), {"variable": "zeta", "where": {}, "published": 1.0},
+         {}, "reproduced"),
+        # it was reduced along an axis that is another
+        (reduced(lattice(1.0 + X), (FIT,)), {"variable": "zeta", "where": {}, "published": 1.0},
+         {"b_over_a": [2.0]}, "not applicable"),
+    ],
+    ids=["dimensions", "no place", "scene", "axis", "not known yet", "reduced", "changed axis"],
+)  # fmt: skip
+def test_where_claims_apply(dataset, of, overrides, verdict):
+    table = verdicts(dataset, [claim(**of)], overrides)
+    assert table.verdict[0] == verdict
+    assert table.moved[0] == (verdict in ("differs", "undecided"))
 
 
 # ---- boundaries, levels, closed forms, paths ----------------------------------------------------
@@ -468,23 +462,6 @@ def test_reductions_of_reductions_keep_to_their_dimensions():
     assert result.apart.dims == ("law", "case")
     again = reduced(result, (Spread(name="s", of="slope", on="number"),))
     assert again.s.dims == ("case",)
-
-
-def test_claims_on_what_was_reduced_along_a_changed_axis_do_not_apply():
-    dataset = reduced(lattice(1.0 + X), (FIT,))
-    claim = Claim(
-        id="C",
-        statement="",
-        source="",
-        variable="zeta",
-        where={},
-        published=1.0,
-        tolerance=0.1,
-        reason="",
-    )
-    (as_declared,) = verdicts(dataset, [claim], {}).verdict
-    (changed,) = verdicts(dataset, [claim], {"b_over_a": [2.0]}).verdict
-    assert (as_declared, changed) == ("reproduced", "not applicable")
 
 
 # ---- where limit cycles end ---------------------------------------------------------------------

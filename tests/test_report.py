@@ -9,11 +9,10 @@ from urllib.parse import unquote
 import browser
 import pytest
 import xarray as xr
-from running import call, run
+from running import call, claimed, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
@@ -56,9 +55,8 @@ class Page(HTMLParser):
 def written(tmp_path_factory):
     """A directory with all kinds of files, and what the command said of it."""
     place = tmp_path_factory.mktemp("results")
-    claim = Claim(id="C1", statement=f"k {EVIL}", source="", variable="critical_stiffness",
-                  published=1.0, tolerance=0.5, reason="a test", relation="below",
-                  where={"law": "slip", "b_over_a": 2.0})  # fmt: skip
+    claim = claimed(statement=f"k {EVIL}", variable="critical_stiffness", tolerance=0.5,
+                    relation="below", where={"law": "slip", "b_over_a": 2.0})  # fmt: skip
     axes = [Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])]
     study = Study(name="fine", title=f"Fine {EVIL}", base=Scene(), axes=axes,
                   measure=LinearStability(), claims=[claim])  # fmt: skip

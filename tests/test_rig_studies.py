@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from running import called, run
+from running import called, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
@@ -173,9 +173,7 @@ def test_two_workers_and_what_is_finished_already(tmp_path, cluster):
 
 
 def test_without_a_rig_nothing_is_said_of_units():
-    plain = Study(
-        name="x", title="t", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=LinearStability()
-    )
+    plain = study_of("x", LinearStability(), Axis("b_over_a", [2.0]))
     described = plain.describe()
     assert "laboratory" not in described
     assert described["axes"] == [{"dimension": "b_over_a", "values": [2.0]}]
@@ -212,10 +210,7 @@ def test_what_states_the_same_takes_the_place_of_an_axis():
     velocities = study(RIG.axis("load_velocity", ["1 um/s"]))
     (axis,) = velocities.with_(load_velocity_ratio=3.0).axes
     assert axis == Axis("load_velocity_ratio", [3.0])
-    plain = Study(
-        name="plain", title="Plain", base=Scene(), measure=LimitCycle(),
-        axes=[Axis("stiffness_ratio", [0.5, 0.6])],
-    )  # fmt: skip
+    plain = study_of("plain", LimitCycle(), Axis("stiffness_ratio", [0.5, 0.6]))
     changed = plain.with_(stiffness=[0.01, 0.02])
     assert changed.axes == (Axis("stiffness", [0.01, 0.02]),)
     assert changed.scene(1).stiffness == 0.02
@@ -334,9 +329,7 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
         RIG.in_units(cycles)
     one = cycles.isel(sigma_star=0, slip_distance=1)
     xr.testing.assert_allclose(RIG.in_units(one), one.rsf.to_si(), rtol=1e-12)
-    plain = run(Study(
-        name="x", title="t", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=LinearStability()
-    ))  # fmt: skip
+    plain = run(study_of("x", LinearStability(), Axis("b_over_a", [2.0])))
     with pytest.raises(InvalidValue, match="is not in the dataset"):
         plain.rsf.in_units()
 

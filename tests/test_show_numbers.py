@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from running import call, run
+from running import call, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -16,12 +16,11 @@ from rsfstudy.status import Status
 
 @pytest.fixture(scope="module")
 def map_of_stiffness():
-    study = Study(
-        name="stiffness",
-        title="Critical stiffness",
-        base=Scene(),
-        axes=[Axis("law", ["slip", "slowness"]), Axis("b_over_a", np.linspace(1.5, 6.0, 101))],
-        measure=LinearStability(),
+    study = study_of(
+        "stiffness",
+        LinearStability(),
+        Axis("law", ["slip", "slowness"]),
+        Axis("b_over_a", np.linspace(1.5, 6.0, 101)),
     )
     return run(study)
 

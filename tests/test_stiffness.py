@@ -5,9 +5,10 @@ weakening, which have no critical stiffness.
 import math
 
 import pytest
+from running import study_of
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -39,13 +40,8 @@ def test_one_of_them_sets_the_spring():
 
 
 def test_stiffness_is_an_axis(tmp_path):
-    study = Study(
-        name="springs",
-        title="Boundary against stiffness",
-        base=Scene(),
-        axes=[Axis("stiffness", [0.018, 0.02])],
-        measure=CriticalStep(),
-        accuracy=Accuracy(1e-4),
+    study = study_of(
+        "springs", CriticalStep(), Axis("stiffness", [0.018, 0.02]), accuracy=Accuracy(0.0001)
     )
     dataset = rsfstudy.run(study, workers=0, output=tmp_path, progress=False)
     assert dataset.critical_velocity_ratio.dims == ("stiffness",)

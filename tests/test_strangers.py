@@ -14,13 +14,12 @@ import pytest
 import xarray as xr
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from running import FAULTY, called, run
+from running import FAULTY, called, claimed, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import terminal
 from rsfstudy.cli.console import console
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import contents, restore, store
 from rsfstudy.measures.linear_stability import LinearStability
@@ -41,16 +40,12 @@ TINY = Study(
         LinearFit(name="slope", of="critical_stiffness", on="log_load_velocity_ratio"),
     ],
     claims=[
-        Claim(
-            id="C1",
-            statement="critical stiffness is b - a",
-            source="eq. 7",
+        claimed(
             variable="critical_stiffness",
             where={"case": "constant", "load_velocity_ratio": 1.0},
             published=0.0145,
             tolerance=1e-6,
-            reason="six digits",
-        )
+        ),
     ],
     references=["a paper"],
 )
