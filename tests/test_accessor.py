@@ -165,14 +165,6 @@ def test_results_are_checked_drawn_and_converted(results):
     np.testing.assert_allclose(velocity, results.critical_velocity_ratio * 1e-5 * 1.17e-8)
 
 
-def test_a_motion_is_drawn_in_any_units():
-    motion = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=0.5, rtol=1e-3)
-    drawn = motion.rsf.plot(against="time")
-    assert drawn.axes[1].get_xlabel() == "Time since the step ($D_c/V_*$)"
-    in_si = motion.rsf.to_si(**SI).rsf.plot(against="time")
-    assert in_si.axes[1].get_xlabel() == "Time since the step (s)"
-
-
 @pytest.mark.parametrize(
     "ask",
     [

@@ -1,13 +1,11 @@
 """The command line: what it prints, what it writes, and its exit statuses."""
 
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
 
 import pytest
-import xarray as xr
 from faulty import declared
 from running import SMALL as LATTICE
 from running import call, claimed, named_results
@@ -52,13 +50,6 @@ def test_run_writes_the_dataset_and_the_figure_and_prints_what_it_found(results)
     assert (output / f"{NAME}.png").read_bytes().startswith(b"\x89PNG")
     for words in ("zeta", "0.9999", "C6", "C7", "reproduced", "9 ok", "right-hand sides"):
         assert words in said
-
-
-def test_run_again_computes_nothing(results):
-    output, _said = results
-    before = xr.load_dataset(output / f"{NAME}.nc")
-    assert call("run", NAME, *SMALL, "--output", output).returncode == 0
-    xr.testing.assert_equal(before, xr.load_dataset(output / f"{NAME}.nc"))  # wall times too
 
 
 def test_check_a_name_and_a_file(results):
@@ -121,13 +112,6 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     assert settings[1].split("=")[0] in ran.stdout
     # a slope needs more than one point
     assert ("no zeta: among these cells" in ran.stdout) == (settings[1] == "b_over_a=1.5")
-
-
-def test_plot_draws_beside_a_file(results, tmp_path):
-    output, _said = results
-    shutil.copy(output / f"{NAME}.nc", tmp_path)
-    assert call("plot", tmp_path / f"{NAME}.nc").returncode == 0
-    assert (tmp_path / f"{NAME}.png").exists()
 
 
 def test_list_and_show():

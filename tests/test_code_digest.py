@@ -335,17 +335,6 @@ def test_what_its_measure_draws_on_does(monkeypatch):
     assert physics_of(effects.study) != before
 
 
-def test_its_cells_and_those_of_an_edited_measure_are_not_mixed(tmp_path, monkeypatch):
-    fixed = {"coupling": "constant normal stress", "dynamics": "quasi-static", "engine": "compiled"}
-    options = {**fixed, "output": tmp_path, "workers": 0, "progress": False}
-    rsfstudy.run("effects", law="slip", **options)
-    monkeypatch.setattr(effects, "figure", None)
-    rsfstudy.run("effects", law=["slip", "slowness"], **options)
-    monkeypatch.setattr(effects, "_TURNS", 26)
-    with pytest.raises(DataError, match="physics: .* there, .* now"):
-        rsfstudy.run("effects", law=["slip", "slowness"], **options)
-
-
 LAW = """
 def rate(x):
     \"\"\"The rate.\"\"\"

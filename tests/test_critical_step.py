@@ -16,7 +16,6 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis import after_step
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.kinds_of_steps import RateSteps
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
@@ -82,16 +81,12 @@ def test_eq_14_displacement_step_at_a_large_norm(stiffness_ratio, b_over_a):
 
 
 @pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
-def test_phi_to_90_degrees_is_constant_normal_stress(of):
-    vanishing, error, _outcome = found(Scene(phi=90.0 - 1e-8), of)
-    absent, _error, _outcome = found(Scene(**CONSTANT), of)
-    assert vanishing == pytest.approx(absent, abs=2 * error + 1e-8)
-
-
-@pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
-def test_alpha_to_zero_is_the_effect_absent(of):
-    vanishing, error, _outcome = found(Scene(alpha=1e-9), of)
-    absent, _error, _outcome = found(Scene(alpha=0.0), of)
+@pytest.mark.parametrize(
+    ("faint", "without"), [({"phi": 90.0 - 1e-8}, CONSTANT), ({"alpha": 1e-9}, {"alpha": 0.0})]
+)
+def test_a_vanishing_effect_is_the_effect_absent(faint, without, of):
+    vanishing, error, _outcome = found(Scene(**faint), of)
+    absent, _error, _outcome = found(Scene(**without), of)
     assert vanishing == pytest.approx(absent, abs=2 * error + 1e-8)
 
 
@@ -496,23 +491,3 @@ def test_a_root_is_that_of_the_same_method_elsewhere():
         ends = function(low, 2.0), function(high, 2.0)
         assert root(low, high, *ends, finest, relative, 2.0) == expected
         assert len(asked) == how.function_calls
-
-
-@pytest.mark.parametrize("factor", [0.4, 3.0])
-@pytest.mark.parametrize("told", [1, -1])
-def test_the_search_begins_on_the_side_that_the_first_path_tells(factor, told):
-    """And goes on to the other where that was none."""
-    steps, asked = RateSteps(Scene(normal_stress="constant"), 1), list[float]()
-    guess = math.log(steps._guess())
-    root = guess + math.log(factor)
-
-    def misfit(log_size):
-        asked.append(log_size)
-        return told * (root - log_size)
-
-    smaller, larger = steps._bracket(misfit)
-    assert smaller < root < larger
-    first = next(log_size for log_size in asked if abs(log_size - guess) > 1e-9)
-    assert (first > guess) is ((factor > 1.0) is (told > 0))
-    if told > 0:
-        assert all((log_size - guess) * (root - guess) > -1e-9 for log_size in asked)

@@ -103,43 +103,6 @@ def test_number_of_unknowns(equations, unknowns):
     assert len(equations.rates([0.01] * unknowns)) == unknowns
 
 
-def reached(function: types.FunctionType, seen: dict | None = None) -> dict:
-    """The functions of ours that a function may call, by what it calls them."""
-    seen = {} if seen is None else seen
-    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-    called = {name: function.__globals__.get(name) for name in function.__code__.co_names}
-    for name, value in (called | {name: cell.cell_contents for name, cell in cells}).items():
-        if isinstance(value, types.FunctionType) and value not in seen.values():
-            seen[name] = value
-            reached(value, seen)
-    return seen
-
-
-#: What the equations of any scene call.
-ALWAYS = {"against", "balance", "strength", "velocity_ratios", "evolutions", "evolution"}
-#: What takes them along the path.
-ALWAYS |= {"state_sum", "times", "path_metric"}
-#: What mass adds.
-OF_MASS = {"resistance", "resisted", "weight_at", "without_mass", "ahead", "contribution"}
-#: What normal stress adds that follows shear stress.
-OF_STRESS = {"stress", "normal_stress", "coefficient"}
-
-
-@pytest.mark.parametrize(
-    ("fields", "more"),
-    [
-        ({"normal_stress": "constant"}, set()),
-        ({"alpha": 0.0}, OF_STRESS),
-        ({}, OF_STRESS | {"state_effect"}),
-        ({"normal_stress": "constant", "radiation_damping": 0.1}, set()),
-        ({"normal_stress": "constant", "inertia": True}, OF_MASS),
-    ],
-)
-def test_an_absent_effect_is_out_of_reach(fields, more):
-    rate = between_ruptures(Scene(**fields), clock=False).rate
-    assert set(reached(rate)) == ALWAYS | more
-
-
 def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     """None holds a number of a scene: those are arguments."""
     one, other = (
@@ -150,9 +113,8 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     assert one.point is other.point
     assert one.p != other.p
     assert all(isinstance(number, float) for number in one.p)
-    for function in (one.rate, *reached(one.rate).values()):
-        cells = (cell.cell_contents for cell in function.__closure__ or ())
-        assert all(isinstance(value, types.FunctionType | int) for value in cells)
+    cells = (cell.cell_contents for cell in one.rate.__closure__ or ())
+    assert all(isinstance(value, types.FunctionType | int) for value in cells)
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():

@@ -24,7 +24,6 @@ from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.slider import laws, places, registry
@@ -112,17 +111,6 @@ def test_its_motions_are_the_same_compiled(name, outside):
     assert of_steps < 1e-8
 
 
-def test_a_cell_by_the_command(outside):
-    example = outside["saturating_law"]
-    cell = [w for n, v in PLACES["saturating_law"].items() for w in ("--cell", f"{n}={v}")]
-    ran = call("rerun", example.file, "--study", example.study, *cell)
-    assert ran.returncode == 0, ran.stderr
-    assert "sharpness = 0.5" in ran.stdout
-    shown = call("show", example.study, "--set", "law=slip,saturating", "--set", "sharpness=0:1:3")
-    assert (shown.returncode, shown.stderr) == (0, "")
-    assert "slip, saturating" in shown.stdout
-
-
 def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
     example = outside["saturating_law"]
     about = rsfstudy.open(example.file).sharpness.attrs
@@ -184,18 +172,6 @@ def test_a_hold_and_a_reload(outside):
     peak = b * np.log(hold) - a * b * math.log(stiffness / b) / (stiffness - b)
     assert found.dataset.peak_stress.values[0] == pytest.approx(peak.values[0], rel=1e-4)
     assert found.dataset.peak_stress.values[1] == pytest.approx(peak.values[1], rel=1e-6)
-
-
-def test_the_whole_history_is_one_motion(outside):
-    """Time, slip and load point displacement run through the segments, and so does the spring."""
-    scene = catalogue.load(str(outside["hold_and_reload"].study)).base.with_(rest_time=1000.0)
-    motion = rsfstudy.simulate(scene, duration=1500.0)
-    assert motion.attrs["status"] == "ok"
-    assert (np.diff(motion.time) > 0.0).all()
-    assert motion.time.values[-1] == pytest.approx(1500.0, rel=1e-12)
-    load = np.maximum(motion.time - 1000.0, 0.0)
-    spring_stress = scene.mu_star + scene.stiffness * (load - motion.slip)
-    np.testing.assert_allclose(motion.shear_stress, spring_stress, atol=1e-12)
 
 
 def test_the_symmetric_law(outside):
@@ -306,21 +282,6 @@ def test_figures_of_rsfstudy_know_the_scenes(outside):
         cell = outside[name].dataset.sel(place)
         (ours,) = {c.scene for c in study.cells()} & {scene_of(cell)}
         assert {n: ours.as_dict()[n] for n in place} == place
-
-
-def test_an_altered_base_is_refused_by_its_path(outside, tmp_path):
-    dataset = rsfstudy.open(outside["saturating_law"].file)
-    declared = json.loads(dataset.attrs["declaration"])
-    for change, complaint in (
-        ({"sharpness": "much"}, "base.sharpness is refused .Expected `float . null`"),
-        ({"sharpness": 7.0}, "base.sharpness is refused .*must not exceed 1"),
-        ({"novel": 1.0}, "declaration.base.novel is unknown"),
-        ({"law": "other"}, "declaration.base.(law|sharpness) is (refused|unknown)"),
-    ):
-        other = {**declared, "base": {**declared["base"], **change}}
-        altered = dataset.assign_attrs(declaration=json.dumps(other))
-        with pytest.raises(DataError, match=complaint):
-            restore.study_of(altered, outside["saturating_law"].study)
 
 
 def test_edited_code_is_refused_with_the_journal(tmp_path):

@@ -250,20 +250,6 @@ def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
         run(study(Own(), claims=[claim]))
 
 
-def test_numbers_named_as_those_of_a_fit_are_only_numbers(tmp_path, capsys):
-    """A run prints the slopes of its reductions, not what looks like one."""
-    from rsfstudy.cli import terminal
-
-    class Likely(Own):
-        variables = dict.fromkeys(("total", "total_stderr", "cheapest_integrator"), ())
-
-    done = run(study(Likely()))
-    terminal.report(done, terminal.ended(done, "own", 1.0, True), [tmp_path / "own.nc"])
-    said = capsys.readouterr().out
-    assert "own: 2 ok" in said
-    assert "standard error" not in said
-
-
 # ---- outcomes that cannot be --------------------------------------------------------------------
 
 

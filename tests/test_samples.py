@@ -242,12 +242,6 @@ def test_draws_of_a_fit_are_cases_of_a_rig(fitted):
 # ---- what is refused ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("field", [lambda d: d["x"] + 1j, lambda d: d["x"][:3]])
-def test_a_field_is_a_number_for_each_sample(field):
-    with pytest.raises(InvalidValue, match="gives no number for each sample"):
-        Axis.samples({"x": norm(0.0, 1.0)}, 8, fields={"a": field})
-
-
 def test_what_is_no_table():
     for table, message in (
         (pd.Series([0.01], name="a"), "is no table of columns"),

@@ -14,7 +14,7 @@ import pytest
 from conftest import EACH_STEP
 from scipy.integrate import BDF, DOP853, RK45, Radau, solve_ivp
 
-from rsfstudy import Scene, simulate
+from rsfstudy import Scene
 from rsfstudy.motion import layout
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.columns import filling, unpacking
@@ -132,20 +132,6 @@ def test_plain_python_takes_the_steps_of_scipy(equations, y, steps, backward):
     assert math.copysign(1.0, ours[0][-1]) == (-1.0 if backward else 1.0)
     assert abs(ours[1].spent - theirs[1].spent) <= 2
     assert ours[1].steps == theirs[1].steps == steps
-
-
-def test_a_trajectory_in_plain_python_is_that_of_scipy():
-    """Through a rupture, recorded within all steps."""
-    ours, theirs = (
-        simulate(Scene(**CYCLE), duration=20.0, rtol=1e-5, engine=by) for by in (PYTHON, SCIPY)
-    )
-    assert ours.attrs["engine"] == PYTHON
-    assert set(np.unique(ours["regime"])) == {1, 2}
-    assert ours.sizes["time"] == pytest.approx(theirs.sizes["time"], rel=0.02)
-    for name in ("log10_slip_rate", "shear_stress", "state_variable"):
-        for extreme in ("min", "max"):
-            one, other = (float(getattr(motion[name], extreme)()) for motion in (ours, theirs))
-            assert one == pytest.approx(other, rel=1e-4)
 
 
 # ---- what a stepper owes the loop ----------------------------------------------------------------

@@ -1,13 +1,18 @@
 """A study in a file of the user's own: it runs by its path, and what is wrong with it is told."""
 
-import sys
+from dataclasses import dataclass
+from typing import ClassVar
 
 import pytest
-from running import call
+import xarray as xr
+from running import run, study_of
 
 import rsfstudy
+from rsfstudy import Axis
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.reduce import Reduction
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -22,55 +27,11 @@ study = Study(
 )
 """
 
-OWN_MEASURE = """
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
-
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.status import Status
-
-
-@dataclass(frozen=True)
-class Stiffness(Measure):
-    name: ClassVar[str] = "spring"
-    headline = "spring"
-    variables = {"spring": (), "spring_error": ()}
-    typical_work = 1
-
-    def find(self, scene, accuracy, meter):
-        return Outcome(Status.OK, {"spring": scene.stiffness, "spring_error": 0.0})
-
-
-study = Study(
-    name="own", title="My own measure", base=Scene(), axes=[Axis("phi", [55, 65])],
-    measure=Stiffness(),
-)
-"""
-
 
 def written(tmp_path, text: str) -> str:
     path = tmp_path / "mine.py"
     path.write_text(text)
     return str(path)
-
-
-def test_a_file_runs_by_its_path(tmp_path):
-    ran = call("run", written(tmp_path, DECLARATION), "--serial", "--output", tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    assert (tmp_path / "mine.nc").exists()
-    assert (tmp_path / "mine.png").exists()
-    assert rsfstudy.open("mine", tmp_path).sizes["phi"] == 2
-
-
-def test_a_measure_of_the_file_reaches_the_workers(tmp_path, cluster):
-    dataset = rsfstudy.run(
-        written(tmp_path, OWN_MEASURE), client=cluster, output=tmp_path, progress=False
-    )
-    assert (dataset.status == 0).all(), dataset.message.values
-    assert float(dataset.spring[0]) == rsfstudy.Scene(phi=55).stiffness
-    assert "study_file_mine" not in sys.modules
 
 
 CLAIM = """
@@ -128,11 +89,6 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
     assert complaint in str(refused.value)
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InvalidValue, match="is no file"):
-        catalogue.load(str(tmp_path / "nothing.py"))
-
-
 def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):
     (tmp_path / "my_angles.py").write_text("angles = [55, 65]")
     helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")
@@ -153,17 +109,6 @@ def test_a_reduction_that_does_not_fit_is_told_before_anything_is_computed(tmp_p
     assert not list(tmp_path.glob("*.sqlite"))
 
 
-def test_cells_that_cannot_be_reduced_are_kept(tmp_path):
-    """A reduction that fits the empty lattice and fails on the numbers loses nothing."""
-    failing = """
-from dataclasses import dataclass
-from typing import ClassVar
-
-import xarray as xr
-
-from rsfstudy.reduce import Reduction
-
-
 @dataclass(frozen=True)
 class Failing(Reduction):
     kind: ClassVar[str] = "failing"
@@ -173,11 +118,13 @@ class Failing(Reduction):
             raise ZeroDivisionError("on numbers")
         return xr.Dataset()
 
-"""
-    unfit = DECLARATION.replace(
-        "measure=", 'reductions=[Failing(name="s", of="critical_displacement")], measure='
-    )
+
+def test_cells_that_cannot_be_reduced_are_kept(tmp_path):
+    """A reduction that fits the empty lattice and fails on the numbers loses nothing."""
+    measure = CriticalStep(of="displacement_step")
+    failing = [Failing("s", "critical_displacement")]
+    study = study_of("mine", measure, Axis("phi", [55, 65]), reductions=failing)
     with pytest.raises(RunError, match="cannot be reduced .ZeroDivisionError: on numbers"):
-        rsfstudy.run(written(tmp_path, failing + unfit), output=tmp_path, progress=False, workers=0)
+        run(study, output=tmp_path)
     kept = rsfstudy.open(tmp_path / "mine.partial.nc")
     assert kept.critical_displacement.notnull().all()

@@ -195,12 +195,6 @@ def test_values_of_an_axis_are_numbers_of_one_spelling(text):
             assignments.setting(f"a={spaced}", ())
 
 
-def test_values_of_an_axis_that_are_numbers():
-    assert assignments.setting("a=1e-2", ()) == ("a", 0.01)
-    assert assignments.setting("a=1,+2.5,.5", ()) == ("a", [1.0, 2.5, 0.5])
-    assert assignments.setting("a=1:3: 3", ()) == ("a", [1.0, 2.0, 3.0])
-
-
 def test_long_texts_are_read_in_linear_time(tmp_path):
     """Cubic time would be 10^14 steps, and never end."""
     path, blanks = tmp_path / "test.csv", " " * 50_000
