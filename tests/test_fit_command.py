@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import synthetic_records as synthetic
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from running import call
@@ -28,38 +29,17 @@ COLUMNS = "time=t (s),displacement=lp (um),friction=mu"
 FIT = ("--columns", COLUMNS, "--stiffness", f"{STIFFNESS} /um", "--law", "slowness")
 
 
-def rows(seed: int = 0, noise: float = 3e-4) -> np.ndarray:
-    """Time, load point displacement and friction of two velocity steps, by Runge and Kutta in steps
-    of 1/400 of D_c; of each, the state is ln(theta V_0/D_c). Noise is correlated by .8.
+def rows() -> np.ndarray:
+    """Time, load point displacement and friction of two velocity steps, with noise correlated by
+    .8.
     """
-    a, b, dc, mu_star, trend = TRUE.values()
-
-    def slopes(mu: float, psi: float, load: float) -> tuple[float, float]:
-        rate = math.exp((mu - mu_star - b * psi) / a)
-        return STIFFNESS * (load - rate), (math.exp(-psi) - rate) / dc
-
-    time, place = 0.0, 0.0
-    mu, psi, found = mu_star, 0.0, []
-    for load, lasts, every in ((1.0, 100.0, 0.5), (10.0, 40.0, 0.1), (1.0, 300.0, 0.5)):
-        count = 10 * math.ceil(every * load * 40 / dc)
-        for _ in range(round(lasts / every)):
-            found.append((time, place, mu + trend * place))
-            h = every / count
-            for _ in range(count):
-                k1 = slopes(mu, psi, load)
-                k2 = slopes(mu + h / 2 * k1[0], psi + h / 2 * k1[1], load)
-                k3 = slopes(mu + h / 2 * k2[0], psi + h / 2 * k2[1], load)
-                k4 = slopes(mu + h * k3[0], psi + h * k3[1], load)
-                mu += h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0])
-                psi += h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1])
-            time, place = time + every, place + every * load
-    told = np.array(found)
-    rng = np.random.default_rng(seed)
-    last = 0.0
-    for n in range(len(told) if noise else 0):
-        last = 0.8 * last + 0.6 * rng.standard_normal()
-        told[n, 2] += noise * last
-    return told
+    loading = ((0.0, 1.0), (100.0, 10.0), (140.0, 1.0))
+    times = [np.arange(0.0, 100.0, 0.5), 100.0 + 0.1 * np.arange(400), np.arange(140.0, 440.0, 0.5)]
+    time = np.concatenate(times)
+    place = synthetic.load_point(loading, time)
+    friction = synthetic.motion("slowness", time, loading, TRUE | {"stiffness": STIFFNESS})[0]
+    noise = synthetic.correlated(len(time), 0.8, 3e-4, 0)
+    return np.column_stack([time, place, friction + TRUE["trend1"] * place + noise])
 
 
 @pytest.fixture(scope="module")

@@ -3,22 +3,18 @@ one friction relation for steady sliding, its stability and motions.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from conftest import cot_phi
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from running import SMALL, run
 from scipy.interpolate import PchipInterpolator
 from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
-from rsfstudy.declare.axis import Axis
-from rsfstudy.files.restore import study_of
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
@@ -31,13 +27,12 @@ from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
     between_ruptures,
     by_inertial_time,
-    in_rupture,
     rigid,
 )
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.places import DYNAMICS, FLUID
+from rsfstudy.slider.places import FLUID
 from rsfstudy.status import Status
 
 LAWS = PLAIN
@@ -191,28 +186,6 @@ def test_without_dilatancy_the_fluid_does_nothing(law, stress):
     assert peaks[1] == pytest.approx(peaks[0], abs=sum(errors))
 
 
-@pytest.mark.parametrize("fields", [{}, CONSTANT, {"inertia": True}, {"radiation_damping": 0.1}])
-def test_number_of_unknowns(fields):
-    """Two more than drained, which has none of its own: no unknown, no number, no function."""
-    scene, drained = dilatant(**fields), Scene(**fields)
-    assert (scene.states, drained.states) == (3, 1)
-    forms = [between_ruptures] if "inertia" not in fields else [between_ruptures, in_rupture]
-    for form in forms:
-        more, fewer = (
-            form(s) if form is in_rupture else form(s, clock=False) for s in (scene, drained)
-        )
-        assert more.unknowns[-2:] == ("porosity", "pore_pressure")
-        assert more.unknowns[:-2] == fewer.unknowns
-        assert (
-            len(more.rates((0.01,) * len(more.unknowns))) == len(more.scales) == len(more.unknowns)
-        )
-    assert [math.isnan(x) for x in drained.numbers[FLUID:DYNAMICS]] == [True, True, True]
-    assert [math.isnan(x) for x in scene.numbers[FLUID:DYNAMICS]] == [False, False, True]
-    at_rest, wet = drained.functions.friction.evolutions, scene.functions.friction.evolutions
-    assert "only" in at_rest.__qualname__
-    assert "with_auxiliary" in wet.__qualname__
-
-
 # ---- measures ------------------------------------------------------------------------------------
 
 
@@ -251,18 +224,6 @@ def test_a_hold_drains(law):
     assert left == pytest.approx(-porosity[-1] - pressure[-1], rel=1e-3)
 
 
-def test_a_trajectory_tells_pore_pressure_and_porosity():
-    fields = {"stiffness_ratio": 3.0, "load_velocity_ratio": 3.0, **CONSTANT}
-    motion = simulate(dilatant(**fields), duration=20.0)
-    assert motion.attrs["status"] == "ok"
-    assert motion["pore_pressure"].attrs["units"] == "1"
-    assert motion["pore_pressure"].attrs["scale"] == "sigma_*"
-    # normal stress is 1 - P, recorded from the same points
-    np.testing.assert_allclose(motion["normal_stress_ratio"], 1.0 - motion["pore_pressure"])
-    assert float(motion["porosity"][-1]) == pytest.approx(0.005 * math.log(3.0), abs=0.002)
-    assert "pore_pressure" not in simulate(Scene(load_velocity_ratio=3.0), duration=0.1)
-
-
 def test_effective_normal_stress_decides_whether_it_is_lost():
     """A motion ends by the normal stress of its points, and none begins without."""
     scene = dilatant(**CONSTANT)
@@ -272,20 +233,6 @@ def test_effective_normal_stress_decides_whether_it_is_lost():
     with pytest.raises(Halt) as halted:
         check_start(scene, there._replace(psis=(0.0, 0.0, 1.0)))
     assert halted.value.status is Status.NORMAL_STRESS_LOST
-
-
-def test_several_states_and_a_fluid():
-    """Two equal states are one, beside the states of a fluid too."""
-    fields = {"stiffness": 0.03, "load_velocity_ratio": 2.0}
-    parts = {"b1_over_a": 0.6, "b2_over_a": 1.4, "length_ratio": 1.0}
-    one, two = dilatant(**fields), dilatant(law="two_slip_states", **parts, **fields)
-    assert (one.states, two.states) == (3, 4)
-    assert two.critical_stiffness == pytest.approx(one.critical_stiffness, rel=1e-9)
-    rates = stability.growth_rates(two, 0.7)
-    for rate in stability.growth_rates(one, 0.7):
-        assert np.abs(rates - rate).min() < 1e-6 * abs(rate)
-    ends = [float(simulate(scene, duration=10.0)["shear_stress"][-1]) for scene in (one, two)]
-    assert ends[1] == pytest.approx(ends[0], abs=1e-7)
 
 
 # ---- scenes --------------------------------------------------------------------------------------
@@ -325,24 +272,6 @@ def test_a_fluid_of_your_own(law):
     assert np.abs(stability.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
     slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
     np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
-
-
-def test_a_study_of_fluids_is_restored():
-    """An axis may choose the fluid, and others belong to one choice."""
-    study = replace(
-        SMALL,
-        axes=(Axis("fluid", ["drained", "dilatant"]), Axis("dilatancy", [0.001, 0.002])),
-        base=SMALL.base.with_(fluid="dilatant", normal_stress="constant"),
-        measure=LinearStability(),
-        reductions=(),
-        claims=(),
-    )
-    dataset = run(study)
-    assert (dataset.status == int(Status.OK)).all()
-    again = study_of(dataset)
-    assert again.describe() == study.describe()
-    values = dataset.critical_stiffness
-    assert float(values[0, 0]) == float(values[0, 1]) > float(values[1, 0]) > float(values[1, 1])
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rsfstudy import Laboratory, Scene, simulate
+from rsfstudy import Laboratory, Scene
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
@@ -49,15 +48,6 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
     else:
         excess = scene.mu_star / ratio - scene.mu_star + alpha * math.log(ratio)
         assert point.log_slip_rate == pytest.approx(excess / scene.a, abs=1e-12)
-
-
-def test_driving_that_is_inclined_adds_to_what_is_imposed():
-    """``s = 1 + e + cot(phi) g`` along a whole motion, to rounding."""
-    scene = Scene(phi=55.0, normal_stress_step=0.1, load_velocity_ratio=3.0, stiffness_ratio=2.0)
-    motion = simulate(scene)
-    deviation = motion["shear_stress"] - scene.mu_star
-    expected = 1.1 + deviation / math.tan(math.radians(55.0))
-    assert np.allclose(motion["normal_stress_ratio"], expected, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
 import pytest
 from rsfstudy.named_studies._triggers import Triggers
 
@@ -12,11 +11,10 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import registry, stability, steady
-from rsfstudy.slider.equations import evolution_of
+from rsfstudy.slider import registry
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.normal_stress.variable import Variable
-from rsfstudy.slider.places import DYNAMICS, FLUID, LAW, NORMAL_STRESS, A
+from rsfstudy.slider.places import NORMAL_STRESS
 from rsfstudy.status import Status
 
 
@@ -46,40 +44,6 @@ def test_the_faster_a_state_falls_above_steady_sliding_the_smaller_the_critical_
     )
     assert prz < slip
     assert math.isnan(slowness) or slip < slowness
-
-
-def test_slopes_of_a_law_at_steady_sliding():
-    """Of order eight: 1e-14 where the law is smooth over a twentieth of ln V."""
-    for law in ("slip", "slowness", "perrin_rice_zheng"):
-        scene = Scene(law=law)
-        for log_slip_rate in (-5.0, 0.0, 3.0):
-            assert evolution_of(scene)(log_slip_rate, -scene.b * log_slip_rate) == pytest.approx(
-                0, abs=1e-15
-            )
-            slopes = stability.slopes_of_law(scene, steady.steady_sliding(scene, log_slip_rate))
-            assert np.ravel(slopes[0]) == pytest.approx(-scene.b, rel=1e-12)
-            assert np.ravel(slopes[1]) == pytest.approx(1.0, rel=1e-12)
-            assert np.ravel(slopes[2]) == pytest.approx(-1.0, rel=1e-12)
-
-
-def test_numbers_stand_where_their_parts_look_for_them():
-    scene = Scene(
-        alpha=0.3,
-        phi=70.0,
-        inertia=True,
-        stiffness=0.02,
-        load_velocity_ratio=2.0,
-        normal_stress_step=0.1,
-    )
-    p = scene.numbers
-    of_law = scene.a, scene.b, scene.mu_star
-    assert p[A:NORMAL_STRESS] == (*of_law, 0.02, 2.0, math.log(2.0), 0.0, 0.1)
-    cot_phi = 1.0 / math.tan(math.radians(70.0))
-    of_mass = scene.inertial_time, math.log(scene.inertial_time)
-    assert p[DYNAMICS : DYNAMICS + 2] == of_mass
-    assert p[NORMAL_STRESS : NORMAL_STRESS + 2] == (0.3, cot_phi)
-    assert p[LAW:] == (scene.b,)
-    assert all(math.isnan(p[place]) for place in range(FLUID, DYNAMICS))
 
 
 def test_a_part_owns_its_fields():

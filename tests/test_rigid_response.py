@@ -26,13 +26,19 @@ CONSTANT = {"normal_stress": "constant"}
 
 
 @pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 200.0, 1e4])
-def test_slowness_law_at_constant_normal_stress_is_eq_17a(rate):
-    """tau less mu_* sigma + a sigma ln V: -b ln V + b ln[1 + (V - 1) exp(-slip)]."""
+@pytest.mark.parametrize("law", ["slowness", "slip"])
+def test_stress_at_constant_normal_stress_is_eqs_17(law, rate):
+    """tau less mu_* sigma + a sigma ln V: -b ln V + b ln[1 + (V - 1) exp(-slip)], and
+    -b ln V [1 - exp(-slip)] by the slip law.
+    """
     scene = Scene()
-    exact = scene.mu_star + scene.a * math.log(rate) - scene.b * math.log(rate)
-    exact = exact + scene.b * np.log1p((rate - 1.0) * np.exp(-SLIP))
-    found = response(rate, law="slowness", **CONSTANT)
+    left = math.log(rate) * np.exp(-SLIP)
+    left = left if law == "slip" else np.log1p((rate - 1.0) * np.exp(-SLIP))
+    exact = scene.mu_star + (scene.a - scene.b) * math.log(rate) + scene.b * left
+    found = response(rate, law=law, **CONSTANT)
     np.testing.assert_allclose(found["shear_stress"], exact, atol=1e-9 * scene.a * 20)
+    np.testing.assert_allclose(found["state_variable"], scene.b * (left - math.log(rate)),
+                               atol=1e-9 * scene.a * 20)  # fmt: skip
 
 
 @pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 1e4])

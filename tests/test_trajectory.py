@@ -1,6 +1,5 @@
 """One motion as a labelled trajectory."""
 
-import json
 import math
 
 import numpy as np
@@ -54,21 +53,6 @@ def test_friction_law_holds_along_the_way():
     friction = motion.shear_stress / motion.normal_stress_ratio
     law = scene.mu_star + scene.a * math.log(10.0) * motion.log10_slip_rate + motion.state_variable
     np.testing.assert_allclose(friction, law, atol=1e-13)
-
-
-def test_stick_slip_runs_through_its_regimes_in_one_time():
-    scene = Scene(
-        normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True
-    )
-    motion = rsfstudy.simulate(scene, duration=100.0)
-    assert motion.attrs["status"] == "ok"
-    assert (np.diff(motion.time) > 0.0).all()
-    assert (np.diff(motion.slip) > -1e-9).all()
-    assert set(np.unique(motion.regime)) == {1, 2}
-    assert float(motion.log10_slip_rate.max()) == pytest.approx(9.39, abs=0.01)
-    assert float(motion.log10_slip_rate.min()) == pytest.approx(-1.397, abs=0.002)
-    work = json.loads(motion.attrs["rhs_evaluations_by_regime"])
-    assert sum(work.values()) == motion.attrs["rhs_evaluations"]
 
 
 def test_time_is_an_index_though_stress_jumps():

@@ -295,17 +295,6 @@ class ThreeSlipStates(laws.Law):
         return (*super().numbers(scene), self.second, self.third)
 
 
-@pytest.mark.parametrize("stress", [CONSTANT, {}])
-def test_three_of_one_length_are_one(stress):
-    for fields in ({"stiffness_ratio": 0.8, "inertia": True}, {"stiffness_ratio": 1.5}):
-        one, three = (
-            Scene(law=law, load_velocity_ratio=2.0, **fields, **stress)
-            for law in ("slip", ThreeSlipStates)
-        )
-        agree(LinearStability(), one, three)
-        agree(LimitCycle(phases=2) if "inertia" in fields else RigidResponse(points=3), one, three)
-
-
 @pytest.mark.parametrize("engine", [SCIPY, COMPILED])
 def test_two_of_three_lengths_alike_are_two(engine):
     """Three states of which two have one length are two."""
