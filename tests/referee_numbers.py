@@ -1,4 +1,4 @@
-"""Numbers that the problems of the referee ask for, each by two ways; see `referee_ways`."""
+"""Numbers that the problems of the referee ask for, and rows of answers; see `referee_ways`."""
 
 from __future__ import annotations
 
@@ -7,25 +7,21 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import mpmath
 import numpy as np
-from referee_ways import AsStated, InLogarithms, located
+from referee_ways import InLogarithms, by, located
 from scipy.optimize import brentq
 
 Numbers = dict[str, Any]
+UNITS = {
+    "time": "s", "event": "1", "friction": "1", "slip_rate": "m/s", "slip": "m", "theta": "s",
+    "theta_1": "s", "theta_2": "s", "normal_stress": "Pa", "pore_pressure": "Pa",
+    "critical_stiffness": "Pa/m", "growth_rate": "1/s", "angular_frequency": "1/s",
+    "critical_velocity": "m/s", "critical_displacement": "m", "recurrence_interval": "s",
+    "peak_slip_rate": "m/s", "slowest_slip_rate": "m/s",
+}  # fmt: skip
 
 
 # ---- steady sliding ------------------------------------------------------------------------------
-
-
-def two_states_in_closed_form(problem: dict[str, Any]) -> Numbers:
-    """The root of a quadratic equation: Gu et al. (1984), for the slip law with two states."""
-    s = AsStated(problem).s
-    (b_1, b_2), rho = (b / s.a for b in s.b), s.lengths[0] / s.lengths[1]
-    half = b_1 - 1 + rho * (2 * b_1 + (b_2 - 1) * (2 + rho))
-    under = half**2 + 4 * rho * (1 + rho) * (b_1 + b_2 - 1) * (1 + rho - b_1 - b_2 * rho)
-    ratio = (half + mpmath.sqrt(under)) / (2 + 2 * rho)
-    return {"critical_stiffness": ratio * s.a * s.sigma / s.lengths[0]}
 
 
 def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
@@ -41,18 +37,6 @@ def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
     scale = s.star / s.lengths[0]
     q = brentq(lambda q: stiffness(q).imag, 1e-3 * scale, 3.0 * scale, xtol=1e-300, rtol=1e-15)
     return {"critical_stiffness": stiffness(q).real}
-
-
-def growth_in_closed_form(problem: dict[str, Any]) -> Numbers:
-    """Of a quadratic equation, with stress over sigma, time in D_c/V_*."""
-    s = AsStated(problem).s
-    b, scale = s.b[0], s.sigma / s.lengths[0]
-    eta, k = s.eta * s.star / s.sigma, s.k / scale
-    half = ((b - k) / (s.a + eta) - 1) / 2
-    p = half + mpmath.sqrt(half**2 - k / (s.a + eta))
-    unit = s.star / s.lengths[0]
-    numbers = {"growth_rate": p.real * unit, "angular_frequency": abs(p.imag) * unit}
-    return numbers | {"critical_stiffness": (b - s.a - eta) * scale}
 
 
 def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
@@ -108,17 +92,6 @@ def of_velocity(kind: type, problem: dict[str, Any]) -> Callable[[Any], Any]:
     return excess
 
 
-def of_displacement(problem: dict[str, Any]) -> Callable[[Any], Any]:
-    """``displacement -> excess``, as stated."""
-
-    def excess(displacement: Any) -> Any:
-        way = AsStated(problem)
-        tau, *others = way.enter(way.begin(), mpmath.mpf(0), way.s.sigma)
-        return excess_of_peak(way, [tau + way.s.k * displacement, *others])
-
-    return excess
-
-
 def displacement_by_quadrature(problem: dict[str, Any]) -> float:
     """With the load point at rest ``du/d(slip) = h(u) (1 - b/a) - K/a`` is an equation of u =
     ln(theta V/2 D_c) alone, h = -sinh(u), and ``d ln V/d(slip) = -K/a - (b/a) h``: slip rate is
@@ -150,18 +123,6 @@ def displacement_by_quadrature(problem: dict[str, Any]) -> float:
     )
 
 
-def by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
-    """Where an excess vanishes, from close by."""
-    first, second = near, near * (1 + mpmath.mpf("1e-9"))
-    at_first, at_second = excess(first), excess(second)
-    for _ in range(12):
-        third = second - at_second * (second - first) / (at_second - at_first)
-        if abs(third - second) <= mpmath.mpf("1e-17") * abs(third):
-            break
-        first, at_first, second, at_second = second, at_second, third, excess(third)
-    return third
-
-
 # ---- limit cycles --------------------------------------------------------------------------------
 
 
@@ -191,20 +152,6 @@ def damped_cycle(kind: type, problem: dict[str, Any], closes: float) -> Numbers:
 # ---- all of them ---------------------------------------------------------------------------------
 
 
-def first_way(problem: dict[str, Any]) -> Numbers:
-    """Numbers by closed forms, and by the equations as stated."""
-    (name, *_others) = problem["quantities"]
-    if name == "critical_stiffness":
-        two = problem["law"] == "two_slip_states"
-        return (two_states_in_closed_form if two else growth_in_closed_form)(problem)
-    if name == "critical_velocity":
-        return {name: by_secant(of_velocity(AsStated, problem), mpmath.mpf("2.967e-6"))}
-    if name == "critical_displacement":
-        near = mpmath.mpf(repr(displacement_by_quadrature(problem)))
-        return {name: by_secant(of_displacement(problem), near)}
-    return damped_cycle(AsStated, problem, 1e-15)
-
-
 def second_way(problem: dict[str, Any]) -> Numbers:
     """The same by other formulations, in double precision."""
     (name, *_others) = problem["quantities"]
@@ -220,3 +167,13 @@ def second_way(problem: dict[str, Any]) -> Numbers:
     if name == "critical_displacement":
         return {name: displacement_by_quadrature(problem)}
     return damped_cycle(InLogarithms, problem, 1e-13)
+
+
+def by_second(problem: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of an answer, in double precision."""
+    return [second_way(problem)] if problem["report"] == "numbers" else by(InLogarithms, problem)
+
+
+def columns(problem: dict[str, Any]) -> list[str]:
+    key = {"series": ["time"], "peaks": ["event"], "numbers": []}[problem["report"]]
+    return [*key, *problem["quantities"]]

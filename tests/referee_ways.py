@@ -1,11 +1,9 @@
-"""Answers to the problems of the referee, by two ways that share neither equations nor arithmetic,
-and nothing of the package.
+"""Answers to the problems of the referee by a way that shares neither equations nor arithmetic with
+that by which they are written (`benchmarks/referee_answers.py`), and nothing of the package.
 
-The first solves the equations as the problems state them, in SI units: spring stress, theta in s
-and slip, slip rate by the friction law (or the root of it and damping), with 30 digits (mpmath).
-The second differentiates friction: ln(V/V_*), logarithms of theta, stress deviation and slip,
-dimensionless, in double precision. Both take extrapolated modified midpoint steps (Gragg, Bulirsch
-and Stoer), of order 20 and 14. `referee_answers` writes what both agree on.
+It differentiates friction: ln(V/V_*), logarithms of theta, stress deviation and slip,
+dimensionless, in double precision, by extrapolated modified midpoint steps (Gragg, Bulirsch and
+Stoer) of order 14.
 """
 
 from __future__ import annotations
@@ -170,120 +168,7 @@ def rest_of_composite(healing: Any, m: Any) -> Any:
     return u
 
 
-# ---- the first way: as stated --------------------------------------------------------------------
-
-
-class AsStated:
-    """Unknowns tau, thetas, slip, phi and p, and slip rate where there is mass, in SI units."""
-
-    def __init__(self, problem: dict[str, Any]) -> None:
-        self.s = s = Slider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
-        self.load, self.imposed = s.star, s.sigma
-        states = [abs(star) for star in s.theta_star]
-        self.steps = Steps(
-            20, mpmath.mpf("1e-19"), [s.sigma / 100, *states, *s.lengths[:1], 1, 1, s.star]
-        )
-        self.last = mpmath.mpf(0)
-
-    def begin(self) -> State:
-        s = self.s
-        rate, thetas = s.initial()
-        self.last = mpmath.log(rate / s.star)
-        psi = self._state(thetas)
-        tau = s.sigma * self._friction(self.last, psi) + s.eta * rate
-        return [tau, *thetas, mpmath.mpf(0), mpmath.mpf(0), mpmath.mpf(0), rate]
-
-    def _state(self, thetas: Sequence[Any]) -> Any:
-        s = self.s
-        if not all(theta > 0 for theta in thetas):
-            raise ArithmeticError("a trial step beyond the logarithm")
-        parts = zip(s.b, thetas, s.theta_star, strict=True)
-        return sum(b * mpmath.log(theta / star) for b, theta, star in parts)
-
-    def _friction(self, x: Any, psi: Any) -> Any:
-        s = self.s
-        if s.regularised:
-            return s.a * mpmath.asinh(mpmath.exp(x + (s.mu + psi) / s.a) / 2)
-        return s.mu + s.a * x + psi
-
-    def _rate(self, tau: Any, sigma: Any, psi: Any) -> Any:
-        s = self.s
-        if s.regularised:
-            return 2 * s.star * mpmath.sinh(tau / sigma / s.a) * mpmath.exp(-(s.mu + psi) / s.a)
-        x = (tau / sigma - s.mu - psi) / s.a
-        if s.eta:
-            top, x = x, min(self.last, x)
-            for _ in range(60):
-                radiated = s.eta * s.star * mpmath.exp(x) / sigma / s.a
-                change = (top - radiated - x) / (1 + radiated)
-                x = x + change
-                if abs(change) < mpmath.mpf("1e-26"):
-                    break
-            self.last = x
-        if x > 1000:
-            raise ArithmeticError("a trial step beyond all slip rates")
-        return s.star * mpmath.exp(x)
-
-    def stress(self, t: Any, tau: Any, p: Any) -> tuple[Any, Any]:
-        """Effective normal stress, and the rate of what is imposed of it."""
-        s = self.s
-        angle = 2 * mpmath.pi / s.turn
-        sigma = self.imposed + s.cot * (tau - s.mu * s.sigma) - p
-        if not s.amplitude:
-            return sigma, mpmath.mpf(0)
-        wave = s.amplitude * mpmath.sin(angle * t)
-        return sigma + wave, s.amplitude * angle * mpmath.cos(angle * t)
-
-    def now(self, t: Any, y: State) -> dict[str, Any]:
-        s, count = self.s, len(self.s.b)
-        tau, thetas, slip, p = y[0], y[1 : 1 + count], y[1 + count], y[3 + count]
-        sigma, imposed = self.stress(t, tau, p)
-        velocity = y[-1] if s.mass else self._rate(tau, sigma, self._state(thetas))
-        told = {"friction": (tau - s.eta * velocity) / sigma, "slip_rate": velocity, "slip": slip}
-        told |= {"theta": thetas[0], "theta_1": thetas[0], "theta_2": thetas[-1]}
-        return told | {"normal_stress": sigma, "pore_pressure": p, "imposed": imposed}
-
-    def rates(self, t: Any, y: State) -> State:
-        s, count = self.s, len(self.s.b)
-        now, thetas = self.now(t, y), y[1 : 1 + count]
-        v, sigma = now["slip_rate"], now["normal_stress"]
-        loading = s.k * (self.load - v)
-        opening = -v / s.lengths[0] * (y[2 + count] - s.dilatancy * mpmath.log(v / s.star))
-        draining = -s.drainage * y[3 + count] - opening
-        pressed = now["imposed"] + s.cot * loading
-        healing = mpmath.exp(-v / s.cutoff) if s.cutoff else 0
-        states = zip(thetas, s.lengths, s.b, s.shares, strict=True)
-        evolving = [
-            s.evolution(v, theta, length, healing)
-            - theta / (b * sigma) * share * (s.alpha * pressed + s.c * loading)
-            for theta, length, b, share in states
-        ]
-        faster = mpmath.mpf(0)
-        if s.mass:
-            mu = self._friction(mpmath.log(v / s.star), self._state(thetas))
-            faster = (y[0] - sigma * mu) / s.mass
-        return [loading, *evolving, v, opening, draining, faster]
-
-    def growth(self, t: Any, y: State) -> Any:
-        """d ln V/dt; at constant normal stress."""
-        s, count = self.s, len(self.s.b)
-        if s.mass:
-            return self.rates(t, y)[-1] / y[-1]
-        slopes, v = self.rates(t, y), self.now(t, y)["slip_rate"]
-        states = zip(s.b, slopes[1 : 1 + count], y[1 : 1 + count], strict=True)
-        falls = s.sigma * sum(b * slope / theta for b, slope, theta in states)
-        return (slopes[0] - falls) / (s.a * s.sigma + s.eta * v)
-
-    def enter(self, y: State, velocity: Any, sigma: Any) -> State:
-        """The state as a segment of loading begins."""
-        s, count = self.s, len(self.s.b)
-        ratio, self.load, self.imposed = self.imposed / sigma, velocity, sigma
-        parts = zip(y[1 : 1 + count], s.b, s.shares, strict=True)
-        thetas = [theta * ratio ** (s.alpha * share / b) for theta, b, share in parts]
-        return [y[0], *thetas, *y[1 + count :]]
-
-
-# ---- the second way: logarithms, in double precision ---------------------------------------------
+# ---- logarithms, in double precision -------------------------------------------------------------
 
 
 class InLogarithms:

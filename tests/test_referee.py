@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from referee_answers import UNITS, by_second, columns
+from referee_numbers import UNITS, by_second, columns
 from referee_page import MARK, PAGE, parts
 from referee_ways import agrees, stated
 from running import call
