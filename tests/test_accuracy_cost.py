@@ -15,7 +15,6 @@ from rsfstudy.named_studies._cheapest import Cheapest
 from rsfstudy.named_studies._problem import Problem
 from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
-import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import InvalidValue
@@ -126,34 +125,6 @@ def test_a_long_run_is_timed_once(monkeypatch):
     monkeypatch.setattr(accuracy_cost, "_timed", long)
     assert solved("DOP853", 4.0).values["relative_time"] == 1.0
     assert len(calls) == 3
-
-
-def test_integrator_and_accuracy_are_axes():
-    """A cell each: those without meaning and those out of reach fail nobody, and no reduction draws
-    on them.
-    """
-    found = rsfstudy.run(
-        "accuracy_cost",
-        problem=["rigid response", "critical step"],
-        integrator=["DOP853", "RK23", "DOP853 + Radau"],
-        requested_digits=[4, 6],
-        run_budget=4_000,
-        repeats=1,
-        workers=0,
-        output=None,
-        progress=False,
-    )
-    assert found.status.dims == ("problem", "integrator", "requested_digits")
-    apart = found.status.sel(integrator="DOP853 + Radau")
-    assert (apart == int(Status.NOT_APPLICABLE)).all()
-    lost = found.status.sel(problem="critical step", integrator="RK23").values.tolist()
-    assert lost == [Status.OK, Status.ACCURACY_OUT_OF_REACH]
-    assert (found.status < int(Status.WORK_BUDGET_SPENT)).all()
-    assert found.proportionality_points.sel(problem="critical step").values.tolist() == [2, 1, 0]
-    assert not any("refused" in found[name].attrs for name in found.data_vars)
-    assert found.cheapest_integrator.sel(digits=6).values.tolist() == ["DOP853", "DOP853"]
-    ok = found.status == int(Status.OK)
-    assert bool((found.relative_time > 0.0).where(ok, True).all())
 
 
 def test_what_has_no_known_answer_is_refused():

@@ -13,7 +13,7 @@ from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.events import Event, Kind, maximum
+from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import READ, STATES, Recording
 
@@ -104,21 +104,6 @@ def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engi
     )
     assert spring_stress[2] == pytest.approx(begun.point.spring_stress, abs=1e-9 * scene.a)
     assert events[-1].kind is Kind.SAMPLED
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_rupture_is_recorded_where_it_is_asked_for(engine):
-    """At its peak, and before and after it; numbers of time lie 1e-6 of its duration apart."""
-    scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    meter, accuracy = Meter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
-    motion = follow(scene, accuracy, meter, [maximum("log_slip_rate")], clock=True)
-    peak = next(e for e in motion if e.kind is Kind.MAXIMUM and e.regime == "inertial")
-    times = np.array([0.5 * peak.time, peak.time, 1.5 * peak.time])
-    table, _events = recorded(scene, engine, times)
-    assert table[:, 0].tolist() == times.tolist()
-    rates = table[:, READ.index("log10_slip_rate")] * math.log(10.0)
-    assert rates[1] == pytest.approx(peak.point.log_slip_rate, abs=1e-5)
-    assert max(rates[0], rates[2]) < peak.point.log_slip_rate - 10.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -7,10 +7,8 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import run, study_of
 
-from rsfstudy import Axis, Scene
-from rsfstudy.measures.triggered import Triggered
+from rsfstudy import Scene
 from rsfstudy.motion.regimes import starting
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
@@ -57,16 +55,3 @@ def test_steps_come_on_top():
     assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
     assert after.spring_stress == scene.stiffness * 0.5
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)
-
-
-def test_it_may_be_an_axis():
-    """A slider that is stressed enough goes unstable by itself, under a load point at rest."""
-    found = run(
-        study_of(
-            "stressed",
-            Triggered(),
-            Axis("initial_stress", [0.003, 0.01]),
-            base=Scene(stiffness_ratio=0.5, load_velocity_ratio=0.0, normal_stress="constant"),
-        )
-    )
-    assert found.unstable.values.tolist() == [0.0, 1.0]

@@ -146,15 +146,3 @@ def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(
     found = effects.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values
     assert found["evaluation_cost"] == pytest.approx(4.0, rel=1e-12)
     assert found["evaluation_cost_in_rupture"] == pytest.approx(3.0, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "fields", [{"normal_stress": "constant"}, {"inertia": True}, {"radiation_damping": 1e-10}]
-)
-def test_every_form_of_the_equations_is_timed(fields):
-    found = effects.EffectCost()(Scene(**fields), Accuracy(1e-3)).values
-    forms = ["", "_in_rupture"] if "inertia" in fields else [""]
-    for form in forms:
-        assert found[f"evaluation_cost{form}"] > 0.0
-        assert found[f"time_per_evaluation{form}"] > 0.0
-    assert ("evaluation_cost_in_rupture" in found) == ("inertia" in fields)

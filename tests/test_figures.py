@@ -5,7 +5,6 @@ import re
 
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib.container import ErrorbarContainer
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
@@ -20,8 +19,7 @@ from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.plots import _text, lines
-from rsfstudy.plots._axes import is_log_spaced
+from rsfstudy.plots import _text
 from rsfstudy.quantity import Quantity
 
 MM = 25.4
@@ -335,13 +333,6 @@ def test_statuses_are_drawn_by_their_names_where_there_is_no_map():
     assert [text.get_text() for text in axes.get_yticklabels()] == ["ok"]
 
 
-def test_curves_with_no_place_in_common_are_all_named():
-    laws = {"law": ["slip", "slowness"], "phi": 60.0}
-    same = xr.DataArray(np.ones((2, 3)), laws, dims=("law", "phase"))
-    ((_curve, text),) = lines._different(list(same), ["law", "phi"])
-    assert text == "slip law and slowness law"
-
-
 def test_two_axes_of_numbers_are_a_map_with_statuses_that_are_no_number():
     dataset = lattice(ANGLES, RATES)
     drawn = plots.figure(dataset)
@@ -496,10 +487,3 @@ def test_formulas_are_never_broken():
 )
 def test_numbers(value, written):
     assert _text.number(value) == written
-
-
-def test_spacing():
-    assert is_log_spaced(np.array([2.0, 5.0, 10.0, 20.0, 50.0, 100.0]))
-    assert not is_log_spaced(np.linspace(1.0, 100.0, 9))
-    assert not is_log_spaced(np.array([0.0, 1.0, 10.0, 100.0]))
-    assert not is_log_spaced(np.array([1.0, 2.0, 4.0]))

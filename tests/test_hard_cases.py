@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies.effects import EffectCost
 from rsfstudy.named_studies.hard_cases import HardCase
 from running import named_results
 
@@ -157,17 +156,3 @@ def test_any_scene_ends_in_numbers_or_in_a_name(
             assert math.isfinite(found.values[name]), name
     else:
         assert found.message
-
-
-def test_an_effect_that_is_not_there_costs_nothing():
-    """Unknowns and regimes of each combination; without mass no right-hand side is spent on it."""
-    fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}
-    damped, massive = (
-        EffectCost()(Scene(**fields, **effect), Accuracy(1e-5)).values
-        for effect in ({"radiation_damping": 1e-10}, {"inertia": True})
-    )
-    assert damped["unknowns"] == massive["unknowns"] == 2.0
-    assert damped["share_in_rupture"] == 0.0
-    assert "unknowns_in_rupture" not in damped
-    assert massive["unknowns_in_rupture"] == 3.0
-    assert 0.2 < massive["share_in_rupture"] < 0.9

@@ -7,15 +7,12 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, called, run, study_of
+from running import call, called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.velocity_step import VelocityStep
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.plots._motion import picture
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.registry import QUANTITIES
@@ -146,18 +143,6 @@ def test_results_say_their_units():
     np.testing.assert_allclose(motion.load_point_displacement, 10.0 * motion.time, atol=1e-9)
 
 
-def test_axes_of_results_are_in_units_of_the_rig_too():
-    study = study_of(
-        "held", Healing(phases=2), Axis("hold_time", [10.0, 100.0]), base=RIG.scene(**LAW)
-    )
-    shown = RIG.in_units(run(study, rtol=1e-4), length="um", time="min")
-    assert shown.hold_time.attrs["units"] == "min"
-    assert shown.hold_time.values == pytest.approx([10.0 / 6.0, 100.0 / 6.0])
-    assert shown.peak_displacement_error.attrs["units"] == "um"
-    assert float(shown.stiffness) == pytest.approx(5e10 * 1e-6)
-    assert shown.healing.attrs["units"] == "1"
-
-
 def heavy_cycles(axis):
     """Limit cycles of which each has a reference rate of its own."""
     study = Study(
@@ -217,16 +202,6 @@ def test_no_scale_is_zero(name):
     stated = {"normal_stress": SIGMA, "slip_distance": D_C} | {name: 0.0}
     with pytest.raises(InvalidValue, match="must be positive and finite"):
         rsfstudy.to_si(motion, **stated)
-
-
-def test_one_test_in_two_units_is_one_test():
-    """Read off in V_* and D_c, or stated in the units of the rig: the same to rounding."""
-    stated = RIG.scene(
-        **LAW, velocity_steps=1, velocity_ratio=10, displacement_between_steps="0.2 mm"
-    )
-    bare = Scene(**LAW, stiffness=0.1, reference_rate=0.1, velocity_steps=1)
-    one, other = (VelocityStep(phases=2)(scene, Accuracy(1e-5)).values for scene in (stated, bare))
-    assert one["apparent_a"] == pytest.approx(other["apparent_a"], rel=1e-8)
 
 
 # ---- protocols from files ------------------------------------------------------------------------

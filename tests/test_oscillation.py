@@ -2,16 +2,13 @@
 stress by linear theory.
 """
 
-import json
 import math
 
 import numpy as np
 import pytest
-from running import study_of
 
-from rsfstudy import Axis, Scene, simulate
+from rsfstudy import Scene, simulate
 from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
@@ -70,19 +67,6 @@ def test_it_never_settles(slider):
     accuracy, meter = Accuracy(1e-6, engine=COMPILED), Meter(10**5, engine=COMPILED)
     *_earlier, end = follow(scene, accuracy, meter, watches, until=40.0)
     assert (end.kind, end.time) == (Kind.END, 40.0)
-
-
-def test_it_is_an_axis_and_a_file_holds_it():
-    study = study_of(
-        "oscillates",
-        LinearStability(),
-        Axis("oscillation_amplitude", [0.0, 0.1]),
-        base=Scene(normal_stress="imposed"),
-    )
-    scenes = list(study.scenes())
-    assert [scene.states for scene in scenes] == [1, 3]
-    told = json.loads(simulate(scenes[1], duration=1.0).attrs["scene"])
-    assert Scene(**told) == scenes[1]
 
 
 def test_faster_than_free_oscillation_with_mass():

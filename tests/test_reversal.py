@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-from in_time import InTime
 
 from rsfstudy import Scene, history, protocol, simulate
 from rsfstudy.errors import Incomplete, InvalidValue
@@ -23,20 +22,6 @@ from rsfstudy.status import Status
 
 CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}
 BACK = {"load_velocity_ratio": 1.0, "stiffness_ratio": 2.0}
-
-
-@pytest.mark.parametrize("stress", [CONSTANT, VARIABLE])
-def test_slip_goes_back_first(stress):
-    """At the rate of the arcsinh form, under reversed stress; then forward. That the motion is that
-    of time is for `test_in_time`.
-    """
-    scene = Scene(law="slowness", regularised=True, mu_star=0.6, **stress, **BACK)
-    scene = scene.with_(displacement_step=-0.65 / scene.stiffness)
-    ran, theirs = simulate(scene, duration=100.0), InTime(scene)
-    assert ran.shear_stress[0] < 0.0 < ran.shear_stress[-1]
-    began = theirs.both(0.0, theirs.start(), 0.0)[1].v
-    assert began < 0.0
-    assert ran.log10_slip_rate[0] == pytest.approx(math.log10(-began), rel=1e-12)
 
 
 @pytest.mark.parametrize("stress", [CONSTANT, VARIABLE])
@@ -70,15 +55,6 @@ def test_friction_is_odd_in_slip_rate():
     value = relation_of(scene)(1e-9 - scene.mu_star)[0]
     linear = math.log(2e-9 / scene.a) - scene.mu_star / scene.a
     assert value / scene.a == pytest.approx(linear, rel=1e-9)
-
-
-def test_a_step_that_reverses_all_stress_ends_the_motion():
-    step = {"displacement_step": -200.0, **CONSTANT}
-    for scene in (Scene(**step, **BACK), Scene(regularised=True, **step)):
-        with pytest.warns(Incomplete, match="shear_stress_reversed"):
-            ran = simulate(scene)
-        assert ran.attrs["status"] == "shear_stress_reversed"
-        assert "the step takes shear stress to" in ran.attrs["message"]
 
 
 @pytest.mark.parametrize("load", [1.0, 10.0, 100.0, 1e4])

@@ -5,10 +5,8 @@ weakening, which have no critical stiffness.
 import math
 
 import pytest
-from running import study_of
 
-import rsfstudy
-from rsfstudy import Axis, Scene
+from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -37,18 +35,6 @@ def test_one_of_them_sets_the_spring():
     assert (soft.stiffness, soft.as_dict()["stiffness_ratio"]) == (0.01, None)
     assert soft.with_(a=0.02).stiffness == 0.01
     assert soft.with_(stiffness_ratio=1.5).as_dict()["stiffness"] is None
-
-
-def test_stiffness_is_an_axis(tmp_path):
-    study = study_of(
-        "springs", CriticalStep(), Axis("stiffness", [0.018, 0.02]), accuracy=Accuracy(0.0001)
-    )
-    dataset = rsfstudy.run(study, workers=0, output=tmp_path, progress=False)
-    assert dataset.critical_velocity_ratio.dims == ("stiffness",)
-    assert dataset.stiffness.attrs["units"] == "1"
-    assert "stiffness_ratio" not in dataset.coords
-    again = rsfstudy.rerun(tmp_path / "springs.nc", workers=0, progress=False)
-    assert (again.identical == again["values"]).all()
 
 
 def test_without_rate_weakening_stiffness_is_given_by_itself():

@@ -255,22 +255,6 @@ def test_vocabulary_describes_itself():
     assert error.scale == "D_c"
 
 
-def test_rate_step_boundary_is_figure_5(tmp_path_factory):
-    dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
-    assert set(dataset.critical_velocity_ratio.dims) == {"case", "b_over_a"}
-    held = {0.25, 0.5, 1.0, 2.0, 4.0}
-    assert all(np.isclose(dataset.a_over_b_minus_a, x, rtol=1e-12).any() for x in held)
-    zeta = {str(case): float(dataset.zeta.sel(case=case)) for case in dataset.case.values}
-    assert zeta["constant normal stress"] == pytest.approx(1.0, abs=1e-4)
-    assert zeta["alpha = 0.25"] == pytest.approx(0.84, abs=0.01)
-    assert zeta["alpha = 0.56"] == pytest.approx(0.664, abs=0.01)
-    assert (dataset.zeta_stderr < 0.003).all()
-    # at a/(b-a) = 4 the finite norm bends even the constant-stress curve: 4.66 instead of 5
-    bent = dataset.critical_velocity_ratio.sel(case="constant normal stress").isel(b_over_a=-1)
-    assert float(bent) == pytest.approx(4.66, abs=0.005)
-    assert int(dataset.rhs_evaluations.max()) <= 8_000
-
-
 def test_the_plain_lattice_agrees_with_the_critical_steps_within_its_bracket(tmp_path_factory):
     """Cells followed forward in time against critical paths followed back, for every row."""
     cells, _path = named_results("rate_step_lattice", tmp_path_factory)
@@ -311,18 +295,3 @@ def test_the_fits_of_stress_drop_leave_out_cells_without_stick_slip(tmp_path_fac
     cycling = (dataset.status == int(Status.OK)).sum("load_velocity_ratio")
     assert 1 < int(cycling.min()) < dataset.sizes["load_velocity_ratio"]
     xr.testing.assert_equal(dataset.static_slope_points.drop_attrs(), cycling.drop_attrs())
-
-
-def test_other_angles_of_the_limit_cycles():
-    dataset = rsfstudy.run(
-        "limit_cycles",
-        phi=[50, 60],
-        law="slip",
-        rtol=1e-4,
-        workers=0,
-        output=None,
-        progress=False,
-    )
-    variable = dataset.sel(normal_stress="variable").squeeze("law")
-    assert (variable.static_stress_drop.diff("phi") < 0.0).all()
-    assert len(plots.figure(dataset).axes) == 2

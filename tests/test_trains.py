@@ -127,8 +127,7 @@ VARIABLE = {"normal_stress": "variable", "alpha": 0.3, "inertia": True}
 
 
 @pytest.mark.parametrize("dynamics", [{"inertia": True}, {"radiation_damping": 1e-6}, VARIABLE])
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("of", ["normal_stress", "velocity"])
+@pytest.mark.parametrize(("of", "law"), [("normal_stress", "slip"), ("velocity", "slowness")])
 def test_a_record_of_whole_cycles_moves_the_slider_alike(of, law, dynamics):
     """Ruptures included. Linear between n samples a cycle, it is off by (pi/n)**2/2 of itself."""
     n, lasts, begin = 400, 2.0 * PERIOD, {"oscillation_begin": BEGIN, "oscillation_cycles": 2.0}

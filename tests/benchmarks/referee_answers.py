@@ -1,5 +1,5 @@
-"""``PYTHONPATH=tests python tests/benchmarks/referee_answers.py [NUMBER ...]`` writes the answers of
-the referee, with the digits that two ways agree on (a quarter of an hour for all).
+"""``PYTHONPATH=tests python tests/benchmarks/referee_answers.py [NUMBER ...]`` writes the answers
+of the referee, with the digits that two ways agree on (a quarter of an hour for all).
 
 The first way, here, solves the equations as the problems state them, in SI units: spring stress,
 theta in s and slip, slip rate by the friction law (or the root of it and damping), with 30 digits
