@@ -38,7 +38,6 @@ ODD = st.one_of(
     st.just(1j),
     st.builds(object),
 )
-NUMBERS = st.floats(1.1, 4.0)
 
 
 # ---- declarations -------------------------------------------------------------------------------

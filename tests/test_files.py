@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, SMALL, call, cell_key, run, run_with_failures
+from running import SMALL, call, cell_key, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
@@ -367,31 +367,6 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
 
 
-def test_a_measure_of_ones_own_is_not_taken_for_one_of_ours(tmp_path):
-    """Not even where it bears the name of one."""
-    (tmp_path / "mine.py").write_text(OWN_CRITICAL_STEP)
-    run_with_failures(tmp_path / "mine.py", output=tmp_path)
-    for again in (rsfstudy.rerun, lambda file: rsfstudy.cell(file, {"b_over_a": 2.0})):
-        with pytest.raises(InvalidValue, match="'critical_step': is a user's own.*--study"):
-            again(tmp_path / "mine.nc")
-
-
-OWN_CRITICAL_STEP = """
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
-
-
-class Mine(CriticalStep):
-    def find(self, scene, accuracy, meter):
-        raise ZeroDivisionError
-
-
-study = Study(
-    name="mine", title="Mine", base=Scene(), axes=[Axis("b_over_a", [2.0])], measure=Mine()
-)
-"""
-
-
 def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
     empty = xr.load_dataset(small)
     empty["status"][:] = 25
@@ -399,16 +374,6 @@ def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
     told = call("rerun", tmp_path / "empty.nc", "--serial", "--quiet")
     assert told.returncode == 1
     assert "nothing to compare" in told.stdout
-
-
-def test_a_rerun_of_a_study_of_ones_own(tmp_path):
-    """Its code is in its own file, which has to be named."""
-    run(FAULTY, output=tmp_path)
-    with pytest.raises(InvalidValue, match="'faulty': is a user's own.*--study FILE"):
-        rsfstudy.rerun(tmp_path / "faulty.nc", workers=0, progress=False)
-    table = rsfstudy.rerun(tmp_path / "faulty.nc", study=FAULTY, workers=0, progress=False)
-    assert (table["values"] == table["identical"]).all()
-    assert table.attrs["differs"] == {}
 
 
 def test_show_tells_what_is_in_a_file(small):

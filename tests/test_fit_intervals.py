@@ -10,7 +10,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from rsfstudy.analysis.fitting import intervals
-from rsfstudy.analysis.fitting.intervals import Profile
 from rsfstudy.analysis.fitting.model import QUICK, Differences, Values
 from rsfstudy.analysis.fitting.search import Fitted, Search
 
@@ -90,16 +89,6 @@ def test_intervals_end_where_the_likelihood_has_fallen() -> None:
         fallen = (by_hand(model, end) - by_hand(model, b)) / found.size**2
         assert fallen == pytest.approx(far**2, rel=slack)
     assert high - b > 1.5 * (b - low)  # no parabola
-
-
-def test_intervals_are_those_of_student_where_the_likelihood_is_a_parabola() -> None:
-    _model, search, found = fit(4.0)
-    for name in ("b", "mu_star"):
-        far = intervals.half_width(found, intervals.COVERS) * found.stderr(name)
-        exact = found.values[name] - far, found.values[name] + far
-        assert intervals.interval(search, found, name) == pytest.approx(exact, rel=1e-12)
-    at = found.values["mu_star"] + 2.0 * found.stderr("mu_star")
-    assert Profile(search, found, "mu_star").squared_distance(at) == pytest.approx(4.0, rel=1e-9)
 
 
 def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:

@@ -12,7 +12,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene, protocol, simulate
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.slider.stability import response_to_normal_stress
 from rsfstudy.status import Status
 
@@ -105,18 +105,6 @@ def test_what_is_shown_is_one_period():
     assert math.degrees(cmath.phase(ratio)) == pytest.approx(found["phase_lead"], abs=1e-5)
 
 
-@pytest.mark.parametrize("amplitude", [1e-3, 2e-2])
-@pytest.mark.parametrize("fields", [{"law": "slowness", **IMPOSED}, {"law": "slip", **IMPOSED}])
-def test_errors_of_a_response_cover_and_engines_agree(fields, amplitude):
-    scene = Scene(**fields, **{**OSCILLATES, "oscillation_amplitude": amplitude})
-    scene, measure = scene.with_(stiffness_ratio=3.0), NormalStressResponse(samples=32)
-    exact, rough = read(measure, scene, 1e-9), read(measure, scene, 1e-4)
-    other = read(measure, scene, 1e-4, ENGINES[0])
-    for name in ("gain", "phase_lead", "distortion", "departure_from_linear"):
-        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
-        assert other[name] == pytest.approx(rough[name], rel=1e-7, abs=1e-9), name
-
-
 @pytest.mark.parametrize("period", [0.6, 5.0])
 def test_errors_cover_where_the_response_is_as_small_as_the_tolerance_lets_it(period):
     """What is left of a transient is no overtone, and no lead."""
@@ -164,20 +152,6 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
         assert found["direct_change"] == pytest.approx(-0.3 * math.log1p(step), rel=1e-12)
     assert departures[1] < 0.1 * departures[0] * 1.3
     assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
-
-
-@pytest.mark.parametrize("inertia", [False, True])
-def test_errors_of_a_transient_cover_and_engines_agree(inertia):
-    scene = Scene(law="slowness", **IMPOSED, **STEP, stiffness_ratio=20.0, inertia=inertia)
-    measure = NormalStressTransient(phases=20)
-    exact, rough = read(measure, scene, 1e-9), read(measure, scene, 1e-4)
-    other = read(measure, scene, 1e-4, ENGINES[0])
-    for name in ("apparent_alpha", "apparent_slip_distance", "evolution_left"):
-        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
-        assert other[name] == pytest.approx(rough[name], rel=1e-6), name
-    assert rough["settled"] == 1.0
-    assert rough["load_point_displacement"][-1] == pytest.approx(30.0, rel=1e-9)
-    assert rough["normal_stress_ratio"] == pytest.approx(1.1, rel=1e-12)
 
 
 @pytest.mark.parametrize(

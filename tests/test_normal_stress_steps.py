@@ -15,11 +15,6 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.regimes import starting
 
-CASES = {
-    "imposed": {"normal_stress": "imposed", "alpha": 0.3},
-    "inclined": {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0},
-}
-
 
 @given(
     step=st.floats(-0.5, 1.0).filter(lambda x: abs(x) > 1e-6),

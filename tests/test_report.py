@@ -22,7 +22,6 @@ from rsfstudy.status import Status
 LOOKS = [(390, "screen"), (1280, "screen"), (680, "print")]
 #: Elements that have no end.
 VOID = {"meta", "link", "img", "br"}
-MOVED = Scene(load_velocity_ratio=2.0, normal_stress="constant")
 EVIL = "</p><script>alert(1)</script> & \x1b[31m"
 
 

@@ -21,7 +21,6 @@ from rsfstudy.slider.equations import relation_of
 from rsfstudy.status import Status
 
 CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}
-BACK = {"load_velocity_ratio": 1.0, "stiffness_ratio": 2.0}
 
 
 @pytest.mark.parametrize("stress", [CONSTANT, VARIABLE])

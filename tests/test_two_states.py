@@ -20,8 +20,7 @@ from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import Meter
-from rsfstudy.slider import laws, stability, steady
-from rsfstudy.slider.equations import between_ruptures, in_rupture, rigid
+from rsfstudy.slider import laws, stability
 from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import LAW
@@ -86,22 +85,6 @@ def test_two_of_one_length_are_one(law, stress):
     for of in ("load_velocity_ratio", "displacement_step"):
         agree(CriticalStep(of=of), *both(law, stiffness_ratio=1.3, **stress), 1e-4)
     agree(Triggered(), *both(law, stiffness_ratio=1.3, load_velocity_ratio=30.0, **stress), 1e-4)
-
-
-@pytest.mark.parametrize(("law", "stress"), CASES)
-def test_the_equations_add_up(law, stress):
-    """The states of two add up to the one, in every form; each form has one unknown more."""
-    one, two = both(law, load_velocity_ratio=3.0, inertia=True, **stress)
-    steady_one, steady_two = (steady.steady_sliding(s, 0.4) for s in (one, two))
-    assert sum(steady_two.psis) == pytest.approx(steady_one.psis[0], rel=1e-13)
-    # b_1 is three tenths of b
-    rates = between_ruptures(one, clock=False).rates((0.03, 0.02))
-    of_two = between_ruptures(two, clock=False).rates((0.03, 0.3 * 0.02, 0.7 * 0.02))
-    assert (of_two[0], of_two[1] + of_two[2]) == pytest.approx(rates, rel=1e-11)
-    state, fast = (0.01, 0.3, 0.012), in_rupture(one)
-    of_two = in_rupture(two).rates((*state, 0.7 * fast.at(state).psi))
-    assert of_two[:3] == pytest.approx(fast.rates(state), rel=1e-11)
-    assert len(rigid(two, 0.3).unknowns) == 2
 
 
 APART = 0.05
@@ -192,18 +175,6 @@ def test_b_follows_from_its_parts():
     assert scene.with_(b2_over_a=-0.4, stiffness=0.001).b == pytest.approx(0.5 * scene.a, rel=1e-15)
     assert Scene(law="two_slip_states", stiffness=0.01, b2_over_a=0.0).b == scene.a
     assert scene.with_(law="slip").b == 2.0 * scene.a
-
-
-@pytest.mark.parametrize("numbers", [{}, STRENGTHENING], ids=["weakening", "strengthening"])
-def test_critical_rate_steps(numbers):
-    """From motions followed forward, with a motion on each side to confirm them."""
-    scene = Scene(law="two_slip_states", stiffness_ratio=1.3, **numbers, **CONSTANT)
-    found = CriticalStep()(scene, Accuracy(1e-4))
-    assert found.status is Status.OK
-    stable, unstable = (
-        found.values[f"critical_velocity_ratio_{s}"] for s in ("stable", "unstable")
-    )
-    assert stable < found.values["critical_velocity_ratio"] < unstable < 1.01 * stable
 
 
 @dataclass(frozen=True, kw_only=True)

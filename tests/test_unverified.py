@@ -15,11 +15,12 @@ from rsfstudy import Scene
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.status import Status
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
@@ -97,3 +98,52 @@ def test_every_number_with_a_numerical_error_is_held_to_what_was_asked(measure, 
             # no laxer than the number, and a, 1/ln r or D_c beside it, ask for
             assert 0.0 < scale < 100.0 * (1.0 + abs(outcome.values[name])), name
             assert outcome.values[f"{name}_error"] < 30.0 * rtol * scale, name
+
+
+STEPS = {"stiffness_ratio": 3.0, "velocity_steps": 1}
+HOLD = {"stiffness_ratio": 3.0, "hold_time": 100.0}
+WAVES = {**IMPOSED, "oscillation_period": 7.0, "stiffness_ratio": 3.0}
+RISES = {**IMPOSED, "law": "slowness", "normal_stress_step": 0.1, "load_velocity_ratio": 1.0}
+SLOW = {"law": "two_slip_states", "a": 0.01, "load_velocity_ratio": 1.0, "displacement_step": 2.0}
+CONSTANT = {"normal_stress": "constant"}
+#: And of scenes that are harder.
+HARDER = [
+    (Healing(phases=2), Scene(law="slip", **HOLD | {"hold_time": 300.0})),
+    (Healing(phases=2), Scene(law="slowness", **HOLD | {"hold_time": 1e5}, alpha=0.56)),
+    (Healing(phases=2), Scene(law="slowness", **HOLD | {"hold_time": 50.0}, inertia=True)),
+    (Healing(phases=2), Scene(law="slip", **HOLD, fluid="dilatant", dilatancy=0.02)),
+    (VelocityStep(phases=2), Scene(law="slip", **STEPS, velocity_ratio=3.0, alpha=0.3)),
+    (VelocityStep(phases=2), Scene(law="slip", **STEPS, radiation_damping=1e-3)),
+    (VelocityStep(phases=2), Scene(law="slowness", **STEPS, **CONSTANT, fluid="dilatant")),
+    *(
+        (NormalStressResponse(samples=32), Scene(law=law, **WAVES, oscillation_amplitude=amplitude))
+        for law in ("slip", "slowness")
+        for amplitude in (1e-3, 2e-2)
+    ),
+    *(
+        (NormalStressTransient(phases=20), Scene(**RISES, stiffness_ratio=20.0, inertia=inertia))
+        for inertia in (False, True)
+    ),
+    # of one event, and of two
+    *((LimitCycle(phases=2), Scene(**SLOW, **CONSTANT, stiffness_ratio=r)) for r in (0.9, 0.86)),
+    (LimitCycle(phases=2), Scene(**SLOW | {"a": 0.0145}, stiffness_ratio=0.9, inertia=True)),
+]
+
+
+@pytest.mark.parametrize(
+    ("measure", "scene"), [*ASKED, *HARDER], ids=lambda x: getattr(x, "name", "")
+)
+def test_errors_cover_and_engines_agree(measure, scene):
+    """Held to a run that is a hundred times as accurate, or more."""
+    exact, rough, other = (
+        measure(scene, Accuracy(rtol, 2_000_000, engine=engine))
+        for rtol, engine in ((1e-9, COMPILED), (1e-4, COMPILED), (1e-6, SCIPY))
+    )
+    assert rough.status is other.status is Status.OK
+    exact, rough, other = exact.values, rough.values, other.values
+    names = [name for name in rough if f"{name}_error" in rough]
+    assert names
+    for name in names:
+        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], name
+        allowed = other[f"{name}_error"] + exact[f"{name}_error"]
+        assert abs(other[name] - exact[name]) <= allowed, name
