@@ -342,34 +342,6 @@ def test_mass_moves_the_boundary_where_it_acts():
 # -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("fields", "of", "direction", "status"),
-    [
-        ({"instability_norm": 5e-9}, RATE, "up", Status.NORM_BELOW_LOADING_RATE),
-        ({"stiffness_ratio": 0.8}, RATE, "up", Status.UNSTABLE_AT_ANY_STEP),
-        ({"inertia": True, "instability_norm": 1e3}, RATE, "up", Status.NORM_UNREACHABLE),
-        ({}, DISPLACEMENT, "down", Status.STABLE_FOR_ALL_STEPS),
-        # a critical path exists for a large step, but steady sliding is unstable already
-        ({"law": "slowness", "b_over_a": 5.0, "stiffness_ratio": 0.8}, RATE, "up",
-         Status.UNSTABLE_AT_ANY_STEP),
-        # every orbit closes at k = k_cr: what rounding makes of a deep down-swing does not count
-        (CONSTANT, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
-        # phi close to atan(mu_*): normal stress outgrows strength
-        ({"law": "slowness", "a": 0.066, "b_over_a": 8.1, "mu_star": 0.6, "phi": 33.0,
-          "alpha": 0.0, "stiffness_ratio": 0.37}, RATE, "up", Status.LOCKED),
-        ({"law": "slowness", **CONSTANT}, RATE, "down", Status.STABLE_FOR_ALL_STEPS),
-    ],
-)  # fmt: skip
-def test_answers_without_a_number(fields, of, direction, status):
-    outcome = CriticalStep(of=of, direction=direction)(Scene(**fields), Accuracy())
-    assert outcome.status is status
-    assert outcome.message
-    assert math.isnan(outcome.values.get(KIND[of], math.nan))
-
-
-KIND = {RATE: "critical_velocity_ratio", DISPLACEMENT: "critical_displacement"}
-
-
 def test_a_displacement_step_may_jump_to_the_norm_at_once():
     """A slider that slows down from the start is critical where the step itself takes it to the
     norm: eq. 13 inverted.

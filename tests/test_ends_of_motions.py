@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies._triggers import Triggers
 from scipy.optimize import brentq
 
 import rsfstudy
@@ -115,20 +114,6 @@ def test_formulas_speak_of_no_other_normal_stress():
         found = LinearStability()(scene.with_(normal_stress_step=step), Accuracy(1e-4)).values
         explicit = found["critical_stiffness_explicit"]
         assert math.isnan(explicit) is (step != 0.0)
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"normal_stress": "constant"},
-        {"normal_stress": "imposed", "fluid": "dilatant"},
-        {"normal_stress": "imposed", "law": "composite"},
-    ],
-)
-def test_where_no_one_effective_friction_is_known(fields):
-    found = Triggers()(Scene(stiffness_ratio=0.5, **fields), Accuracy(1e-4))
-    assert found.status is Status.NOT_APPLICABLE
-    assert "no one effective friction" in found.message
 
 
 def test_one_segment_lasts_as_stated():

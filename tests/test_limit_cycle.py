@@ -101,21 +101,6 @@ def test_balances_of_the_orbit(case):
     assert np.abs(np.diff(found["log10_slip_rate"])).max() < 0.05 * np.ptp(found["log10_slip_rate"])
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"stiffness_ratio": 1.2}, "settles to steady sliding"),
-        # k_cr falls with V_0: what is soft at V_* is stiff at 1000 V_*
-        ({"load_velocity_ratio": 1000.0, "phi": 50.0}, "settles to steady sliding"),
-        ({"load_velocity_ratio": 0.0}, "held"),
-    ],
-)
-def test_where_there_is_no_stick_slip(fields, message):
-    outcome = LimitCycle()(scene(**fields), Accuracy())
-    assert outcome.status is Status.NO_LIMIT_CYCLE
-    assert message in outcome.message
-
-
 def test_public_call_and_si_units():
     """sigma_* = 100 MPa, D_c = 10 micrometres."""
     cycle = rsfstudy.limit_cycle(scene(law="slowness"))

@@ -117,21 +117,6 @@ def test_errors_cover_where_the_response_is_as_small_as_the_tolerance_lets_it(pe
             assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"], (name, rtol)
 
 
-@pytest.mark.parametrize(
-    ("fields", "status"),
-    [
-        ({"oscillation_amplitude": 0.0}, Status.NO_STEP),
-        ({"load_velocity_ratio": 0.0}, Status.NO_STEADY_STATE),
-        ({"stiffness_ratio": 0.9}, Status.NOT_APPLICABLE),
-        ({"law": "slip", "stiffness_ratio": 1.1, "oscillation_amplitude": 0.1},
-         Status.SLIP_RATE_UNBOUNDED),
-    ],
-)  # fmt: skip
-def test_where_there_is_no_response(fields, status):
-    scene = Scene(**IMPOSED, **OSCILLATES).with_(**fields)
-    assert NormalStressResponse()(scene, Accuracy(1e-4)).status is status
-
-
 # ---- after a step --------------------------------------------------------------------------------
 
 STEP = {"normal_stress_step": 0.1, "load_velocity_ratio": 1.0}
@@ -152,24 +137,6 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
         assert found["direct_change"] == pytest.approx(-0.3 * math.log1p(step), rel=1e-12)
     assert departures[1] < 0.1 * departures[0] * 1.3
     assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
-
-
-@pytest.mark.parametrize(
-    ("fields", "status", "message"),
-    [
-        ({"normal_stress_step": 0.0}, Status.NO_STEP, "does not change"),
-        ({"load_velocity_ratio": 0.0}, Status.NOT_APPLICABLE, "does not move on at V_"),
-        ({"displacement_step": 0.1}, Status.NOT_APPLICABLE, "does not move on at V_"),
-        (INCLINED, Status.NOT_APPLICABLE, "follows shear stress"),
-        ({"fluid": "dilatant"}, Status.NOT_APPLICABLE, "follows shear stress or pore pressure"),
-        ({"stiffness_ratio": 2.0}, Status.NOT_APPLICABLE, "loading or unloading"),
-    ],
-)
-def test_where_there_is_no_transient_to_read(fields, status, message):
-    scene = Scene(**IMPOSED, **STEP, stiffness_ratio=20.0).with_(**fields)
-    outcome = NormalStressTransient()(scene, Accuracy(1e-4))
-    assert (outcome.status, message in outcome.message) == (status, True)
-    assert "apparent_alpha" not in outcome.values
 
 
 def test_a_protocol_that_steps_too_soon_is_not_read():

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.measures.healing import Healing
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import Kind, settling
 from rsfstudy.motion.meter import Meter
-from rsfstudy.status import Status
 
 CASES = {
     "imposed": {"normal_stress": "imposed", "alpha": 0.3},
@@ -75,8 +73,3 @@ def test_faster_than_free_oscillation_with_mass():
     assert motion.attrs["status"] == "ok"
     expected = 1.0 + 0.1 * np.sin(2.0 * np.pi * motion.time / 5e-8)
     assert np.allclose(motion.normal_stress_ratio, expected, rtol=0.0, atol=1e-7)
-
-
-def test_it_holds_nothing():
-    outcome = Healing()(Scene(oscillation_amplitude=0.1), Accuracy())
-    assert outcome.status is Status.NO_STEP

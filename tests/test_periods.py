@@ -158,19 +158,6 @@ def test_what_never_repeats_itself_says_so(engine):
     assert found.values["floquet_multiplier"] == pytest.approx(-1.6183, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("scene", "status"),
-    [
-        (slow(1.4), Status.NO_LIMIT_CYCLE),
-        (slow(0.8), Status.SLIP_RATE_UNBOUNDED),
-        (slow(0.9, load_velocity_ratio=0.0), Status.NO_LIMIT_CYCLE),
-    ],
-)
-@pytest.mark.parametrize("measure", [LimitCycle(phases=2), Bifurcation(transient=8, events=8)])
-def test_other_ends(scene, status, measure):
-    assert measure(scene, Accuracy(1e-5)).status is status
-
-
 def test_motions_that_still_grow_are_not_said_to_have_no_period():
     """A thousandth below critical stiffness they take hundreds of events."""
     found = Bifurcation(transient=16, events=16)(slow(0.999, displacement_step=0.1), Accuracy(1e-6))

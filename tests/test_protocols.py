@@ -151,15 +151,6 @@ def test_protocols_are_points_of_an_axis():
     assert found.apparent_a.notnull().values.tolist() == [[True, True], [True, False]]
 
 
-def test_what_has_nothing_to_read():
-    outcome = Healing()(Scene(**STIFF), Accuracy())
-    assert (outcome.status.label, outcome.message[:14]) == ("no_step", "the load point")
-    for number, label in ((1, "not_applicable"), (2, "not_applicable"), (3, "not_applicable")):
-        held = Scene(**STIFF, hold_time=10.0)
-        assert VelocityStep(step_number=number)(held, Accuracy()).status.label == label
-    assert VelocityStep()(Scene(**STIFF), Accuracy()).status.label == "no_step"
-
-
 @pytest.mark.parametrize(
     "idle",
     [

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.measures.rigid_response import RigidResponse, friction_after_step
+from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import log_slip_rate_at
 from rsfstudy.status import Status
@@ -80,13 +80,6 @@ def test_variable_normal_stress_makes_up_and_down_steps_unequal():
     # the jump is smaller downward, what evolves after it is larger
     assert response(1e-3)["direct_asymmetry"] < -0.05
     assert response(1e-3)["evolution_asymmetry"] > 0.05
-
-
-def test_steps_without_a_response_are_named():
-    assert RigidResponse()(Scene(), Accuracy()).status is Status.NO_STEP
-    beyond = Scene(load_velocity_ratio=1e-35)
-    assert RigidResponse()(beyond, Accuracy()).status is Status.NO_STEADY_STATE
-    assert friction_after_step(Scene(), 0.0) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_numbers_do_not_depend_on_the_points_that_are_kept():

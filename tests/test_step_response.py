@@ -96,17 +96,6 @@ def test_mass_lowers_the_peak_after_a_large_step_and_leaves_small_ones_alone():
     )
 
 
-def test_slip_that_runs_away_without_mass_is_an_answer():
-    found = response(law="slip", load_velocity_ratio=20.0)
-    assert found.status is Status.SLIP_RATE_UNBOUNDED
-    assert found.status.is_answer
-    assert math.isnan(found.values.get("max_log10_slip_rate", math.nan))
-
-
-def test_a_held_load_point_is_refused_by_status():
-    assert response(displacement_step=1.0).status is Status.NO_STEADY_STATE
-
-
 def test_the_rise_after_a_jump_ends_in_a_peak_whether_or_not_it_is_followed():
     """With mass: looser tolerances begin at its end, tighter ones follow it. The peak is that of
     the full equations by Radau's method, to 1e-11.

@@ -46,15 +46,6 @@ def test_an_answer_the_tolerance_decides_says_so():
     assert Triggered()(near.with_(stiffness_ratio=1.0), Accuracy()).status is Status.OK
 
 
-def test_a_norm_below_the_loading_is_no_question():
-    outcome = Triggered()(Scene(load_velocity_ratio=1e5, instability_norm=5e-4), Accuracy())
-    assert outcome.status is Status.NORM_BELOW_LOADING_RATE
-
-
-def test_no_step_triggers_nothing():
-    assert answer(load_velocity_ratio=1.0) == (0.0, 0.0)
-
-
 def test_with_mass_a_jump_beyond_the_norm_counts():
     """The slider slows down from where the step takes it: ln V = 16.08, and the norm is 14.61."""
     scene = Scene(

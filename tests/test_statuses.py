@@ -1,0 +1,119 @@
+"""Answers without a number, and what could not be found out: each measure names them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rsfstudy.named_studies._bifurcation import Bifurcation
+from rsfstudy.named_studies._triggers import Triggers
+
+from rsfstudy import Scene
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.normal_stress_response import NormalStressResponse
+from rsfstudy.measures.normal_stress_transient import NormalStressTransient
+from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.status import Status
+
+UP, DOWN = CriticalStep(), CriticalStep(direction="down")
+CONSTANT, SLOWNESS = {"normal_stress": "constant"}, {"law": "slowness"}
+IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
+CYCLES = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+SLOW = {"law": "two_slip_states", **CONSTANT, "a": 0.01, "load_velocity_ratio": 1.0,
+        "displacement_step": 2.0}  # fmt: skip
+WAVES = {**IMPOSED, "oscillation_amplitude": 1e-3, "oscillation_period": 7.0,
+         "stiffness_ratio": 1.5}  # fmt: skip
+STEP = {**IMPOSED, "normal_stress_step": 0.1, "load_velocity_ratio": 1.0, "stiffness_ratio": 20.0}
+HELD, TWO = {"displacement_step": 0.3}, {"law": "two_slip_states"}
+LOAD_HELD = {"load_velocity_ratio": 0.0}
+
+#: A measure, a scene, how it ends, and what is said of it.
+ENDS = [
+    (UP, {"instability_norm": 5e-9}, Status.NORM_BELOW_LOADING_RATE, ""),
+    (UP, {"stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
+    (UP, {"inertia": True, "instability_norm": 1e3}, Status.NORM_UNREACHABLE, ""),
+    (CriticalStep(of="displacement_step", direction="down"), {}, Status.STABLE_FOR_ALL_STEPS, ""),
+    # a critical path exists for a large step, but steady sliding is unstable already
+    (UP, {**SLOWNESS, "b_over_a": 5.0, "stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
+    # every orbit closes at k = k_cr: what rounding makes of a deep down-swing does not count
+    (DOWN, CONSTANT, Status.STABLE_FOR_ALL_STEPS, ""),
+    (DOWN, {**SLOWNESS, **CONSTANT}, Status.STABLE_FOR_ALL_STEPS, ""),
+    # phi close to atan(mu_*): normal stress outgrows strength
+    (UP, {**SLOWNESS, "a": 0.066, "b_over_a": 8.1, "mu_star": 0.6, "phi": 33.0, "alpha": 0.0,
+          "stiffness_ratio": 0.37}, Status.LOCKED, ""),
+    (LimitCycle(), {**CYCLES, "stiffness_ratio": 1.2}, Status.NO_LIMIT_CYCLE, "settles to steady"),
+    # k_cr falls with V_0: what is soft at V_* is stiff at 1000 V_*
+    (LimitCycle(), {**CYCLES, "load_velocity_ratio": 1000.0, "phi": 50.0}, Status.NO_LIMIT_CYCLE,
+     "settles to steady sliding"),
+    (LimitCycle(), {**CYCLES, **LOAD_HELD}, Status.NO_LIMIT_CYCLE, "held"),
+    *(
+        (measure, {**SLOW, "stiffness_ratio": ratio, **more}, status, "")
+        for measure in (LimitCycle(phases=2), Bifurcation(transient=8, events=8))
+        for ratio, more, status in (
+            (1.4, {}, Status.NO_LIMIT_CYCLE), (0.9, LOAD_HELD, Status.NO_LIMIT_CYCLE),
+            (0.8, {}, Status.SLIP_RATE_UNBOUNDED),
+        )
+    ),
+    (LinearStability(), {"phi": 40.0, "load_velocity_ratio": 1e-4}, Status.NO_STEADY_STATE, ""),
+    (LinearStability(), {"inertia": True, "period": 1e8, "load_velocity_ratio": 100.0},
+     Status.UNSTABLE_AT_ANY_STIFFNESS, "direct effect"),
+    *(
+        (measure, {**HELD, **stress, **law}, Status.NO_STEADY_STATE, "the load point is held")
+        for measure in (LinearStability(), RigidResponse(points=3))
+        for stress in ({}, CONSTANT)
+        for law in ({}, TWO)
+    ),
+    (RigidResponse(), {}, Status.NO_STEP, ""),
+    (RigidResponse(), {"load_velocity_ratio": 1e-35}, Status.NO_STEADY_STATE, ""),
+    (StepResponse(), {"displacement_step": 1.0}, Status.NO_STEADY_STATE, ""),
+    (StepResponse(), {"load_velocity_ratio": 20.0}, Status.SLIP_RATE_UNBOUNDED, ""),
+    (Triggered(), {"load_velocity_ratio": 1e5, "instability_norm": 5e-4},
+     Status.NORM_BELOW_LOADING_RATE, ""),
+    (Healing(), {"stiffness_ratio": 3.0}, Status.NO_STEP, "the load point"),
+    (Healing(), {"oscillation_amplitude": 0.1}, Status.NO_STEP, ""),
+    (VelocityStep(), {"stiffness_ratio": 3.0}, Status.NO_STEP, ""),
+    *((VelocityStep(step_number=n), {"hold_time": 10.0}, Status.NOT_APPLICABLE, "")
+      for n in (1, 2, 3)),
+    (NormalStressResponse(), {**IMPOSED, "load_velocity_ratio": 2.0}, Status.NO_STEP, ""),
+    (NormalStressResponse(), {**IMPOSED, "normal_stress_ramp": 0.1}, Status.NO_STEP, ""),
+    (NormalStressResponse(), {**WAVES, **LOAD_HELD}, Status.NO_STEADY_STATE, ""),
+    (NormalStressResponse(), {**WAVES, "stiffness_ratio": 0.9}, Status.NOT_APPLICABLE, ""),
+    (NormalStressResponse(), {**WAVES, "stiffness_ratio": 1.1, "oscillation_amplitude": 0.1},
+     Status.SLIP_RATE_UNBOUNDED, ""),
+    (NormalStressTransient(), {**STEP, "normal_stress_step": 0.0}, Status.NO_STEP, "not change"),
+    (NormalStressTransient(), {**STEP, **LOAD_HELD}, Status.NOT_APPLICABLE, "not move on at V_"),
+    (NormalStressTransient(), {**STEP, "displacement_step": 0.1}, Status.NOT_APPLICABLE,
+     "does not move on at V_"),
+    (NormalStressTransient(), {**STEP, "normal_stress": "variable", "phi": 60.0},
+     Status.NOT_APPLICABLE, "follows shear stress"),
+    (NormalStressTransient(), {**STEP, "fluid": "dilatant"}, Status.NOT_APPLICABLE,
+     "follows shear stress or pore pressure"),
+    (NormalStressTransient(), {**STEP, "stiffness_ratio": 2.0}, Status.NOT_APPLICABLE,
+     "loading or unloading"),
+    *(
+        (Triggers(), {"stiffness_ratio": 0.5, **fields}, Status.NOT_APPLICABLE,
+         "no one effective friction")
+        for fields in (CONSTANT, {"normal_stress": "imposed", "fluid": "dilatant"},
+                       {"normal_stress": "imposed", "law": "composite"})
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("measure", "fields", "status", "message"), ENDS, ids=lambda x: str(getattr(x, "name", x))
+)
+def test_what_has_no_number_is_named(measure, fields, status, message):
+    outcome = measure(Scene(**fields), Accuracy(1e-5))
+    assert outcome.status is status
+    assert status.is_answer
+    assert outcome.message
+    assert message in outcome.message
+    assert not np.isfinite(outcome.values.get(measure.headline, math.nan)).any()
