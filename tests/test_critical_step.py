@@ -365,6 +365,14 @@ def test_the_survey_says_how_far_it_came():
     assert 1e-20 < outcome.values["critical_velocity_ratio_stable"] < 1e-6
 
 
+def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
+    """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
+    scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
+    for inertia in (False, True):
+        found = swing.swing(scene.with_(inertia=inertia), Accuracy(1e-6), Meter(500_000))
+        assert found.reached is not inertia
+
+
 def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     """After these drops of V_0 the motion ends in limit cycles with peaks of 9.57 and 8.49 in ln V,
     below the norm at 10.89.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.noise import Noise, Run
@@ -172,3 +173,18 @@ def test_noise_without_size() -> None:
 def test_noise_that_is_unknown(name: str) -> None:
     with pytest.raises(InvalidValue, match="noise"):
         noises.check_noise(name)
+
+
+@pytest.mark.parametrize("order", [0, 3])
+def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
+    """``n (n + 2) sum of r_k**2/(n - k)`` over 20 lags more than the order, chi-squared of 20
+    degrees, whatever the mean.
+    """
+    left = np.random.default_rng(8).normal(size=300) + np.sin(np.arange(300.0))
+    lags = range(1, 20 + order + 1)
+    seen = np.array([np.corrcoef(np.roll(left, k)[k:], left[k:])[0, 1] for k in lags])
+    size = 300 * 302 * sum(r**2 / (300 - k) for r, k in zip(seen, lags, strict=True))
+    told = noises.whiteness(left + 5.0, order)
+    assert told == pytest.approx(noises.whiteness(left, order), rel=1e-9)
+    # means and sizes of parts are not those of the whole: a few lags in 300
+    assert chi2.isf(told, 20) == pytest.approx(size, rel=0.1)

@@ -48,11 +48,14 @@ def test_none_is_invented(rho: float) -> None:
 
 def test_a_ramp_over_samples_is_a_ramp() -> None:
     time = 0.01 * np.arange(12_000.0)
-    speed = np.interp(time, [60.0, 60.3], [1.0, 10.0])
+    speed = np.interp(time, [60.0, 60.24, 60.3], [1.0, 2.0, 10.0])
     moved = np.concatenate([[0.0], np.cumsum(0.01 * speed[:-1])])
     (step,) = steps_of(time, moved + synthetic.correlated(len(time), 0.0, 1e-3, 1))
     assert (step.before, step.after) == pytest.approx((1.0, 10.0), rel=0.01)
-    assert 59.9 < step.begins < step.ends < 60.4
+    assert 59.9 < step.begins < step.ends < 60.5
+    # displacement behind it is right: the lines before and behind meet in its middle
+    meet = (moved[-1] - 10.0 * time[-1]) / (1.0 - 10.0)
+    assert 0.5 * (step.begins + step.ends) == pytest.approx(meet, abs=1e-3)
 
 
 def test_sparse_and_dense_parts_of_a_record() -> None:
