@@ -365,6 +365,13 @@ def test_the_survey_says_how_far_it_came():
     assert 1e-20 < outcome.values["critical_velocity_ratio_stable"] < 1e-6
 
 
+def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
+    """Leaps that had to be shortened each time would take ten times the work."""
+    slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
+    scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
+    assert swing.swing(scene, Accuracy(1e-6), Meter(15_000)).reached
+
+
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
