@@ -152,25 +152,11 @@ ENOUGH = {
 
 #: Studies whose motions are left to the compiled engine, which `test_compiled` holds to SciPy's.
 LEFT_TO_COMPILED = (
-    "bounded_slip",
-    "coverage",
-    "dilatant_cycles",
-    "dilatant_steps",
-    "displacement_boundary",
-    "injection",
-    "normal_stress_steps",
-    "rate_step_lattice",
-    "resonance",
-    "rig_recurrence",
-    "slide_hold_slide",
-    "stress_drop",
-    "triggering",
-    "two_states",
-    "uncertain_recurrence",
-    "velocity_steps",
-    "wave_triggering",
-    "what_matters",
-)
+    "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
+    "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
+    "slide_hold_slide", "stress_drop", "triggering", "two_states", "uncertain_recurrence",
+    "velocity_steps", "wave_triggering", "what_matters",
+)  # fmt: skip
 
 
 def enough(name: str) -> Study:

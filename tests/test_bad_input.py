@@ -26,18 +26,9 @@ from rsfstudy.slider.registry import FIELDS
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(-5, 5),
-    st.floats(),
-    st.text(max_size=5),
-    st.just([]),
-    st.just({}),
-    st.just(np.nan),
-    st.just(np.array([1.0, 2.0])),
-    st.just(1j),
-    st.builds(object),
-)
+    st.none(), st.booleans(), st.integers(-5, 5), st.floats(), st.text(max_size=5), st.just([]),
+    st.just({}), st.just(np.nan), st.just(np.array([1.0, 2.0])), st.just(1j), st.builds(object),
+)  # fmt: skip
 
 
 # ---- declarations -------------------------------------------------------------------------------

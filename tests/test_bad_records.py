@@ -44,29 +44,18 @@ def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset
     ("record", "options", "told"),
     [
         (GOOD | {"displacement": -GOOD["displacement"]}, {}, "displacement = .* Reverse its sign"),
-        (
-            GOOD | {"displacement": GOOD["friction"], "friction": GOOD["displacement"]},
-            {},
-            "displacement = .* which column is which",
-        ),
-        (
-            rsfstudy.read_record(GOOD).with_steps([(1e3, 1e3, 1.0, 10.0)]),
-            {},
-            "step 1 = .* outside of record, 0 to 50 s.*with_steps",
-        ),
+        (GOOD | {"displacement": GOOD["friction"], "friction": GOOD["displacement"]}, {},
+         "displacement = .* which column is which"),
+        (rsfstudy.read_record(GOOD).with_steps([(1e3, 1e3, 1.0, 10.0)]), {},
+         "step 1 = .* outside of record, 0 to 50 s.*with_steps"),
         (GOOD, {"free": (*FOUR, "alpha")}, "'alpha': needs a normal stress that changes"),
-        (
-            GOOD | {"normal_stress": np.full(ROWS, 20.0)},
-            {"free": (*FOUR, "alpha"), "loading": "recorded"},
-            "'alpha': needs a normal stress that changes",
-        ),
-        (
-            GOOD | {"normal_stress": np.linspace(20.0, 21.0, ROWS)},
-            {"free": (*FOUR, "alpha")},
-            "--loading recorded",
-        ),
+        (GOOD | {"normal_stress": np.full(ROWS, 20.0)},
+         {"free": (*FOUR, "alpha"), "loading": "recorded"},
+         "'alpha': needs a normal stress that changes"),
+        (GOOD | {"normal_stress": np.linspace(20.0, 21.0, ROWS)}, {"free": (*FOUR, "alpha")},
+         "--loading recorded"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_fitted_is_refused(
     record: dict[str, np.ndarray] | Record, options: dict[str, Any], told: str
 ) -> None:

@@ -25,16 +25,8 @@ SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
 def results(tmp_path_factory):
     """From a process of its own, as a user calls it."""
     output = tmp_path_factory.mktemp("outputs")
-    command = [
-        sys.executable,
-        "-m",
-        "rsfstudy.cli.command_line",
-        "run",
-        NAME,
-        *SMALL,
-        "--output",
-        output,
-    ]
+    command = [sys.executable, "-m", "rsfstudy.cli.command_line", "run", NAME, *SMALL]
+    command += ["--output", output]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     return output, ran.stdout

@@ -104,7 +104,7 @@ def test_no_number_of_a_step_that_is_ok_is_missing():
     loose tolerances): of each kind there are some.
     """
     ended = []
-    for number in range(180):
+    for number in range(90):
         for rtol in (1e-2, 1e-4):
             scene = drawn(number)
             outcome = VelocityStep(phases=2)(scene, Accuracy(rtol, engine=COMPILED))

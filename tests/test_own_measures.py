@@ -153,32 +153,15 @@ def test_what_is_not_measured_is_not_described():
 @pytest.mark.parametrize(
     "values",
     [
-        np.ones((2, 2)),
-        np.float64(3.0),
-        [],
-        [[1.0], [1.0, 2.0]],
-        [1.0, np.nan],
-        [1.0, np.inf],
-        [1.0, 1.0],
-        ["a", "a"],
-        ["a", "b\0c"],
-        ["a", "\udc80"],
-        [1.0, 2j],
-        [1.0, None],
-        np.array([object(), 1.0]),
-        np.array([1.0, 2.0], dtype=object),
-        np.array([1.0, 2.0], dtype=np.longdouble),
-        np.array([1.0, 2.0], dtype=np.float16),
-        np.array(["2020-01-01", "2020-01-02"], dtype="M8[ns]"),
-        np.array([1, 2], dtype="m8[ns]"),
-        np.ma.masked_array([1.0, 2.0], [False, True]),
-        {"a": 1.0},
-        "ab",
-        None,
-        3,
+        np.ones((2, 2)), np.float64(3.0), [], [[1.0], [1.0, 2.0]], [1.0, np.nan], [1.0, np.inf],
+        [1.0, 1.0], ["a", "a"], ["a", "b\0c"], ["a", "\udc80"], [1.0, 2j], [1.0, None],
+        np.array([object(), 1.0]), np.array([1.0, 2.0], dtype=object),
+        np.array([1.0, 2.0], dtype=np.longdouble), np.array([1.0, 2.0], dtype=np.float16),
+        np.array(["2020-01-01", "2020-01-02"], dtype="M8[ns]"), np.array([1, 2], dtype="m8[ns]"),
+        np.ma.masked_array([1.0, 2.0], [False, True]), {"a": 1.0}, "ab", None, 3,
     ],
     ids=named,
-)
+)  # fmt: skip
 def test_inner_coordinates_that_are_none(values):
     with pytest.raises(InvalidValue, match="x = |measure = 'Own': declares what no lattice can"):
         study(along(values))

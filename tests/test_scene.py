@@ -114,18 +114,12 @@ def test_what_takes_fields_completes_them():
 @pytest.mark.parametrize(
     "changes",
     [
-        {"stiffness_ratio": 0.5},
-        {"load_velocity_ratio": 3.0},
-        {"displacement_step": 1.0},
-        {"a": 0.012},
-        {"b_over_a": 3.0},
-        {"mu_star": 0.7},
-        {"phi": 70.0},
-        {"alpha": 0.3},
+        {"stiffness_ratio": 0.5}, {"load_velocity_ratio": 3.0}, {"displacement_step": 1.0},
+        {"a": 0.012}, {"b_over_a": 3.0}, {"mu_star": 0.7}, {"phi": 70.0}, {"alpha": 0.3},
         {"stiffness_ratio": 0.5, "b_over_a": 3.0},
     ],
     ids=str,
-)
+)  # fmt: skip
 def test_copies_share_a_critical_stiffness_only_where_friction_is_the_same(changes):
     scene = Scene(normal_stress="variable", stiffness_ratio=0.8)
     assert scene.critical_stiffness > 0.0
