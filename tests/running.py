@@ -43,6 +43,36 @@ SMALL = Study(
     ],
     measure=CriticalStep(),
 )
+#: A study file with a measure of its own.
+OWN = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Power(Measure):
+    power: int = 1
+    offset: float = 0.0
+    name: ClassVar[str] = "power"
+    headline = "total"
+    variables = {"total": ()}
+    typical_work = 1
+
+    def find(self, scene, accuracy, meter):
+        if self.power == 4:
+            raise ZeroDivisionError
+        return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
+
+
+study = Study(
+    name="own", title="Powers", base=Scene(),
+    axes=[Axis("power", [1, 2]), Axis("b_over_a", [2, 3])], measure=Power(),
+)
+"""
 FAULTY = Path(__file__).with_name("faulty.py")
 #: Time in s after which what has not come on any machine never will.
 HANGS = 1200.0

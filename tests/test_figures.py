@@ -224,14 +224,6 @@ def test_all_decades_of_bounded_slip_are_seen(tmp_path_factory):
         assert np.ptp(stresses) > 0.5 * (high - low)
 
 
-def test_the_curves_of_figure_6_fill_their_panel(tmp_path_factory):
-    dataset, _path = named_results("rate_step_stiffness", tmp_path_factory)
-    axes = plots.figure(dataset).axes[0]
-    low, high = axes.get_ylim()
-    assert axes.get_yscale() == "linear"
-    assert np.ptp(dataset.critical_velocity_ratio.sel(law="slip").values) > 0.6 * (high - low)
-
-
 def test_each_case_of_the_lattice_has_its_own_cells(tmp_path_factory):
     dataset, _path = named_results("rate_step_lattice", tmp_path_factory)
     drawn = plots.figure(dataset)
@@ -470,20 +462,3 @@ def test_words(text, written):
 )
 def test_units(quantity, written):
     assert _text.label(quantity) == written
-
-
-def test_formulas_are_never_broken():
-    text = r"critical $a\,b c d e f$ of $g h$, at last"
-    lines = _text.wrapped(text, 10).split("\n")
-    assert " ".join(lines) == text
-    assert all(line.count("$") % 2 == 0 for line in lines)
-    assert _text.wrapped(r"it costs \$5 or \$6", 10) == "it costs\n\\$5 or \\$6"
-    assert _text.wrapped("two states, b_1 = 1.4 a", 12) == "two states,\nb_1 = 1.4 a"
-
-
-@pytest.mark.parametrize(
-    ("value", "written"),
-    [(16383.0, "16,400"), (1.64e7, r"$1.64\times10^{7}$"), (0.5, "0.5"), (1e-6, "$10^{-6}$")],
-)
-def test_numbers(value, written):
-    assert _text.number(value) == written

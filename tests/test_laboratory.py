@@ -196,14 +196,6 @@ def test_an_axis_whose_scale_varies_along_another_is_refused():
     np.testing.assert_allclose(one.load_velocity, np.array([1.5, 2.0]) * 1e-2 * D_C, rtol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["normal_stress", "slip_distance"])
-def test_no_scale_is_zero(name):
-    motion = simulate(Scene(hold_time=1.0), duration=0.1, rtol=1e-2)
-    stated = {"normal_stress": SIGMA, "slip_distance": D_C} | {name: 0.0}
-    with pytest.raises(InvalidValue, match="must be positive and finite"):
-        rsfstudy.to_si(motion, **stated)
-
-
 # ---- protocols from files ------------------------------------------------------------------------
 
 RECORD = "velocity (um/s), distance (um), duration (min)\n10, 300,\n1, 300,\n\n0,, 10\n1, 200,\n"
@@ -225,18 +217,6 @@ def test_a_protocol_from_a_file(tmp_path):
     path.write_text("velocity [V_*], duration [D_c/V_*]\n2, 3\n1,\n")
     assert read_protocol(path).history == (Segment(2.0, 0.0, 3.0), Segment(1.0))
     assert RIG.protocol([{"velocity": "2 um/s", "step": "5 um"}]).history == (Segment(2.0, 0.5),)
-
-
-def test_units_of_a_rig_need_one(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text(RECORD)
-    with pytest.raises(InvalidValue, match=r"need the scales of a rig. Give a laboratory"):
-        read_protocol(path)
-    with pytest.raises(DataError, match="absent.csv: cannot be read as CSV"):
-        read_protocol(tmp_path / "absent.csv")
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DataError, match="cannot be read as CSV"):
-        read_protocol(path)
 
 
 # ---- pictures ------------------------------------------------------------------------------------
@@ -272,14 +252,6 @@ def test_where_the_load_point_is_held_slip_is_the_abscissa(fields):
     assert "Slip" in picture(motion).axes[1].get_xlabel()
     asked = picture(motion, against="load_point_displacement")
     assert "Load point displacement" in asked.axes[1].get_xlabel()
-
-
-def test_what_is_no_motion_has_no_picture():
-    with pytest.raises(DataError, match="it is no motion as simulate gives it"):
-        picture(xr.Dataset())
-    motion = simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
-    with pytest.raises(InvalidValue, match="against = 'place': is unknown"):
-        picture(motion, against="place")
 
 
 def test_the_command_simulates_a_rig(tmp_path):

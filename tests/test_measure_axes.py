@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import asked_for, call, claimed, run, same_numbers, study_of
+from running import OWN, asked_for, call, claimed, run, same_numbers, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -204,37 +204,6 @@ def test_the_file_alone_reproduces_its_cells(tmp_path):
     assert (table["values"] == table["identical"]).all()
     _scene, outcome = rsfstudy.cell(file, {"direction": "down", "b_over_a": 3.0})
     assert outcome.values["critical_displacement_stable"] == found.critical_displacement_stable
-
-
-OWN = """
-from dataclasses import dataclass
-from typing import ClassVar
-
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.status import Status
-
-
-@dataclass(frozen=True)
-class Power(Measure):
-    power: int = 1
-    offset: float = 0.0
-    name: ClassVar[str] = "power"
-    headline = "total"
-    variables = {"total": ()}
-    typical_work = 1
-
-    def find(self, scene, accuracy, meter):
-        if self.power == 4:
-            raise ZeroDivisionError
-        return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
-
-
-study = Study(
-    name="own", title="Powers", base=Scene(),
-    axes=[Axis("power", [1, 2]), Axis("b_over_a", [2, 3])], measure=Power(),
-)
-"""
 
 
 def test_a_study_file_with_a_measure_of_its_own(tmp_path, monkeypatch):

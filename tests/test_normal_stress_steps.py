@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rsfstudy import Laboratory, Scene
+from rsfstudy import Scene
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
@@ -73,9 +73,3 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
         assert reaches_norm(stepped, Accuracy(1e-9), Meter(100_000)) is reached
-
-
-def test_units_of_the_rig():
-    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
-    kind = rig.protocol([{"velocity": "1 um/s", "normal_stress": "5.5 MPa"}])
-    assert kind.history[0].normal_stress == pytest.approx(0.1, rel=1e-12)

@@ -11,7 +11,6 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 from running import run, study_of
 
 from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
-from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
@@ -49,16 +48,6 @@ def test_protocols_are_what_their_fields_say():
     rows = [{"velocity": v, "distance": 8.0} for v in (4.0, 1.0, 4.0)]
     same_motion(stepped, Scene(**STIFF, loading=protocol(rows)), 12.0)
     assert protocol(rows).lasts == 2.0 + 8.0 + 2.0
-
-
-def test_a_field_of_a_protocol_is_an_axis():
-    """Where it calls for no protocol, what is left is the step of other scenes."""
-    study = study_of(
-        "held", Healing(phases=2), Axis("hold_time", [0.0, 10.0, 100.0]), base=Scene(**STIFF)
-    )
-    found = run(study, rtol=1e-5)
-    assert [bool(x) for x in found.healing.notnull()] == [False, True, True]
-    assert float(found.healing[2]) > float(found.healing[1]) > 0.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)

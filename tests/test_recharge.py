@@ -106,12 +106,6 @@ def test_a_step_of_pressure_around_the_fault_is_none_within_it():
     assert np.allclose(motion.pore_pressure, expected, rtol=0.0, atol=1e-8)
 
 
-def test_a_file_holds_it():
-    motion = at_times(loading=INJECTED, **DILATANT, dilatancy=0.02)
-    assert motion.rsf.scene == Scene(**FAULT, loading=INJECTED, **DILATANT, dilatancy=0.02)
-    assert "of_pressure" in motion.history_samples.attrs
-
-
 def test_normal_stress_beside_a_fluid_is_refused():
     """Its own change is no pressure that drains."""
     for columns in ({}, {"pore_pressure": [0.0, 0.1]}):

@@ -159,26 +159,6 @@ def test_results_survive_their_file(tmp_path):
     assert (rerun["identical"] == rerun["values"]).all()
 
 
-def test_two_workers_and_what_is_finished_already(tmp_path, cluster):
-    made = study(*LATTICE)
-    serial = run(made, output=tmp_path / "serial")
-    both = rsfstudy.run(made, client=cluster, output=tmp_path / "both", progress=False)
-    longer = made.with_(sigma_star=["1 MPa", "5 MPa", "20 MPa", "40 MPa"])
-    kept = run(longer, output=tmp_path / "both")
-    for name in made.measure.variables:
-        xr.testing.assert_identical(serial[name], both[name])
-        xr.testing.assert_equal(both[name], kept[name].isel(sigma_star=slice(3)))
-    # cells that are kept are not timed anew
-    assert kept["wall_time"].isel(sigma_star=slice(3)).equals(both["wall_time"])
-
-
-def test_without_a_rig_nothing_is_said_of_units():
-    plain = study_of("x", LinearStability(), Axis("b_over_a", [2.0]))
-    described = plain.describe()
-    assert "laboratory" not in described
-    assert described["axes"] == [{"dimension": "b_over_a", "values": [2.0]}]
-
-
 # ---- other values ----------------------------------------------------------------------------
 
 
@@ -404,12 +384,6 @@ def test_options_of_the_rig_and_values_in_units_in_show():
     assert "axis load_velocity (1) 3 um/s" in said
     assert "axis stiffness (3) 1 kPa/um, 3.16228 kPa/um, 10 kPa/um" in said
     assert "slip_distance = 2e-05 m" in said
-
-
-def test_a_rig_is_stated_by_three_at_least():
-    status, said = called(["show", "limit_cycles", "--normal-stress", "5 MPa"])
-    assert status == 2
-    assert "--slip-distance" in said
 
 
 def test_the_stiffness_of_a_rig_takes_the_place_of_an_axis():

@@ -3,13 +3,12 @@
 import os
 import subprocess
 import sys
-import textwrap
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from faulty import declared
-from running import HANGS, SMALL, run, same_numbers
+from running import HANGS, OWN, SMALL, run, same_numbers
 
 from rsfstudy import Scene, Study
 from rsfstudy.api import runs
@@ -84,36 +83,14 @@ def test_bad_cells_are_refused_before_any_work(tmp_path):
 
 def test_a_measure_of_a_script_reaches_the_workers(tmp_path):
     script = tmp_path / "script.py"
-    script.write_text(
-        textwrap.dedent("""
-            from dataclasses import dataclass
-            import rsfstudy
-            from rsfstudy.measures import Measure, Outcome
-            from rsfstudy.status import Status
-
-            @dataclass(frozen=True)
-            class Own(Measure):
-                name = "own"
-                headline = "total"
-                variables = {"total": ()}
-                typical_work = 1
-
-                def find(self, scene, accuracy, meter):
-                    return Outcome(Status.OK, {"total": scene.b_over_a})
-
-            study = rsfstudy.Study(
-                name="own", title="Own", base=rsfstudy.Scene(), measure=Own(),
-                axes=[rsfstudy.Axis("b_over_a", [2, 3])],
-            )
-            if __name__ == "__main__":
-                print(rsfstudy.run(study, workers=1, output=None, progress=False).total.values)
-        """)
-    )
+    runs = "rsfstudy.run(study, workers=1, output=None, progress=False, power=1)"
+    guarded = f"if __name__ == '__main__':\n    print({runs}.total.values)"
+    script.write_text(f"import rsfstudy\n{OWN}\n{guarded}")
     ran = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=HANGS
     )
     assert ran.returncode == 0, ran.stderr
-    assert ran.stdout == "[2. 3.]\n"
+    assert ran.stdout == "[[2. 3.]]\n"
 
 
 def test_accuracy_reaches_the_cells():

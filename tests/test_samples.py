@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from rsfstudy.named_studies import uncertain_recurrence
-from running import call, run
+from running import run
 from scipy.stats import lognorm, norm, truncnorm, uniform
 
 import rsfstudy
@@ -452,13 +452,3 @@ def test_a_single_case_is_drawn():
 
 
 # ---- the command line ---------------------------------------------------------------------------
-
-
-def test_fewer_samples_from_the_command_line():
-    shown = call("show", "uncertain_recurrence", "--set", "sample=0:7:8").stdout
-    assert "axis sample (8)" in shown
-    refused = call("show", "uncertain_recurrence", "--set", "sample=300")
-    assert refused.returncode == 2
-    assert "sample = 300.0: is no point of the axis: they are numbered from 0 to 255" in (
-        refused.stderr.replace("\n", " ")
-    )

@@ -20,7 +20,6 @@ from running import enough, named_results
 import rsfstudy
 from rsfstudy import plots, vocabulary
 from rsfstudy.declare import catalogue, names
-from rsfstudy.files import restore
 from rsfstudy.status import Status
 
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
@@ -41,12 +40,6 @@ def test_every_cell_is_answered(result):
     dataset, _path = result
     assert (dataset.status < int(Status.WORK_BUDGET_SPENT)).all()
     assert dataset.attrs["completeness"] == "complete"
-
-
-def test_its_file_tells_the_study(result):
-    """Loadings of its own included."""
-    dataset, _path = result
-    assert restore.study_of(dataset).dimensions == dataset.status.dims
 
 
 def test_every_verdict_is_the_expected_one(result):
@@ -228,14 +221,6 @@ def test_what_is_reduced_carries_the_errors_of_its_cells(result):
             continue
         error = dataset[f"{reduction.name}_error"]
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
-
-
-def test_a_plot_outside_of_the_package_is_never_imported(result):
-    foreign = json.loads(result[0].attrs["declaration"])
-    foreign["plot"] = "os"
-    dataset = result[0].assign_attrs(declaration=json.dumps(foreign))
-    with pytest.raises(rsfstudy.errors.InvalidValue, match="plot = 'os': is unknown"):
-        plots.figure(dataset)
 
 
 @pytest.mark.parametrize("result", names.names()[::7], indirect=True, scope="module")
