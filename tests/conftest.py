@@ -123,12 +123,6 @@ def formulas_are_set_once():
 
 
 @pytest.fixture
-def constant() -> Scene:
-    """Slip law at constant normal stress."""
-    return Scene(normal_stress="constant")
-
-
-@pytest.fixture
 def variable() -> Scene:
     """Slip law with all effects of variable normal stress."""
     return Scene(normal_stress="variable", alpha=0.56, phi=60.0)

@@ -89,14 +89,6 @@ def test_two_runs_that_agree_by_chance(question, law, normal_stress, sample, dig
     assert np.nanmax(ratios) < most
 
 
-def test_a_reading_of_normal_stress_needs_one_that_changes():
-    found = Coverage(question="normal stress transient")(
-        Scene(normal_stress="constant"), Accuracy()
-    )
-    assert found.status is Status.NOT_APPLICABLE
-    assert "normal_stress" in found.message
-
-
 def test_a_scene_without_a_number_counts_its_status():
     """Slip without mass runs away, at either accuracy."""
     found = Coverage(sample=0, requested_digits=4)(LIKE[0], Accuracy())

@@ -14,7 +14,7 @@ from rsfstudy.analysis.approach import Approach
 from rsfstudy.analysis.return_map import ReturnMap, section
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
@@ -108,13 +108,6 @@ def test_all_numbers_against_the_full_equations(scene):
         values = measured(scene, rtol).values
         for name, number in zip(HEADLINES, true, strict=True):
             assert values[name] == pytest.approx(number, abs=values[f"{name}_error"] + 2e-9), name
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_both_engines_close_the_same_cycle(engine):
-    found = measured(in_words("slip")["two"], 1e-6, engine)
-    error = found.values["recurrence_interval_error"]
-    assert found.values["recurrence_interval"] == pytest.approx(TRUE["slip"], abs=error)
 
 
 def test_the_cycle_of_one_event_is_that_of_the_limit_cycle():

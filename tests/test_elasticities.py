@@ -9,7 +9,6 @@ import pytest
 from running import run
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.errors import InvalidValue
 from rsfstudy.files import restore
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
@@ -158,26 +157,6 @@ def test_a_study_of_elasticities():
     again = restore.study_of(found)
     assert again.measure == measure
     assert again.describe() == study.describe()
-
-
-class Curve(Known):
-    """A headline along an inner dimension."""
-
-    variables: ClassVar[dict[str, tuple[str, ...]]] = {"y": ("phase",)}
-
-
-def test_what_has_no_elasticities():
-    for given, message in (
-        ({"measure": CriticalStep(), "parameters": ("law",)}, "parameters = 'law': is no number"),
-        (
-            {"measure": CriticalStep(), "parameters": ("load_velocity_ratio",)},
-            "parameters = 'load_velocity_ratio': is no number of a scene that critical_step leaves",
-        ),
-        ({"measure": Curve()}, "measure = .*headline is one number"),
-        ({"measure": "critical_step"}, "measure = 'critical_step': must be a measure"),
-    ):
-        with pytest.raises(InvalidValue, match=message):
-            Elasticities(**given)
 
 
 def test_the_elasticities_that_uncertain_recurrence_states():

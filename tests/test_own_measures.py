@@ -186,46 +186,6 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
     assert back["curve"].values.tolist() == [[3.0, 4.0]] * 2
 
 
-@pytest.mark.parametrize(
-    ("declared", "complaint"),
-    [
-        ({"variables": ["total"]}, "declares what no lattice can hold"),
-        ({"variables": {}}, "must name a number"),
-        *(
-            ({"variables": {"total": (), name: ()}}, f"'{name}': names something else, or nothing")
-            for name in ("a/b", "phi", "status", "e\u0301tude")
-        ),
-        ({"inner_coordinates": {"total": [0.0, 1.0]}}, "'total': names something else"),
-        ({"variables": {"total": None}}, "dimensions = None: of 'total' must be names"),
-        ({"variables": {"total": "x"}}, "dimensions = 'x': of 'total' must be names"),
-        ({"variables": {"total": ("x",)}}, "dimension = 'x': of 'total' has no coordinate values"),
-        ({"variables": {"total": ("x", "x")}}, "must be names, each once"),
-        ({"headline": []}, "unhashable"),
-        ({"headline": "other"}, "headline = 'other': is not measured"),
-        ({"name": None}, "name = None: must be a text"),
-        ({"sought": ("b_ovr_a",)}, "sought = 'b_ovr_a': is not a field .* mean 'b_over_a'"),
-        ({"sought": 3}, "declares what no lattice can hold"),
-        ({"typical_work": "many"}, "typical_work = 'many': must be a number greater than 0"),
-        ({"typical_work": 0}, "typical_work = 0: must be a number greater than 0"),
-        ({"typical_work": np.nan}, "typical_work = nan: must be a number greater than 0"),
-        ({"typical_work": 10**400}, "declares what no lattice can hold .OverflowError"),
-        ({"work_by_digits": {}}, "declares what no lattice can hold .IndexError"),
-        ({"expected_work": lambda _self, _accuracy: np.nan}, "expected_work = nan: must exceed 0"),
-        ({"describe": lambda _self: None}, "is no plain data"),
-        (
-            {"describe": lambda _self: {"name": "own", "n": np.int64(2)}},
-            "is no plain data .*Python",
-        ),
-        ({"describe": lambda _self: {}}, "declares what no lattice can hold .KeyError: 'name'"),
-        ({"__call__": lambda _self, _scene, _accuracy: 3}, "has a __call__ of its own. Write find"),
-    ],
-    ids=named,
-)
-def test_declarations_that_make_no_lattice(declared, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        study(own(**declared))
-
-
 def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
     claim = claimed(id="T1", variable="message", where={"b_over_a": 2.0})

@@ -173,13 +173,6 @@ def test_few_events_say_nothing_of_periods(events):
     assert f"--set events={2 * events}" in found.message
 
 
-def test_one_state_has_a_period_of_one():
-    found = LimitCycle(phases=2)(
-        Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True), Accuracy(1e-4)
-    )
-    assert found.values["period_events"] == 1.0
-
-
 def test_a_start_that_no_stress_holds_leads_nowhere():
     """Spring stress so low that the fault opens."""
     scene = Scene(law="two_slip_states", load_velocity_ratio=1.0)

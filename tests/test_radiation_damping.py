@@ -4,14 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import between_ruptures, relation_of
 from rsfstudy.status import Status
@@ -53,17 +51,6 @@ def test_at_zero_strength_it_is_the_effect_absent(law, of):
         for damping in (0.0, 1e-17)
     )
     assert faint == pytest.approx(absent, rel=1e-8)
-
-
-def test_critical_stiffness_at_the_reference_rate():
-    """K_cr = [(b - a) - eta D]/E, D = 1 - mu_* cot(phi), E = D + alpha cot(phi)."""
-    scene = Scene(radiation_damping=0.003)
-    steadiness = 1.0 - scene.mu_star * cot_phi(scene)
-    expected = (scene.b - scene.a - 0.003 * steadiness) / (
-        steadiness + scene.alpha * cot_phi(scene)
-    )
-    found = LinearStability()(scene, Accuracy()).values["critical_stiffness"]
-    assert found == pytest.approx(expected, rel=1e-13)
 
 
 def test_stronger_damping_makes_slower_ruptures():

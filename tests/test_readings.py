@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from in_time import InTime
 from scipy.integrate import DOP853, quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
@@ -132,20 +131,6 @@ def test_where_there_is_no_closed_form_there_is_no_departure(number, fields, kno
     scene = Scene(**{**SOFT, **fields})
     found = read(VelocityStep(step_number=number, phases=2), scene, 1e-5, engine=COMPILED)
     assert math.isfinite(found["closed_form_departure"]) is known
-
-
-@pytest.mark.parametrize(("law", "end"), [("slip", 43.3), ("slowness", 45.0)])
-def test_a_hold_is_that_of_time(law, end):
-    """By equations in time: how far stress relaxes, and where it peaks after reloading, soon after
-    which slip runs away by the slip law.
-    """
-    scene = Scene(law=law, normal_stress="constant", stiffness_ratio=2.0, hold_time=40.0)
-    (held, _end), (tops,) = InTime(scene).solved([40.0, end], [lambda now: now.v - 1.0], [1.0])
-    time, top = tops[-1]
-    found = read(Healing(phases=2), scene)
-    assert found["relaxation"] == pytest.approx(held.f, rel=2e-7)
-    assert found["healing"] == pytest.approx(top.f, rel=2e-7)
-    assert found["peak_displacement"] == pytest.approx(time - 40.0, abs=1e-3)
 
 
 DILATANT = {"normal_stress": "constant", "fluid": "dilatant", "dilatancy": 0.02, "drainage": 1.0}

@@ -242,18 +242,6 @@ def test_draws_of_a_fit_are_cases_of_a_rig(fitted):
 # ---- what is refused ----------------------------------------------------------------------------
 
 
-def test_what_is_no_table():
-    for table, message in (
-        (pd.Series([0.01], name="a"), "is no table of columns"),
-        (pd.DataFrame([[1.0, 2.0]], columns=["a", "a"]), "must be one list, of a value for"),
-        (xr.Dataset({"a": (("x", "y"), np.ones((2, 2)))}), "must be one list"),
-        ({"a": [0.01], "a (1)": [0.01]}, "column = 'a': stands twice"),
-        (xr.Dataset({"a (1)": ("x", [0.01], {"units": "um"})}), "units = 'um': are not those of"),
-    ):
-        with pytest.raises(InvalidValue, match=message):
-            Axis.cases(table)
-
-
 def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypatch):
     monkeypatch.setattr(cells, "computed", None)
     drawn = {"a": norm(0.01, 0.01), "mu_star": norm(0.6, 0.3)}

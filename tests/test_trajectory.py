@@ -38,23 +38,6 @@ def test_a_stable_step_ends_in_the_new_steady_state(inertia):
     assert float(end.state_variable) == pytest.approx(-scene.b * math.log(1.5), abs=1e-9)
 
 
-def test_slip_is_the_integral_of_slip_rate():
-    motion = rsfstudy.simulate(Scene(load_velocity_ratio=1.5, law="slowness"), duration=30.0)
-    rate = 10.0**motion.log10_slip_rate.values
-    slip = np.concatenate([[0.0], np.cumsum(np.diff(motion.time) * (rate[1:] + rate[:-1]) / 2)])
-    # trapezoids between samples
-    np.testing.assert_allclose(motion.slip, slip, rtol=1e-3, atol=1e-3)
-
-
-def test_friction_law_holds_along_the_way():
-    """tau/sigma = mu_* + a ln V + Theta wherever mass does not act: eq. 1a."""
-    scene = Scene(load_velocity_ratio=1.5, displacement_step=0.2)
-    motion = rsfstudy.simulate(scene, duration=30.0)
-    friction = motion.shear_stress / motion.normal_stress_ratio
-    law = scene.mu_star + scene.a * math.log(10.0) * motion.log10_slip_rate + motion.state_variable
-    np.testing.assert_allclose(friction, law, atol=1e-13)
-
-
 def test_time_is_an_index_though_stress_jumps():
     """Held, pushed by 0.5 D_c at time 2, and let go on: spring stress jumps at once."""
     segments = [{"velocity": 0.0, "duration": 2.0}, {"velocity": 1.0, "duration": 1.0, "step": 0.5}]

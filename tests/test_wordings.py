@@ -20,6 +20,7 @@ from unittest import mock
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from running import call
 from scipy.stats import norm
 
@@ -31,6 +32,7 @@ from rsfstudy.declare.names import names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.elasticities import Elasticities
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
@@ -128,6 +130,17 @@ def claim(**fields) -> Claim:
     return Claim(**{**parts, "published": 1.0, "tolerance": 0.1, "reason": "", **fields})
 
 
+def own(**declared) -> Measure:
+    """A measure of a user's own, that declares something else."""
+    usual = {"name": "own", "headline": "total", "variables": {"total": ()}, "typical_work": 1}
+    return type("Own", (Measure,), usual | declared)()
+
+
+def measuring(**declared) -> rsfstudy.Study:
+    """A study of such a measure."""
+    return study(Axis("b_over_a", [2.0]), measure=own(**declared))
+
+
 def members(base: type) -> Iterator[type]:
     yield base
     for kind in base.__subclasses__():
@@ -147,9 +160,10 @@ def known() -> dict[str, Any]:
     return (
         {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
         | {kind.__name__: kind for kind in kinds if kind.__module__.startswith("rsfstudy.")}
-        | {"inf": math.inf, "nan": math.nan, "np": np, "pd": pd, "norm": norm}
+        | {"inf": math.inf, "nan": math.nan, "np": np, "pd": pd, "norm": norm, "xr": xr}
         | {"Accuracy": Accuracy, "Output": Output}
         | {"study": study, "claim": claim, "csv": csv, "RIG": RIG, "in_si": in_si}
+        | {"own": own, "measuring": measuring, "Elasticities": Elasticities}
         | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
     )
 
