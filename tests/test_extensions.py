@@ -511,23 +511,6 @@ def squares(dataset, axes):
     axes.set_title("squares")
 
 
-@pytest.mark.parametrize(
-    ("plot", "complaint"),
-    [
-        (3, "plot = 3: must be a name, a Figure, or a function or module"),
-        (lambda dataset, axes: axes, "plot = '<lambda>': needs a name of its own"),
-        (
-            SimpleNamespace(__name__="lines", draw=squares),
-            "plot = 'lines': needs a name of its own",
-        ),
-        (SimpleNamespace(__name__="laws", draw=squares), "plot = 'laws': needs a name of its own"),
-    ],
-)
-def test_figures_that_are_none(plot, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        study_of("n", Held(), Axis("phi", [60]), plot=plot)
-
-
 def test_a_module_or_a_function_draws(tmp_path):
     study = study_of("n", Held(), Axis("phi", [60, 70]), plot=squares)
     dataset = run(study)

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import rsfstudy
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
+from rsfstudy.errors import DataError, InvalidValue
 
 TIME = np.array([0.0, 0.5, 1.0, 2.0])
 MOVED = np.array([0.0, 1.5, 3.0, 36.0])
@@ -68,49 +68,6 @@ def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
         rsfstudy.read_record(path, {"mu": "mu"})
     with pytest.raises(InvalidValue, match="heading = 't': heads no column"):
         rsfstudy.read_record(pd.read_csv(path), {"time": "t (s)"})
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("t (s),displ,mu\n0,0,0.6\n", ["displ", "states no units", "displ (um)"]),
-        ("t (s),displ (MPa),mu\n0,0,0.6\n", ["displacement", "MPa"]),
-        ("clock,displ (um),mu\n0,0,0.6\n", ["time and displacement", "columns="]),
-        ("t (s),displ (um)\n0,0\n", ["friction", "shear_stress"]),
-        ("t (s),displ (um),tau (MPa)\n0,0,1\n", ["normal stress", "20 MPa"]),
-        ("t (s),displ (um),mu\n0,0,0.6\n1,1,nan\n2,2,0.6\n", ["line 3", "column 3", "nan"]),
-        ("t (s),displ (um),mu\n0,0,0.6\n1,,0.6\n2,2,0.6\n", ["line 3", "column 2"]),
-        ("t (s),displ (um),mu\n\n0,0,0.6\n1,two,0.6\n", ["line 4", "column 2", "two"]),
-        ("t (s),displ (um),mu\n0,0,0.6\n1,1\n", ["line 3", "2 fields"]),
-        ("t (s),displ (um),mu\n0,0,0.6\n1,1,0.6\n1,2,0.6\n", ["time", "row 3", "later"]),
-        ("t (s),displ (um),mu\n0,0,0.6\n2,1,0.6\n1,2,0.6\n", ["time", "row 3", "later"]),
-        (
-            "t (s),displ (um),tau (MPa),sigma (MPa)\n0,0,1,1\n1,1,1,0\n",
-            ["normal_stress", "positive", "row 2"],
-        ),
-    ],
-)
-def test_what_is_wrong_in_a_file_is_told_with_its_place(
-    text: str, told: list[str], tmp_path: Path
-) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text(text)
-    with pytest.raises(RsfStudyError) as error:
-        rsfstudy.read_record(path)
-    for words in told:
-        assert words in str(error.value)
-
-
-def test_what_is_wrong_in_arrays_is_told() -> None:
-    arrays = {"time": TIME, "displacement": MOVED, "friction": FRICTION}
-    for name, values, told in (
-        ("friction", [0.6, 0.6, np.nan, 0.6], "sample 3"),
-        ("displacement", MOVED[:3], "3 samples"),
-        ("time", [0.0, 1.0, 1.0, 2.0], "row 3"),
-        ("speed", MOVED, "unknown"),
-    ):
-        with pytest.raises(InvalidValue, match=told):
-            rsfstudy.read_record({**arrays, name: np.array(values)})
 
 
 def test_raw_numbers_have_a_scale_and_an_offset(tmp_path: Path) -> None:

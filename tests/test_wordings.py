@@ -14,6 +14,7 @@ import shlex
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
@@ -164,6 +165,7 @@ def known() -> dict[str, Any]:
         | {"Accuracy": Accuracy, "Output": Output}
         | {"study": study, "claim": claim, "csv": csv, "RIG": RIG, "in_si": in_si}
         | {"own": own, "measuring": measuring, "Elasticities": Elasticities}
+        | {"SimpleNamespace": SimpleNamespace}
         | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
     )
 
