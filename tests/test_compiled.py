@@ -74,7 +74,7 @@ def asked() -> Iterator[tuple[Measure, Scene, Accuracy]]:
         yield LimitCycle(phases=2), cycling, Accuracy(1e-6)
 
 
-@pytest.mark.parametrize(("measure", "scene", "accuracy"), asked())
+@pytest.mark.parametrize(("measure", "scene", "accuracy"), list(asked()))
 def test_both_engines_end_alike_within_their_errors(measure, scene, accuracy):
     one = agreement.compared(measure, scene, accuracy)
     assert one.same_end, one.what
