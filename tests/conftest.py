@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import gc
 import importlib
@@ -18,8 +19,9 @@ from rsfstudy import Scene
 from rsfstudy.compute import clusters, provenance, workers
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, EventSpecification, settling
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise, settling
+from rsfstudy.motion.meter import Halt, Meter
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -77,6 +79,28 @@ def follow(
         if until(event):
             return meter
     raise AssertionError("a motion never ends by itself")
+
+
+def reaches_the_norm(scene: Scene, rtol: float = 1e-8, peaks: float = math.inf) -> bool:
+    """Whether a motion does, or one of so many first peaks, followed without any of what ends it
+    early.
+    """
+    norm, count = scene.log_norm_rate, 0
+    watches = (
+        maximum("log_slip_rate"),
+        rise("log_slip_rate", norm, ends=True),
+        fall("spring_stress", -scene.mu_star, ends=True),
+    )
+    accuracy, meter = Accuracy(rtol, engine=COMPILED), Meter(200_000, engine=COMPILED)
+    with contextlib.suppress(Halt):  # slip that dies out, or that decays for ever
+        for event in course.follow(scene, accuracy, meter, watches):
+            # a step may pass the norm and come back
+            if event.kind is Kind.RISE or event.point.log_slip_rate >= norm:
+                return True
+            count += event.kind is Kind.MAXIMUM
+            if count == peaks:
+                break
+    return False
 
 
 def cot_phi(scene: Scene) -> float:

@@ -1,10 +1,9 @@
 """Where critical paths end, are none, or do not decide."""
 
-import contextlib
 import math
 
 import pytest
-from conftest import cot_phi
+from conftest import cot_phi, reaches_the_norm
 
 from rsfstudy import Scene
 from rsfstudy.analysis import search_of_steps
@@ -15,7 +14,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import Kind, maximum, rise
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT, FALL = "load_velocity_ratio", "displacement_step", "normal_stress_step"
@@ -92,22 +91,6 @@ def test_a_fall_of_normal_stress_leaves_sigma_3_positive():
     assert 1.0 + largest == pytest.approx(scene.mu_star * cot_phi(scene), rel=1e-6)
 
 
-def reaches_the_norm(scene: Scene, peaks: int) -> bool:
-    """Whether one of so many first peaks does, followed forward."""
-    beyond = rise("log_slip_rate", scene.log_norm_rate, ends=True)
-    meter, count = Meter(200_000, engine=COMPILED), 0
-    with contextlib.suppress(Halt):  # slip that dies out under a held load point
-        watches = (maximum("log_slip_rate"), beyond)
-        for event in follow(scene, Accuracy(1e-10, engine=COMPILED), meter, watches):
-            # a step may pass the norm and come back
-            if event.kind is Kind.RISE or event.point.log_slip_rate >= scene.log_norm_rate:
-                return True
-            count += event.kind is Kind.MAXIMUM
-            if count == peaks:
-                break
-    return False
-
-
 ASKED = [
     *((of, way, stress) for of in (RATE, DISPLACEMENT) for way in ("up", "down")
       for stress in (CONSTANT, VARIABLE)),
@@ -128,10 +111,10 @@ def test_motions_on_each_side_go_as_told(law, of, direction, stress):
     held = {} if of == RATE else {"load_velocity_ratio": 0.0}
     if outcome.status is Status.STABLE_FOR_ALL_STEPS:
         largest = outcome.values[f"{measure.headline}_stable"]
-        assert not reaches_the_norm(scene.with_(**{of: largest}, **held), 10)
+        assert not reaches_the_norm(scene.with_(**{of: largest}, **held), 1e-10, 10)
         return
     assert outcome.status is Status.OK
     critical = outcome.values[measure.headline]
     for share, reaches in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
         step = critical**share if of == RATE else critical * share
-        assert reaches_the_norm(scene.with_(**{of: step}, **held), 100) is reaches
+        assert reaches_the_norm(scene.with_(**{of: step}, **held), 1e-10, 100) is reaches

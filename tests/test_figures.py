@@ -411,8 +411,6 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        (["--output", "fig.pdf", "--figure", "svg"], 2, "nor another --figure"),
-        (["--figure", "jpg"], 2, "'jpg' is not one of"),
         (["--style", "nothing"], 2, "is neither a style sheet"),
         (["--variable", "nothing"], 1, "variable = 'nothing': is no number"),
     ],

@@ -1,10 +1,10 @@
 """Load point at rest: critical steps where several states may weaken one after the other."""
 
-import contextlib
 import math
 
 import numpy as np
 import pytest
+from conftest import reaches_the_norm
 
 from rsfstudy import Scene, simulate
 from rsfstudy.analysis import held
@@ -13,8 +13,8 @@ from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.events import Kind, fall, maximum, rise
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.events import fall, maximum
+from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"
@@ -37,22 +37,6 @@ LATE = [
          "drainage": 30.0, "stiffness_ratio": 1.0, "period": 300.0, "reference_rate": 2.6e-8},
     ),
 ]  # fmt: skip
-
-
-def reaches_the_norm(scene: Scene) -> bool:
-    """Whether the motion does, followed without any of what ends it early."""
-    norm = scene.log_norm_rate
-    watches = (
-        rise("log_slip_rate", norm, ends=True),
-        fall("spring_stress", -scene.mu_star, ends=True),
-    )
-    # slip that dies out, or that decays for ever
-    with contextlib.suppress(Halt):
-        meter = Meter(20_000, engine=COMPILED)
-        for event in follow(scene, Accuracy(1e-8, engine=COMPILED), meter, watches):
-            if event.kind is Kind.RISE or event.point.log_slip_rate >= norm:
-                return True
-    return False
 
 
 @pytest.mark.parametrize("engine", ["scipy", COMPILED])
