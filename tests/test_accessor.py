@@ -165,21 +165,12 @@ def test_results_are_checked_drawn_and_converted(results):
     np.testing.assert_allclose(velocity, results.critical_velocity_ratio * 1e-5 * 1.17e-8)
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda rsf: rsf.scene,
-        lambda rsf: rsf.study,
-        lambda rsf: rsf.to_si(**SI),
-        lambda rsf: rsf.check(),
-        lambda rsf: rsf.plot(),
-        lambda rsf: rsf.failures(),
-    ],
-)
-def test_a_foreign_dataset_is_refused(ask):
-    foreign = xr.Dataset({"temperature": ("x", [1.0])})
-    with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
-        ask(foreign.rsf)
+def test_a_foreign_dataset_is_refused():
+    rsf = xr.Dataset({"temperature": ("x", [1.0])}).rsf
+    asks = rsf.check, rsf.plot, rsf.failures, lambda: rsf.to_si(**SI)
+    for ask in (*asks, lambda: rsf.scene, lambda: rsf.study):
+        with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
+            ask()
 
 
 @pytest.mark.parametrize("scene", ["LC08_L1TP", "[1]", '{"law": "slip"}'])

@@ -68,15 +68,8 @@ def test_what_was_edited_is_told_all_the_same(older, tmp_path):
 
 def test_files_name_their_layout(tmp_path):
     rsfstudy.run("linear_stability", output=tmp_path, workers=0, progress=False, b_over_a=[2.0])
-    call(
-        "simulate",
-        "--set",
-        "load_velocity_ratio=2",
-        "--duration",
-        "0.1",
-        "--output",
-        tmp_path / "m.png",
-    )
+    words = ["simulate", "--set", "load_velocity_ratio=2", "--duration", "0.1", "--output"]
+    call(*words, tmp_path / "m.png")
     for name in ("linear_stability.nc", "m.nc"):
         assert xr.load_dataset(tmp_path / name).attrs["layout"] == contents.LAYOUT
 

@@ -11,8 +11,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
+from rsfstudy.measures.linear_stability import growth, jacobian
 from rsfstudy.slider import closed_forms, laws, stability, steady
-from rsfstudy.slider.equations import normal_stress_at
+from rsfstudy.slider.equations import by_displacement, normal_stress_at
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
 WITH_ONE_B = {name: law for name, law in laws.PARTS.items() if issubclass(law, laws.Law)}
@@ -120,3 +121,17 @@ def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
     heavy = stability.growth_rates(scene.with_(inertia=True, period=period), 0.0)
     assert heavy[-1].real < -1e9
     np.testing.assert_allclose(heavy[:-1].real, stability.growth_rates(scene, 0.0).real, rtol=1e-8)
+
+
+@pytest.mark.parametrize("off", [-1e-3, -1e-8, 1e-8, 1e-3])
+@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
+def test_growth_close_to_critical_stiffness(off, effects):
+    """At K = K_cr (1 + d), a p**2 + (E K - (b-a)) p + D K = 0 per time D_c/V_*: twice the growth
+    rate is -(b-a) d/a, and a half of that per slip and load point displacement.
+    """
+    scene = Scene(stiffness_ratio=1.0 + off, **effects)
+    expected = -0.25 * (scene.b_over_a - 1.0) * off
+    # central differences are right to 6e-10 of rates of order one
+    grows = growth(jacobian(by_displacement(scene), (0.0, 0.0)))
+    assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
+    assert grows * off < 0.0
