@@ -20,7 +20,6 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text
-from rsfstudy.quantity import Quantity
 
 MM = 25.4
 #: Inches by which neighbours may seem to touch: extents are those of the highest letters.
@@ -448,15 +447,3 @@ def test_run_takes_a_format_and_a_style(tmp_path, monkeypatch):
 )
 def test_words(text, written):
     assert _text.pretty(text) == written
-
-
-@pytest.mark.parametrize(
-    ("quantity", "written"),
-    [
-        (Quantity("x", "", "s-1", "rate of step-2"), "Rate of step-2 (s$^{-1}$)"),
-        (Quantity("x", "", "1", "stress", "sigma_*"), r"Stress ($\sigma_*$)"),
-        (Quantity("x", "$V$", "m s-1", "rate", "V_*"), "Rate, $V$ (m s$^{-1}$)"),
-    ],
-)
-def test_units(quantity, written):
-    assert _text.label(quantity) == written

@@ -56,7 +56,9 @@ def test_load_point_is_held_after_a_displacement_step_unless_said_otherwise():
 
 def test_effects_are_those_the_scene_calls_for():
     assert Scene(normal_stress="constant").effects == ()
-    assert Scene(alpha=0.0).effects == ("inclined_driving",)
+    worn, wet = Scene(alpha=0.0, stress_dependence=1.0), Scene(alpha=0.0, fluid="dilatant")
+    assert worn.effects == ("stress_dependence", "inclined_driving")
+    assert wet.effects == ("inclined_driving", "dilatancy")
     assert Scene(inertia=True).effects == ("inclined_driving", "linker_dieterich", "inertia")
 
 

@@ -159,11 +159,6 @@ def test_closed_forms_that_do_not_hold_with_it_are_not_told():
     assert growth == pytest.approx(stability["critical_stiffness"], rel=1e-8)
 
 
-def test_it_is_told_among_the_effects():
-    effects = Scene(stress_dependence=1.0, alpha=0.0).effects
-    assert effects == ("stress_dependence", "inclined_driving")
-
-
 def test_critical_stiffness_itself_is_left_open():
     """Orbits need not close there: neither growth nor decay can be told."""
     for law in ("slip", "slowness"):
