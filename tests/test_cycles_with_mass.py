@@ -18,13 +18,7 @@ from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
-HEADLINES = (
-    "recurrence_interval",
-    "static_stress_drop",
-    "dynamic_stress_drop",
-    "min_log10_slip_rate",
-    "max_log10_slip_rate",
-)
+HEADLINES = [output.name for output in LimitCycle().outputs if output.error]
 #: V_0 T/(2 pi D_c) = .1.
 SAME = {
     "a": 0.004,
