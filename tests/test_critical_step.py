@@ -369,15 +369,17 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """Leaps that had to be shortened each time would take ten times the work."""
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert swing.swing(scene, Accuracy(1e-6), Meter(15_000)).reached
+    assert after_step.reaches_norm(scene, Accuracy(1e-6), Meter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
-        found = swing.swing(scene.with_(inertia=inertia), Accuracy(1e-6), Meter(500_000))
-        assert found.reached is not inertia
+        reached = after_step.reaches_norm(
+            scene.with_(inertia=inertia), Accuracy(1e-6), Meter(500_000)
+        )
+        assert reached is not inertia
 
 
 def test_a_limit_cycle_below_the_norm_is_not_leapt_over():

@@ -6,7 +6,6 @@ import math
 
 import pytest
 from in_time import InTime
-from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
+from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
+from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 from rsfstudy.named_studies._triggers import Triggers
 
 from rsfstudy import Scene
@@ -14,8 +16,6 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.normal_stress_response import NormalStressResponse
-from rsfstudy.measures.normal_stress_transient import NormalStressTransient
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
