@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.runs import run as run
     from rsfstudy.api.runs import studies as studies
     from rsfstudy.api.trajectory import simulate as simulate
-    from rsfstudy.declare.axis import Axis as Axis
+    from rsfstudy.axes.axis import Axis as Axis
     from rsfstudy.declare.claims import Claim as Claim
     from rsfstudy.declare.figure import Figure as Figure
     from rsfstudy.declare.figure import Panel as Panel
@@ -56,7 +56,7 @@ _GIVEN = {
     "rig.history": ("history",),
     "plots._motion": ("picture",),
     "declare.study": ("Study",),
-    "declare.axis": ("Axis",),
+    "axes.axis": ("Axis",),
     "declare.claims": ("Claim",),
     "declare.figure": ("Figure", "Panel"),
     "motion.accuracy": ("Accuracy",),

@@ -11,11 +11,10 @@ from running import called, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
-from rsfstudy.declare import catalogue
+from rsfstudy.declare import catalogue, rigs
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.rig import lattice
 
 STATED = {
     "normal_stress": "5 MPa",
@@ -342,7 +341,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """Axes are in units then, what they hold is what they held; new values are in units."""
     studied = catalogue.load("slide_hold_slide")
     rig = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = lattice.on(studied, rig)
+    there = rigs.on(studied, rig)
     assert there.axes[2].units == {"hold_time": "s"}
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -370,7 +369,7 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     study = catalogue.load("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = lattice.on(before, rig).base
+        there = rigs.on(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass
 

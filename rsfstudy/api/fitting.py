@@ -11,7 +11,7 @@ import xarray as xr
 
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import runs
-from rsfstudy.declare.axis import Axis
+from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.doors import door

@@ -20,13 +20,13 @@ import xarray as xr
 from rsfstudy.api import runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
-from rsfstudy.declare.wording import settings
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
 from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, table
 from rsfstudy.status import Status
+from rsfstudy.wording import settings
 
 _UNREAD = "cannot be read"
 #: What begins a page of ours, and a figure.

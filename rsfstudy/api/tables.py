@@ -14,11 +14,11 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
-from rsfstudy.declare.wording import listed, short, stated
 from rsfstudy.files import contents, numbers
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
+from rsfstudy.wording import listed, short, stated
 
 #: Most cells of a lattice that are shown, and most that failed.
 MOST_CELLS, _MOST_FAILURES = 24, 20

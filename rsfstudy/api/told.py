@@ -12,8 +12,8 @@ import xarray as xr
 from rsfstudy.api import fit_results, tables
 from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
-from rsfstudy.declare.wording import stated
 from rsfstudy.files import contents
+from rsfstudy.wording import stated
 
 Piece = Table | Mapping[str, str] | str
 

@@ -26,13 +26,12 @@ from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import SharedProcesses, Workers
-from rsfstudy.declare import catalogue, names
+from rsfstudy.declare import catalogue, names, rigs
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.motion.engines import lacking
-from rsfstudy.rig import lattice
 from rsfstudy.rig.quantities import STATED
 from rsfstudy.rig.units import number
 
@@ -242,7 +241,7 @@ def _declared(name: str, given: Given) -> Study:
     taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
     if {*stated} - taken and study.laboratory is None:
         rig = {name: text for name, text in stated.items() if name not in taken}
-        study = lattice.on(study, assignments.laboratory(rig))
+        study = rigs.on(study, assignments.laboratory(rig))
         study = replace(study, overrides={**study.overrides, **rig})
         stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {"load_velocity": "m/s", **{name: about.units for name, about in STATED.items()}}

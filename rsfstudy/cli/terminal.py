@@ -17,7 +17,6 @@ from rsfstudy.cli.console import console, stderr
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.wording import listed, settings, short, stated
 from rsfstudy.errors import DataError, brief
 from rsfstudy.files import contents
 from rsfstudy.files.comparison import Comparison
@@ -27,6 +26,7 @@ from rsfstudy.rig.quantities import STATED
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage
+from rsfstudy.wording import listed, settings, short, stated
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure

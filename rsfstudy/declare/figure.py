@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import check_text
+from rsfstudy.axes.axis import check_text
 from rsfstudy.declare.names import names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rsfstudy.declare.axis import Axis
-from rsfstudy.declare.wording import listed
+from rsfstudy.axes.axis import Axis
 from rsfstudy.quantity import (
     HEADINGS,
     Quantity,
@@ -20,6 +19,7 @@ from rsfstudy.quantity import (
 )
 from rsfstudy.slider import registry
 from rsfstudy.vocabulary import quantity
+from rsfstudy.wording import listed
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study

@@ -14,23 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare import checks
-from rsfstudy.declare.axis import Axis, Row, check_text, plain_values, select, spread
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, spread
+from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
-from rsfstudy.declare.wording import is_list
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.reduce import Reduction
-from rsfstudy.rig import lattice
 from rsfstudy.rig.axes import axis as axis_in_units
 from rsfstudy.rig.axes import in_units
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.lattice import Cells
 from rsfstudy.rig.quantities import ALSO, FULL
 from rsfstudy.slider.assembly import without_meaning
 from rsfstudy.slider.registry import (
@@ -44,6 +43,7 @@ from rsfstudy.slider.registry import (
     quantities_with,
 )
 from rsfstudy.slider.scene import Scene
+from rsfstudy.wording import is_list
 
 #: Fields that decide what fills a slot.
 _CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
@@ -205,9 +205,9 @@ class Study:
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
-    def rig(self) -> lattice.Cells | None:
+    def rig(self) -> Cells | None:
         """What makes scenes of axes in units, in a study of a rig."""
-        return lattice.Cells(self.laboratory, self.base, self.axes) if self.laboratory else None
+        return Cells(self.laboratory, self.base, self.axes) if self.laboratory else None
 
     @cached_property
     def units(self) -> dict[str, str]:
@@ -342,7 +342,7 @@ class Study:
             if ALSO.get(name) in axis.fields and name not in axis.fields:
                 changed = self._stated_as(name, values, axis)
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-        if changed_by_rig := lattice.override(self, name, value):
+        if changed_by_rig := rigs.override(self, name, value):
             return replace(self, **changed_by_rig)
         for index, axis in enumerate(self.axes):
             if name == axis.dimension:

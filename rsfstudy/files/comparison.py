@@ -14,13 +14,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.declare.wording import listed
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
 from rsfstudy.files.journal import differences
 from rsfstudy.files.numbers import headline
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import MEASURED_TIMES
+from rsfstudy.wording import listed
 
 _COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
 #: Of a fingerprint, what the declaration states too.

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.accuracy import Accuracy

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.axis import kinds
+from rsfstudy.axes.axis import kinds
 from rsfstudy.declare.study import Study
 from rsfstudy.files import loadings
 from rsfstudy.files.contents import LAYOUT

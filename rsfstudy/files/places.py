@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rsfstudy.axes.axis import check_text
 from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.axis import check_text
 from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
 

@@ -16,8 +16,8 @@ import msgspec
 import xarray as xr
 
 from rsfstudy import measures, reduce
+from rsfstudy.axes.axis import Axis
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.axis import Axis
 from rsfstudy.declare.figure import figure_name
 from rsfstudy.declare.names import names
 from rsfstudy.declare.study import Study

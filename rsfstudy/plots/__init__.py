@@ -25,7 +25,6 @@ from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.figure import Figure as Declared
 from rsfstudy.declare.figure import Panel
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.wording import settings
 from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.files.contents import declaration
@@ -45,6 +44,7 @@ from rsfstudy.reduce.base import stated_by
 from rsfstudy.rig.scales import in_units_of_rig
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, quantity
+from rsfstudy.wording import settings
 
 Draw = Callable[[xr.Dataset, Axes], Any]
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from rsfstudy.declare.axis import Axis, Row, columns, plain
-from rsfstudy.declare.wording import is_list
+from rsfstudy.axes.axis import Axis, Row, columns, plain
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import FULL, OF_AXIS, ON_AXIS, STATED, UNITS, is_friction, units_of
 from rsfstudy.rig.units import exact, factor, parted, spaced
+from rsfstudy.wording import is_list
 
 
 def axis(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Axis:

@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.declare.axis import Axis
+from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.rig import axes

@@ -1,40 +1,32 @@
-"""Lattices over rigs: the fields of scenes that each cell has by axes in units; and studies on
-other rigs, or with other values.
-"""
+"""Lattices over rigs: the fields of scenes that each cell has by axes in units."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import Axis, Row, alike, spread
-from rsfstudy.declare.wording import is_list
+from rsfstudy.axes.axis import Axis, Row, alike
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.axes import axis as axis_in_units
-from rsfstudy.rig.axes import named, numbers_in, si_units, size
+from rsfstudy.rig.axes import size
+from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import (
     FIELDS,
     FULL,
     OF_AXIS,
     ON_AXIS,
     SCALES,
-    UNITS,
     check_together,
     is_friction,
+    is_scaled,
     of_scene,
-    stated,
 )
 from rsfstudy.rig.scales import BESIDE, scales_of_rig
 from rsfstudy.rig.units import times
 from rsfstudy.slider.scene import Scene
-
-if TYPE_CHECKING:
-    from rsfstudy.declare.study import Study
-    from rsfstudy.rig.laboratory import Laboratory
 
 
 @dataclass(frozen=True)
@@ -101,7 +93,7 @@ class Cells:
         row : mapping of str to value, or to ndarray of float
         """
         units, rig = self.units, self.rig(row)
-        here, found = _scales(rig), {}
+        here, found = factors(rig), {}
         if set(OF_AXIS) & set(units) & set(row):
             found = self._held(here) | of_scene(rig)
             if "period" in self.laboratory.as_dict() and not self.base.has_mass:
@@ -118,11 +110,11 @@ class Cells:
 
     def _held(self, here: Mapping[str, Any]) -> dict[str, Any]:
         """Fields of the base that stay what they are in SI units."""
-        base = _scales(self.laboratory.as_dict())
+        base = factors(self.laboratory.as_dict())
         held = {
             name: value * (base[FIELDS[name].scale] / here[FIELDS[name].scale])
             for name, value in self.base.as_dict().items()
-            if _is_scaled(name) and isinstance(value, float) and value != 0.0
+            if is_scaled(name) and isinstance(value, float) and value != 0.0
         }
         if "radiation_damping" in held:  # eta is held: its stress goes with V_*
             held["radiation_damping"] = held["radiation_damping"] * (here["V_*"] / base["V_*"])
@@ -178,7 +170,7 @@ def _alike(theirs: Any, value: Any) -> bool:
     return isinstance(theirs, float) and math.isclose(theirs, value, rel_tol=1e-9)
 
 
-def _scales(rig: Mapping[str, Any]) -> dict[str, Any]:
+def factors(rig: Mapping[str, Any]) -> dict[str, Any]:
     """Value of 1 in SI units, by what quantities are measured in."""
     return {name: scale.factor for name, scale in scales_of_rig(rig).items()}
 
@@ -202,75 +194,3 @@ def _squeezed(along: Sequence[Axis], values: np.ndarray) -> tuple[tuple[str, ...
         else:
             kept.insert(0, axis.dimension)
     return tuple(kept), values
-
-
-# ---- other rigs ----------------------------------------------------------------------------------
-
-
-def on(study: Study, laboratory: Laboratory) -> Study:
-    """A study of no rig on a rig: what its axes, its base and the ranges of its fits hold without
-    dimension is turned into SI units, and what the rig states takes the place of theirs.
-    """
-    scales_ = _scales(laboratory.as_dict())
-    axes: list[Axis] = []
-    every: dict[str, float] = {}
-    for along in study.axes:
-        sizes = {n: scales_[FIELDS[n].scale] for n in along.fields if _is_scaled(n)}
-        every |= sizes
-        rows = [
-            {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
-            for row in along.rows
-        ]
-        units = {n: UNITS[FIELDS[n].scale] for n in sizes}
-        axes.append(along.with_rows(rows, units, along.drawn))
-    reductions = [_in_range(each, every.get(getattr(each, "on", ""))) for each in study.reductions]
-    changes = of_scene(laboratory.as_dict())
-    if {"inertia", "radiation_damping"} & set(changes):  # in place of what the study has
-        changes = {"inertia": False, "radiation_damping": 0.0, **changes}
-    base = study.base.with_(**changes)
-    return replace(study, laboratory=laboratory, base=base, axes=axes, reductions=reductions)
-
-
-def _in_range(reduction: Any, scale: float | None) -> Any:
-    """A reduction whose range, if it has any, is in SI units."""
-    span = getattr(reduction, "within", None)
-    if scale is None or span is None:
-        return reduction
-    return replace(reduction, within=tuple(scale * end for end in span))
-
-
-def _is_scaled(name: str) -> bool:
-    return name in FIELDS and bool(FIELDS[name].scale) and not name.endswith("_ratio")
-
-
-# ---- other values --------------------------------------------------------------------------------
-
-
-def override(study: Study, name: str, value: Any) -> dict[str, Any]:
-    """What changes in a study of a rig by another value of a quantity, or by a list of them; empty
-    where the name is none of a quantity.
-    """
-    laboratory, values = study.laboratory, list(value) if is_list(value) else [value]
-    if laboratory is None or not values:
-        return {}
-    name = named(name, values[0])
-    for index, along in enumerate(study.axes):
-        if name in along.units:
-            units = along.units[name]
-            if along.is_plain:
-                changed = axis_in_units(name, values, "" if isinstance(values[0], str) else units)
-            else:
-                changed = spread(along, name, numbers_in(name, values, units))
-            return {"axes": (*study.axes[:index], changed, *study.axes[index + 1 :])}
-    if si_units(name, values[0]) is None:
-        return {}
-    made = axis_in_units(name, values)
-    if is_list(value):
-        return {"axes": (made, *study.axes)}
-    fields = Cells(laboratory, study.base, [made]).fields(made.rows[0])
-    found: dict[str, Any] = {"base": study.base.with_(**fields)}
-    if name in OF_AXIS:
-        quantity = OF_AXIS[name]
-        si = stated(quantity, value, laboratory.normal_stress)
-        found["laboratory"] = replace(laboratory, **{quantity: si})
-    return found

@@ -139,6 +139,11 @@ def of_scene(rig: Mapping[str, Any]) -> dict[str, Any]:
     return plain | ({"inertia": True} if "period" in found else {})
 
 
+def is_scaled(name: str) -> bool:
+    """True of a field of a scene that is measured in a unit of the slider, and no ratio."""
+    return name in FIELDS and bool(FIELDS[name].scale) and not name.endswith("_ratio")
+
+
 def units_of(name: str, value: Any) -> str | None:
     """SI units of a value of a field of a scene; None where it is none in units: a ratio that is a
     plain number, or a field of another kind.

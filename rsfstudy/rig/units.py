@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.axis import plain
+from rsfstudy.axes.axis import plain
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.

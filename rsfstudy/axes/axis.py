@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.declare.wording import is_list, short
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
+from rsfstudy.wording import is_list, short
 
 Row = Mapping[str, Any]
 
@@ -126,7 +126,7 @@ class Axis:
             For an impossible number, correlation or distribution; and where Sobol indices are asked
             for of quantities that depend on each other.
         """
-        from rsfstudy.declare import samples  # loads scipy.stats
+        from rsfstudy.axes import samples  # loads scipy.stats
 
         drawn, how = samples.draw(distribution, n, seed, method, covariance)
         return cls(dimension, samples.set_by(drawn, fields), units, how)
@@ -151,7 +151,7 @@ class Axis:
         fields, units, dimension
             As in `samples`.
         """
-        from rsfstudy.declare import samples
+        from rsfstudy.axes import samples
 
         columns, stated = samples.columns_of(table)
         made = samples.set_by(columns, fields)
