@@ -74,6 +74,19 @@ def test_override_along_a_zipped_axis_touches_only_the_points_that_use_it():
     assert study(Axis("case", CASES)).with_(alpha=0.3).shape == (2,)
 
 
+def test_an_override_that_other_points_take_from_the_base_is_refused():
+    """They would stay as they are, though it is listed as applied; points are selected first."""
+    points = {"two laws": {"law": "slip"}, "neutral": {"law": "slowness", "b_over_a": 1.0}}
+    laws = declared(base=Scene(stiffness=0.01), axes=[Axis("case", points)])
+    with pytest.raises(InvalidValue, match="some points of case alone .neutral.*two laws is 2"):
+        laws.with_(b_over_a=1.6)
+    for given in ({"b_over_a": 1.6, "case": "two laws"}, {"case": "two laws", "b_over_a": 1.6}):
+        (scene,) = laws.with_(**given).scenes()
+        assert (scene.law, scene.b_over_a) == ("slip", 1.6)
+    (neutral,) = laws.with_(b_over_a=0.9, case="neutral").scenes()
+    assert neutral.b_over_a == 0.9
+
+
 def test_labels_select_points():
     assert [s.alpha for s in study(Axis("case", CASES)).with_(case=["strong"]).scenes()] == [0.56]
     with pytest.raises(InvalidValue, match="Did you mean 'strong'"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
 from rsfstudy.rig.quantities import FULL
-from rsfstudy.slider.registry import FIELDS, SLOT_NAMES
+from rsfstudy.slider.assembly import without_meaning
+from rsfstudy.slider.registry import FIELDS, SLOT_NAMES, by_class
 from rsfstudy.slider.synonyms import instead_of_field
 from rsfstudy.vocabulary import QUANTITIES
+from rsfstudy.wording import short
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -60,6 +62,25 @@ def fields(study: Study) -> None:
             rule = "decides which numbers are measured, which all cells must share"
             remedy = "Make a study of each value."
             raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
+
+
+def override(study: Study, axis: Axis, name: str, value: Any) -> None:
+    """Refuse another value of a field that some points of an axis state, and that others take from
+    the base.
+    """
+    stating = [point for point, row in zip(axis.points, axis.rows, strict=True) if name in row]
+    if axis.is_plain or not 0 < len(stating) < len(axis):
+        return
+    parts = study.own_parts
+    for point, row in zip(axis.points, axis.rows, strict=True):
+        held = by_class({**study.base.as_dict(), **row}, parts)
+        if name in row or not held.get(name) or name in without_meaning(held, parts.values()):
+            continue
+        some = ", ".join(stating)
+        rule = f"is stated by some points of {axis.dimension} alone ({some}), and that of {point} "
+        rule += f"is {short(held[name])}: it would stay"
+        remedy = f"Select points of one kind too, as in {axis.dimension}={some}."
+        raise InvalidValue(name, value, rule, remedy=remedy)
 
 
 def apart(axes: Sequence[Axis]) -> None:

@@ -322,17 +322,20 @@ class Study:
 
         A list for a field that is fixed makes it an axis; a field along a zipped axis changes only
         in the points that use it, where each new value makes a point of its own; labels select
-        points of a zipped axis.
+        points of a zipped axis, before fields change.
 
         Raises
         ------
         InvalidValue
-            For a name that is neither an axis nor a field of the scene or of the measure, and for
-            values that make no axis.
+            For a name that is neither an axis nor a field of the scene or of the measure, for
+            values that make no axis, and for a field that some points of a zipped axis state and
+            the others take from the base.
         """
         study, given = self, {name: plain_values(name, v) for name, v in overrides.items()}
         # parts of the user's own come first: they bring the fields that others may be
-        for name in sorted(given, key=lambda name: not own_named([name], _rows(name, given[name]))):
+        own = [name for name in given if own_named([name], _rows(name, given[name]))]
+        selections = [axis.dimension for axis in self.axes if not axis.is_plain]
+        for name in dict.fromkeys([*own, *filter(given.__contains__, selections), *given]):
             study = study._override(name, given[name])
         return replace(study, overrides={**self.overrides, **given})
 
@@ -342,6 +345,7 @@ class Study:
             if ALSO.get(name) in axis.fields and name not in axis.fields:
                 changed = self._stated_as(name, values, axis)
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
+            checks.override(self, axis, name, value)
         if changed_by_rig := rigs.override(self, name, value):
             return replace(self, **changed_by_rig)
         for index, axis in enumerate(self.axes):
