@@ -1,29 +1,36 @@
-"""Assembly of the parts of a scene from its fields, and the place of each field among them."""
+"""Assembly of the parts of a scene from its fields, the place of each field among them, and what
+is made of parts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider.derived import derived
 from rsfstudy.slider.numbers import SPRING, Slider, with_spring
 from rsfstudy.slider.parts import Part, checked, names_of
 from rsfstudy.slider.protocol import Stated
 from rsfstudy.slider.registry import (
     CALLERS,
+    IF_STATED,
     NAMED,
     OWNERS,
     SLOT_NAMES,
     SLOTS,
     Own,
     Slot,
+    completed,
     fields_with,
     kind_of,
     name_of,
     resolve,
+    shown,
 )
 from rsfstudy.slider.synonyms import instead_of_choice, instead_of_field, instead_of_unnamed
 
@@ -198,6 +205,110 @@ def own_parts(parts: Parts) -> dict[str, Own]:
         for slot, part in filled
         if type(part) not in slot.choices.values()
     }
+
+
+#: Attributes of a scene that only its equations and its lattice ask for.
+_INNER = frozenset(
+    {"layout", "made", "functions", "numbers", "numbers_of_friction", "under", "shown"}
+)
+
+
+class Assembled(ShownAsTable):
+    """Base of a scene: what is made of parts, whose fields it has as its own.
+
+    Attributes
+    ----------
+    parts : Parts
+    """
+
+    parts: Parts
+
+    def __init__(self, parts: Parts | None = None, /, **given: Any) -> None:
+        if parts is None:
+            parts = parts_of(given)
+        elif not isinstance(parts, Parts):
+            raise unnamed(parts)
+        object.__setattr__(self, "parts", parts)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse parts that mean nothing together."""
+
+    def __getattr__(self, name: str) -> Any:
+        """A field, which is that of a part, or of none here."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        layout = self.layout
+        if name in layout.places:
+            return getattr(self.parts[layout.places[name]], name)
+        if name in layout.named:
+            return getattr(self.parts, name).name
+        if name in layout.idle:
+            return layout.idle[name]
+        raise AttributeError(f"a Scene has no field or attribute {name!r}")
+
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
+
+    def __dir__(self) -> list[str]:
+        """Names that users ask for; a field without meaning in this scene is left out."""
+        # what is not stated may follow from other fields
+        stated = {name for name, value in self.as_dict().items() if value is not None}
+        names = {*super().__dir__(), *stated} - _INNER
+        return [name for name in names if not name.startswith("_")]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.parts,)
+
+    @derived
+    def layout(self) -> Layout:
+        """Places of the fields."""
+        return layout_of(tuple(map(type, self.parts[1:])))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields as plain Python values."""
+        values = dict(self.layout.idle)
+        for name in self.layout.named:
+            values[name] = getattr(self.parts, name).name
+        for part in self.parts:
+            values |= vars(part)
+        kept = (n for n in self.layout.fields if n not in IF_STATED or values[n] is not None)
+        return {name: values[name] for name in kept}
+
+    def describe(self) -> dict[str, Any]:
+        """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or
+        the digest of its samples.
+        """
+        history = self.parts.loading
+        if history.samples:
+            return self.as_dict() | {"samples": history.digest}
+        stated = history.stated if "loading" in self.layout.named else ()
+        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
+
+    @property
+    def own_parts(self) -> tuple[Own, ...]:
+        """Those of its parts that are the user's own."""
+        return tuple(own_parts(self.parts).values())
+
+    def shown(self) -> Iterator[tuple[Quantity, object]]:
+        """The fields that mean something in it, with their values."""
+        return shown(self.as_dict(), self.own_parts)
+
+    @completed()
+    def with_(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked anew.
+
+        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
+        the place of its ratio, and the other way round.
+        """
+        if all(n in self.layout.plain and value is not None for n, value in changes.items()):
+            return type(self)(with_numbers(self.parts, changes))
+        theirs = own_parts(self.parts)
+        kept = {**self.as_dict(), **theirs}
+        dropped = without_meaning({**kept, **changes}, theirs.values())
+        if any(changes.get(name) is not None for name in SPRING):
+            dropped |= {*SPRING}
+        return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
 
 def _refuse_unless_idle(name: str, value: Any, part: type[Part]) -> None:

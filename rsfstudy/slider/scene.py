@@ -5,7 +5,6 @@ checked when made.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import Parameter, Signature
@@ -14,9 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.slider import (
-    assembly,
     dynamics,
     fluid,
     laws,
@@ -28,27 +25,22 @@ from rsfstudy.slider import (
     stability,
     system,
 )
-from rsfstudy.slider.assembly import Layout, Parts
+from rsfstudy.slider.assembly import Assembled, Parts
 from rsfstudy.slider.derived import derived
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.numbers import SPRING, Slider
+from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.registry import Own
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
 _KEPT = 4096
 #: Table of the one segment of most loadings, which does not end.
 FOR_EVER = np.array([[0.0, math.inf, *[math.nan] * 4]])
-#: Attributes of a scene that only its equations and its lattice ask for.
-_INNER = frozenset(
-    {"layout", "made", "functions", "numbers", "numbers_of_friction", "under", "shown"}
-)
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Scene(ShownAsTable):
+class Scene(Assembled):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -170,14 +162,9 @@ class Scene(ShownAsTable):
         [Parameter(n, Parameter.KEYWORD_ONLY, default=d) for n, d in registry.defaults().items()]
     )
 
-    def __init__(self, parts: Parts | None = None, /, **given: Any) -> None:
-        if parts is None:
-            parts = assembly.parts_of(given)
-        elif not isinstance(parts, Parts):
-            raise assembly.unnamed(parts)
-        object.__setattr__(self, "parts", parts)
+    def _check(self) -> None:
         # the law last: it may ask what all of friction makes of steady sliding
-        for part in (*parts[:1], *reversed(parts[2:]), parts.law):
+        for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
 
     if TYPE_CHECKING:
@@ -188,86 +175,7 @@ class Scene(ShownAsTable):
         initial_stress: float
         initial_state: float
 
-    def __getattr__(self, name: str) -> Any:
-        """A field, which is that of a part, or of none in this scene."""
-        if name.startswith("_"):
-            raise AttributeError(name)
-        layout = self.layout
-        if name in layout.places:
-            return getattr(self.parts[layout.places[name]], name)
-        if name in layout.named:
-            return getattr(self.parts, name).name
-        if name in layout.idle:
-            return layout.idle[name]
-        raise AttributeError(f"a Scene has no field or attribute {name!r}")
-
-    def __repr__(self) -> str:
-        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
-
-    def __dir__(self) -> list[str]:
-        """Names that users ask for; a field without meaning in this scene is left out."""
-        # what is not stated may follow from other fields
-        stated = {name for name, value in self.as_dict().items() if value is not None}
-        names = {*super().__dir__(), *stated} - _INNER
-        return [name for name in names if not name.startswith("_")]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Scene, (self.parts,)
-
-    # ---- its fields -----------------------------------------------------------------------------
-
-    @derived
-    def layout(self) -> Layout:
-        """Places of its fields."""
-        return assembly.layout_of(tuple(map(type, self.parts[1:])))
-
-    def as_dict(self) -> dict[str, Any]:
-        """The fields as plain Python values."""
-        values = dict(self.layout.idle)
-        for name in self.layout.named:
-            values[name] = getattr(self.parts, name).name
-        for part in self.parts:
-            values |= vars(part)
-        silent = registry.IF_STATED
-        kept = (n for n in self.layout.fields if n not in silent or values[n] is not None)
-        return {name: values[name] for name in kept}
-
-    def describe(self) -> dict[str, Any]:
-        """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or
-        the digest of its samples.
-        """
-        history = self.parts.loading
-        if history.samples:
-            return self.as_dict() | {"samples": history.digest}
-        stated = history.stated if "loading" in self.layout.named else ()
-        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
-
-    @property
-    def own_parts(self) -> tuple[Own, ...]:
-        """Those of its parts that are the user's own."""
-        return tuple(assembly.own_parts(self.parts).values())
-
-    def shown(self) -> Iterator[tuple[Quantity, object]]:
-        """The fields that mean something in it, with their values."""
-        return registry.shown(self.as_dict(), self.own_parts)
-
     # ---- other scenes ---------------------------------------------------------------------------
-
-    @registry.completed()
-    def with_(self, **changes: Any) -> Scene:
-        """A copy with some fields changed, checked anew.
-
-        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
-        the place of its ratio, and the other way round.
-        """
-        if all(n in self.layout.plain and value is not None for n, value in changes.items()):
-            return Scene(assembly.with_numbers(self.parts, changes))
-        theirs = assembly.own_parts(self.parts)
-        kept = {**self.as_dict(), **theirs}
-        dropped = assembly.without_meaning({**kept, **changes}, theirs.values())
-        if any(changes.get(name) is not None for name in SPRING):
-            dropped |= {*SPRING}
-        return Scene(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
     def without_mass(self) -> Scene:
         """This slider in quasi-static motion, if it has mass."""
