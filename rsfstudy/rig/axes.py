@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from rsfstudy.axes.axis import Axis, Row, columns, plain
+from rsfstudy.axes.axis import Axis, Row, plain
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import FULL, OF_AXIS, ON_AXIS, STATED, UNITS, is_friction, units_of
@@ -48,23 +48,50 @@ def axis(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Ax
     listed = [values] if isinstance(values, str) else values
     if not is_list(listed) or not len(listed):
         return Axis(dimension, values)
-    name = named(dimension, listed[0])
-    if si_units(name, listed[0]) is None:
-        return Axis(dimension, values)
-    units = units or _stated_units(listed[0]) or str(si_units(name, listed[0]))
-    return Axis(name, numbers_in(name, listed, units), {name: units})
+    return _plain([{dimension: value} for value in listed], {dimension: units})
 
 
 def in_units(along: Axis) -> Axis:
     """An axis of a study of a rig, whose plain numbers are in SI units, as everywhere in a rig."""
-    if along.is_numbered:
-        return _numbered(along)
-    if along.units:
-        _check(along)
-        return along
-    if along.labels is not None:
-        return _zipped(along)
-    return axis(along.dimension, [row[along.dimension] for row in along.rows])
+    if along.is_plain:
+        return _plain(along.rows, along.units)
+    rows, units = _converted(along.rows, along.units, by_column=along.is_numbered)
+    return along.with_rows(rows, units, along.drawn)
+
+
+def _plain(rows: Sequence[Row], units: Mapping[str, str]) -> Axis:
+    """An axis of one field."""
+    found, stated = _converted(rows, units, by_column=True)
+    (name,) = found[0]
+    return Axis(name, [row[name] for row in found], stated)
+
+
+def _converted(
+    rows: Sequence[Row], units: Mapping[str, str], *, by_column: bool
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Rows whose fields have the names and units that they have on axes, and these units: those of
+    the axis, those of the first value of a column, or SI units.
+    """
+    found: list[dict[str, Any]] = [{} for _row in rows]
+    stated: dict[str, str] = {}
+    quantities: dict[str, list[tuple[dict[str, Any], Any]]] = {}
+    for row, new in zip(rows, found, strict=True):
+        for given, value in row.items():
+            example = rows[0][given] if by_column else value
+            name = named(given, example)
+            si = si_units(name, example)
+            new[name if si else given] = value
+            if si:
+                quantities.setdefault(name, []).append((new, value))
+                ours = _stated_units(value) if by_column else ""
+                stated.setdefault(name, units.get(given) or ours or si)
+            elif units.get(given):
+                size(given, units[given])  # which refuses what is none of a rig
+    for name, held in quantities.items():
+        numbers = numbers_in(name, [value for _row, value in held], stated[name])
+        for (row, _value), number in zip(held, numbers, strict=True):
+            row[name] = number
+    return found, stated
 
 
 def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
@@ -84,47 +111,6 @@ def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
         of = f", and {len(wrong)} of {len(found)} are not" if len(found) > 1 else ""
         raise InvalidValue(name, wrong[0], f"must be positive{of}")
     return found
-
-
-def _zipped(along: Axis) -> Axis:
-    """A zipped axis, whose fields are in SI units where they are in units."""
-    units: dict[str, str] = {}
-    rows: dict[str, Row] = {}
-    for label, row in zip(along.labels or (), along.rows, strict=True):
-        rows[label] = found = {}
-        for given, value in row.items():
-            name = named(given, value)
-            si = si_units(name, value)
-            if si is None:
-                found[given] = value
-            else:
-                found[name] = numbers_in(name, [value], si)[0]
-                units[name] = si
-    return Axis(along.dimension, rows, units)
-
-
-def _numbered(along: Axis) -> Axis:
-    """An axis of samples or cases, whose fields are in the units stated, or in SI units."""
-    found: dict[str, Any] = {}
-    units: dict[str, str] = {}
-    for given, column in columns(along.rows).items():
-        name = named(given, column[0])
-        si = si_units(name, column[0])
-        if si is None:
-            found[given] = column
-            continue
-        units[name] = along.units.get(given) or _stated_units(column[0]) or si
-        found[name] = numbers_in(name, column, units[name])
-    return Axis(along.dimension, found, units, along.drawn)
-
-
-def _check(along: Axis) -> None:
-    """Refuse units of another kind, and quantities of a rig that are not positive."""
-    for name, units in along.units.items():
-        size(name, units)
-        for row in along.rows:
-            if not _is_meant(name, row.get(name, 1.0)):
-                raise InvalidValue(name, row[name], "must be positive")
 
 
 def _is_meant(name: str, number: Any) -> bool:
