@@ -1,4 +1,4 @@
-"""Checks of a study's fields: those that its axes vary, and those of parts of the user's own."""
+"""Checks of what a study is declared of: its parts, their names, and what its axes vary."""
 
 from __future__ import annotations
 
@@ -9,17 +9,67 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rsfstudy.axes.axis import Axis
+from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import TAKEN, Measure
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.quantity import is_name
+from rsfstudy.reduce import Reduction
+from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import FULL
 from rsfstudy.slider.assembly import without_meaning
 from rsfstudy.slider.registry import FIELDS, SLOT_NAMES, by_class
+from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.synonyms import instead_of_field
 from rsfstudy.vocabulary import QUANTITIES
 from rsfstudy.wording import short
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
+
+
+#: What parts of a study are made of, one of them or a list; the laboratory may be left out.
+_ONE = {"base": Scene, "measure": Measure, "accuracy": Accuracy, "laboratory": Laboratory}
+_LISTS = {"axes": Axis, "reductions": Reduction, "claims": Claim, "references": str}
+
+
+def parts(study: Study) -> None:
+    """Refuse parts of other types."""
+    for name, kind in (_ONE | _LISTS).items():
+        given = getattr(study, name)
+        if name in _LISTS and not isinstance(given, list | tuple):
+            raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
+        for value in given if name in _LISTS else [given]:
+            if not isinstance(value, kind) and (name, value) != ("laboratory", None):
+                raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
+    if not study.axes:
+        raise InvalidValue("axes", study.axes, "must hold at least one axis")
+
+
+def names(study: Study) -> None:
+    """Refuse names that results bear already, and reductions of what is not measured."""
+    study.measure.check()
+    known = list(study.measure.variables)
+    for reduction in study.reductions:
+        if not is_name(reduction.name) or reduction.name in TAKEN:
+            raise InvalidValue("reduction", reduction.name, "names something else, or nothing")
+        if reduction.of not in known:
+            raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
+        known.append(reduction.name)
+    taken = {*known, *study.measure.inner_coordinates, *(TAKEN - set(FIELDS))}
+    for axis in study.axes:
+        sought(study, axis.fields)
+        for name in (axis.dimension, *axis.fields):
+            if name in taken:
+                raise InvalidValue("axis", name, "is the name of something measured")
+
+
+def sought(study: Study, fields: Sequence[str]) -> None:
+    """Refuse to set what the measure solves for."""
+    for name in fields:
+        if {name, FULL.get(name)} & set(study.measure.sought):
+            rule = f"{study.measure.name} solves for {name}; it cannot be an axis or be set"
+            raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
 
 def own_fields(study: Study) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.axes.axis import Axis, spread
+from rsfstudy.axes.axis import Axis
 from rsfstudy.rig.axes import axis as axis_in_units
-from rsfstudy.rig.axes import named, numbers_in, si_units
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.lattice import Cells, factors
 from rsfstudy.rig.quantities import FIELDS, OF_AXIS, UNITS, is_scaled, of_scene, stated
-from rsfstudy.wording import is_list
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -49,27 +47,11 @@ def _in_range(reduction: Any, scale: float | None) -> Any:
     return replace(reduction, within=tuple(scale * end for end in span))
 
 
-def override(study: Study, name: str, value: Any) -> dict[str, Any]:
-    """What changes in a study of a rig by another value of a quantity, or by a list of them; empty
-    where the name is none of a quantity.
-    """
-    laboratory, values = study.laboratory, list(value) if is_list(value) else [value]
-    if laboratory is None or not values:
-        return {}
-    name = named(name, values[0])
-    for index, along in enumerate(study.axes):
-        if name in along.units:
-            units = along.units[name]
-            if along.is_plain:
-                changed = axis_in_units(name, values, "" if isinstance(values[0], str) else units)
-            else:
-                changed = spread(along, name, numbers_in(name, values, units))
-            return {"axes": (*study.axes[:index], changed, *study.axes[index + 1 :])}
-    if si_units(name, values[0]) is None:
-        return {}
-    made = axis_in_units(name, values)
-    if is_list(value):
-        return {"axes": (made, *study.axes)}
+def fixed(study: Study, name: str, value: Any) -> dict[str, Any]:
+    """What changes in a study of a rig by another value of a quantity that is no axis of it."""
+    laboratory = study.laboratory
+    assert laboratory is not None
+    made = axis_in_units(name, [value])
     fields = Cells(laboratory, study.base, [made]).fields(made.rows[0])
     found: dict[str, Any] = {"base": study.base.with_(**fields)}
     if name in OF_AXIS:

@@ -21,20 +21,19 @@ from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import TAKEN, Measure
+from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import own_stepper
-from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig.axes import axis as axis_in_units
-from rsfstudy.rig.axes import in_units
+from rsfstudy.rig.axes import in_units, named, numbers_in, si_units
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.lattice import Cells
-from rsfstudy.rig.quantities import ALSO, FULL
+from rsfstudy.rig.quantities import ALSO
 from rsfstudy.slider.assembly import without_meaning
 from rsfstudy.slider.registry import (
     CALLERS,
-    FIELDS,
     SLOT_NAMES,
     Own,
     by_class,
@@ -118,7 +117,10 @@ class Study:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
-        self._check_parts()
+        checks.parts(self)
+        if self.laboratory is not None:
+            object.__setattr__(self, "axes", [in_units(axis) for axis in self.axes])
+        checks.names(self)
         checks.own_fields(self)
         checks.fields(self)
         checks.apart(self.axes)
@@ -127,48 +129,6 @@ class Study:
                 json.dumps(value)
             except (TypeError, ValueError) as error:
                 raise InvalidValue(name, value, f"must be plain data ({error})") from error
-
-    def _check_parts(self) -> None:
-        parts: list[tuple[str, Sequence[Any], type]] = [
-            ("base", [self.base], Scene),
-            ("measure", [self.measure], Measure),
-            ("axes", self.axes, Axis),
-            ("reductions", self.reductions, Reduction),
-            ("claims", self.claims, Claim),
-            ("references", self.references, str),
-            ("accuracy", [self.accuracy], Accuracy),
-            ("laboratory", [self.laboratory] if self.laboratory is not None else [], Laboratory),
-        ]
-        for name, values, kind in parts:
-            if not isinstance(values, list | tuple):
-                raise InvalidValue(name, values, f"must be a list of {kind.__name__} objects")
-            for value in values:
-                if not isinstance(value, kind):
-                    raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
-        if not self.axes:
-            raise InvalidValue("axes", self.axes, "must hold at least one axis")
-        if self.laboratory is not None:
-            object.__setattr__(self, "axes", [in_units(axis) for axis in self.axes])
-        self.measure.check()
-        known = list(self.measure.variables)
-        for reduction in self.reductions:
-            if not is_name(reduction.name) or reduction.name in TAKEN:
-                raise InvalidValue("reduction", reduction.name, "names something else, or nothing")
-            if reduction.of not in known:
-                raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
-            known.append(reduction.name)
-        taken = {*known, *self.measure.inner_coordinates, *(TAKEN - set(FIELDS))}
-        for axis in self.axes:
-            self._check_sought(axis.fields)
-            for name in (axis.dimension, *axis.fields):
-                if name in taken:
-                    raise InvalidValue("axis", name, "is the name of something measured")
-
-    def _check_sought(self, fields: Sequence[str]) -> None:
-        for name in fields:
-            if {name, FULL.get(name)} & set(self.measure.sought):
-                rule = f"{self.measure.name} solves for {name}; it cannot be an axis or be set"
-                raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
     @staticmethod
     def caption(docstring: str | None) -> str:
@@ -341,39 +301,46 @@ class Study:
 
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
+        of_rig = self.laboratory is not None and bool(values)
+        name = named(name, values[0]) if of_rig else name
         for index, axis in enumerate(self.axes):
-            if ALSO.get(name) in axis.fields and name not in axis.fields:
-                changed = self._stated_as(name, values, axis)
+            if changed := self._changed(axis, name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-            checks.override(self, axis, name, value)
-        if changed_by_rig := rigs.override(self, name, value):
-            return replace(self, **changed_by_rig)
-        for index, axis in enumerate(self.axes):
-            if name == axis.dimension:
-                changed = Axis(name, values) if axis.is_plain else select(axis, values)
-            elif name in axis.fields:
-                changed = spread(axis, name, values)
-            else:
-                continue
-            return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
+        of_rig = of_rig and si_units(name, values[0]) is not None
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
-        if name not in known and not own_named([name], _rows(name, values)):
+        if name not in known and not of_rig and not own_named([name], _rows(name, values)):
             rule = "is neither an axis nor a field of the scene or of the measure"
             raise checks.unknown("override", name, rule, known)
-        self._check_sought([name])
+        checks.sought(self, [name])
         if is_list(value):
-            return replace(self, axes=(Axis(name, values), *self.axes))
+            return replace(self, axes=(self._axis(name, values), *self.axes))
+        if of_rig:
+            return replace(self, **rigs.fixed(self, name, value))
         if name in self.of_scene | SLOT_NAMES:
             changes = by_class({name: value}, self.own_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{name: value}))
 
-    def _stated_as(self, name: str, values: Sequence[Any], axis: Axis) -> Axis:
-        """An axis of a field that states what another one does, in its place."""
+    def _changed(self, axis: Axis, name: str, values: Sequence[Any]) -> Axis | None:
+        """An axis with other values, if it is of this field, or of one that states the same."""
+        units = axis.units.get(name, "")
+        if name == axis.dimension:
+            return self._axis(name, values, units) if axis.is_plain else select(axis, values)
+        if name in axis.fields:
+            checks.override(self, axis, name, values)
+            return spread(axis, name, numbers_in(name, values, units) if units else values)
+        if ALSO.get(name) not in axis.fields:
+            return None
         if axis.labels is not None:
             rule = f"states what {ALSO[name]} does along {axis.dimension}"
             raise InvalidValue(name, values, rule, remedy=f"Give {ALSO[name]}.")
-        return axis_in_units(name, values) if self.laboratory else Axis(name, values)
+        return self._axis(name, values)
+
+    def _axis(self, name: str, values: Sequence[Any], units: str = "") -> Axis:
+        """An axis of a field, whose plain numbers are in these units in a study of a rig."""
+        if self.laboratory is None:
+            return Axis(name, values)
+        return axis_in_units(name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""
