@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from rsfstudy.motion.accuracy import Accuracy as Accuracy
     from rsfstudy.plots._motion import picture as picture
     from rsfstudy.rig.history import history as history
+    from rsfstudy.rig.history import read_protocol as read_protocol
     from rsfstudy.rig.laboratory import Laboratory as Laboratory
-    from rsfstudy.rig.protocol_file import read_protocol as read_protocol
     from rsfstudy.rig.records import read_record as read_record
     from rsfstudy.rig.table import read_table as read_table
     from rsfstudy.slider.loading import Segment as Segment
@@ -49,11 +49,10 @@ _GIVEN = {
     "slider.loading": ("Segment",),
     "slider.protocol": ("protocol",),
     "rig.laboratory": ("Laboratory",),
-    "rig.protocol_file": ("read_protocol",),
     "rig.records": ("read_record",),
     "rig.table": ("read_table",),
     "api.fitting": ("fit",),
-    "rig.history": ("history",),
+    "rig.history": ("history", "read_protocol"),
     "plots._motion": ("picture",),
     "declare.study": ("Study",),
     "axes.axis": ("Axis",),

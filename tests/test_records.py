@@ -66,7 +66,7 @@ def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
         InvalidValue, match=r"^column = 'mu': is unknown. Choices: time, .*friction"
     ):
         rsfstudy.read_record(path, {"mu": "mu"})
-    with pytest.raises(InvalidValue, match="heading = 't': heads no column"):
+    with pytest.raises(InvalidValue, match="column = 't': is not in the record"):
         rsfstudy.read_record(pd.read_csv(path), {"time": "t (s)"})
 
 

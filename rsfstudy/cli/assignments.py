@@ -8,9 +8,8 @@ from typing import Any
 
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.history import history
+from rsfstudy.rig.history import history, read_protocol
 from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.protocol_file import read_protocol
 from rsfstudy.rig.quantities import SCALES, STATED
 from rsfstudy.rig.table import read_table
 from rsfstudy.rig.units import number, spaced

@@ -1,4 +1,6 @@
-"""Loading histories from records: arrays, datasets and CSV files, in whatever units."""
+"""Loading histories, in whatever units: sampled ones from arrays, datasets and CSV files, and
+protocols from CSV files.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,10 @@ import numpy as np
 
 from rsfstudy.doors import door
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.table import Column, read_table, selected
+from rsfstudy.rig.laboratory import SEGMENT, Laboratory
+from rsfstudy.rig.table import Column, picked, read_table
 from rsfstudy.slider.history import History, sampled
+from rsfstudy.slider.protocol import KEYS, Protocol, protocol
 
 #: What a record may hold, and the units of the slider.
 _SCALES = {
@@ -104,23 +107,14 @@ def _columns(
     if not is_dataset and not isinstance(record, Mapping):
         remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
         raise InvalidValue("record", record, "is no record", remedy=remedy)
-    names = [*record.variables] if is_dataset else [*record]
     if columns is None:  # a dataset may hold more
-        columns = {n: (n,) for n in names if n in _SCALES or not is_dataset}
-    found = {}
-    for key, told in columns.items():
-        name, units, scale, offset = selected(told, names)
-        if name not in names:
-            raise InvalidValue("column", name, "is not in the record", choices=map(str, names))
-        values = np.asarray(record[name], dtype=float)
-        if values.ndim != 1:
-            raise InvalidValue(key, values.shape, "must lie along one dimension")
-        if is_dataset and not units:
-            units = str(record[name].attrs.get("units", ""))
-            if not units and laboratory is not None:
-                rule, remedy = "has no units", "Set its attribute units."
-                raise InvalidValue(key, name, rule, remedy=remedy)
-        found[key] = Column(values * scale + offset, units)
+        names = [n for n in record.variables if n in _SCALES] if is_dataset else [*record]
+        columns = {str(name): (name,) for name in names}
+    found = picked(record, columns)
+    for key, column in found.items():
+        if is_dataset and laboratory is not None and not column.units:
+            remedy = "Set its attribute units."
+            raise InvalidValue(key, columns[key], "has no units", remedy=remedy)
     return found
 
 
@@ -158,3 +152,48 @@ def _velocity(
         return mean, None
     first = int(np.argmax(back))
     return mean, (key, float(found[key].values[first]), found[key].place(first))
+
+
+@door
+def read_protocol(
+    path: str | Path, laboratory: Laboratory | None = None, name: str = "protocol"
+) -> Protocol:
+    """A loading history from a CSV file.
+
+    Its first line names the columns and their units, as in ``velocity (um/s), duration (s)``: a
+    velocity, and the duration or the distance of each segment (a field may be empty), and perhaps a
+    sudden ``step`` at its beginning, or the ``normal_stress`` during it. Units of the slider
+    (``V_*``, ``D_c``, ``D_c/V_*``, ``sigma_*``) need no laboratory.
+
+    Parameters
+    ----------
+    path : str or Path
+    laboratory : Laboratory, optional
+        The rig whose units are used.
+    name : str
+        What the protocol is called in results.
+
+    Raises
+    ------
+    DataError
+        Where there is no such file of text.
+    InvalidValue
+        For a header without units, or a field that is no number, with its line and column.
+    """
+    columns = read_table(path)
+    for key in columns:
+        if key not in KEYS:
+            raise InvalidValue("column", key, "is unknown", choices=KEYS)
+    units = {key: column.units for key, column in columns.items()}
+    of_slider = all(SEGMENT[key] == of for key, of in units.items())
+    if not of_slider and laboratory is None:
+        remedy = "Give a laboratory, or the units of the slider: V_*, D_c, D_c/V_*."
+        rule = "need the scales of a rig"
+        raise InvalidValue("units", ", ".join(units.values()), rule, remedy=remedy)
+    rows = zip(*(column.values.tolist() for column in columns.values()), strict=True)
+    stated = [{k: x for k, x in zip(columns, row, strict=True) if not np.isnan(x)} for row in rows]
+    if of_slider or laboratory is None:
+        return protocol(stated, name)
+    return laboratory.protocol(
+        [{k: f"{x:.17g} {units[k]}" for k, x in segment.items()} for segment in stated], name
+    )

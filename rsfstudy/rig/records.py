@@ -13,7 +13,7 @@ import pandas as pd
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.table import HEADING, Column, Selected, read_table, selected
+from rsfstudy.rig.table import HEADING, Column, Selected, picked, read_table, selected
 from rsfstudy.rig.units import factor, in_si
 
 #: SI units of what a record may hold, and what turns them into those of `Record`.
@@ -95,8 +95,7 @@ def read_record(
         binary = _is_binary(Path(source))
         found = _of_xlook(Path(source), columns) if binary else _of_text(Path(source), columns)
     elif isinstance(source, Mapping | pd.DataFrame):
-        arrays = {str(key): np.asarray(v, dtype=float) for key, v in source.items()}
-        found = _of_arrays(arrays, columns)
+        found = _of_arrays(source, columns)
     else:
         remedy = "Give the path of a file, a mapping of arrays, or a DataFrame."
         raise InvalidValue("record", source, "is no record", remedy=remedy)
@@ -160,19 +159,13 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
     return read_table(path, select)
 
 
-def _of_arrays(
-    arrays: Mapping[str, np.ndarray], columns: Mapping[str, Any] | None
-) -> Mapping[str, Column]:
+def _of_arrays(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
     """Columns of arrays by name, or by headings where they, or `columns`, state units."""
-    if columns is None and not any("(" in key or "[" in key for key in arrays):
-        return {key: Column(values, "") for key, values in arrays.items()}
-    headings, found = [*arrays], {}
-    for key, of in (columns or _known(headings, "record")).items():
-        heading, units, scale, offset = _selected(key, of, headings)
-        if heading not in arrays:
-            raise InvalidValue("heading", heading, "heads no column", choices=headings)
-        found[key] = Column(arrays[heading] * scale + offset, units)
-    return found
+    headings = [*map(str, source)]
+    if columns is None and not any("(" in key or "[" in key for key in headings):
+        return picked(source, {key: (key,) for key in headings})
+    told = columns or _known(headings, "record")
+    return picked(source, {key: _selected(key, of, headings) for key, of in told.items()})
 
 
 def _known(headings: list[str], place: str) -> dict[str, str]:

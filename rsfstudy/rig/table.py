@@ -48,11 +48,8 @@ def selected(told: Any, headings: Sequence[str]) -> Selected:
     raw = None if told in headings else _RAW.fullmatch(told)
     scale, offset = 1.0, 0.0
     if raw:
-        told, scale, offset = (
-            raw[1],
-            float(raw[2] + raw[3]),
-            float((raw[4] or "") + (raw[5] or "0")),
-        )
+        told, scale = raw[1], float(raw[2] + raw[3])
+        offset = float((raw[4] or "") + (raw[5] or "0"))
     match = HEADING.fullmatch(told)
     units = (match[2] or "").strip() if match else ""
     heading = told if told in headings or not match else match[1]
@@ -95,6 +92,30 @@ class Column(NamedTuple):
             raise InvalidValue(name, float(self.values[row]), rule).at(self.place(row))
 
 
+def picked(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
+    """Columns of arrays, of variables or of a DataFrame, by name; units of variables are those that
+    their attributes state.
+
+    Parameters
+    ----------
+    source : mapping of str to array, xarray.Dataset or pandas.DataFrame
+    columns : mapping of str to str, tuple or Selected
+        What is wanted, as `selected` takes it.
+    """
+    names = [*map(str, source.variables if hasattr(source, "data_vars") else source)]
+    found = {}
+    for key, told in columns.items():
+        heading, units, scale, offset = selected(told, names)
+        if heading not in names:
+            raise InvalidValue("column", heading, "is not in the record", choices=names)
+        values = np.asarray(source[heading], dtype=float)
+        if values.ndim != 1:
+            raise InvalidValue(key, values.shape, "must lie along one dimension")
+        units = units or str(getattr(source[heading], "attrs", {}).get("units", ""))
+        found[key] = Column(values * scale + offset, units)
+    return found
+
+
 @door
 def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
     """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
@@ -135,11 +156,11 @@ def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
         remedy = f"Its first line reads, for instance, {_EXAMPLE}."
         raise InvalidValue("table", str(path), "has no header", remedy=remedy)
     if values is None:
+        lines = np.array([n for n, _row in rows], dtype=int)
         for n, row in rows:
             if len(row) != len(header):
                 rule = f"has {len(row)} fields, and the header {len(header)}"
                 raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
-        lines = np.array([n for n, _row in rows], dtype=int)
     select = columns if callable(columns) else _as_headed
     if isinstance(columns, Mapping):
         wanted = {name: selected(told, headings) for name, told in columns.items()}
@@ -151,13 +172,13 @@ def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
             rule = f"heads {headings.count(heading)} columns, and must head one"
             raise InvalidValue("column", heading, rule, choices=headings).at(f"{path}, line {line}")
         place = headings.index(heading)
-        column = Column(np.empty(len(lines)), units, place + 1, lines, str(path))
-        if values is None:
-            for n, (_line, row) in enumerate(rows):
-                column.values[n] = _number(name, row[place], column, n)
-        else:
-            column.values[:] = values[:, place]
-        found[name] = column._replace(values=column.values * scale + offset)
+        column = Column(np.empty(0), units, place + 1, lines, str(path))
+        below = (
+            [_number(name, row[place], column, n) for n, (_line, row) in enumerate(rows)]
+            if values is None
+            else values[:, place]
+        )
+        found[name] = column._replace(values=np.array(below, dtype=float) * scale + offset)
     return found
 
 
