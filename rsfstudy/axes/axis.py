@@ -74,11 +74,9 @@ class Axis:
             rows = tuple({dimension: plain(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
                 raise InvalidValue(dimension, None, "must be a value on an axis")
-        object.__setattr__(self, "dimension", dimension)
-        object.__setattr__(self, "rows", rows)
-        object.__setattr__(self, "labels", labels)
-        object.__setattr__(self, "units", {} if units is None else units)
-        object.__setattr__(self, "drawn", {} if drawn is None else drawn)
+        held = (dimension, rows, labels, units or {}, drawn or {})
+        for name, value in zip(self.__dataclass_fields__, held, strict=True):
+            object.__setattr__(self, name, value)
         self._check()
 
     @classmethod

@@ -109,7 +109,7 @@ def _columns(
         raise InvalidValue("record", record, "is no record", remedy=remedy)
     if columns is None:  # a dataset may hold more
         names = [n for n in record.variables if n in _SCALES] if is_dataset else [*record]
-        columns = {str(name): (name,) for name in names}
+        columns = {str(name): str(name) for name in names}
     found = picked(record, columns)
     for key, column in found.items():
         if is_dataset and laboratory is not None and not column.units:

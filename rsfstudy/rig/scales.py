@@ -92,14 +92,15 @@ def in_units(
     dataset: xr.Dataset, si: Mapping[str, Scale], stress: str, length: str, time: str
 ) -> xr.Dataset:
     """A dataset in units of stress, length and time, by its scales in SI units; see `scaled`."""
-    units = {"sigma_*": (stress, "Pa"), "D_c": (length, "m"), "D_c/V_*": (time, "s")}
-    size = {name: float(factor("units", *pair)) for name, pair in units.items()}
+    units = {
+        "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",
+        "V_*": f"{length} {time}-1", "sigma_*/D_c": f"{stress} {length}-1",
+    }  # fmt: skip
+    size = {n: float(factor("units", units[n], si[n].units)) for n in ("sigma_*", "D_c", "D_c/V_*")}
     size["V_*"] = size["D_c"] / size["D_c/V_*"]
     size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
     size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
-    units |= {"V_*/D_c": (f"{time}-1", "")}
-    units |= {"V_*": (f"{length} {time}-1", ""), "sigma_*/D_c": (f"{stress} {length}-1", "")}
-    return scaled(dataset, {n: Scale(s.factor / size[n], units[n][0]) for n, s in si.items()})
+    return scaled(dataset, {n: Scale(s.factor / size[n], units[n]) for n, s in si.items()})
 
 
 def scales(

@@ -12,7 +12,6 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -88,21 +87,17 @@ def spaced(name: str, text: str, values: str) -> list[float] | list[str]:
 
 def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
     spacing = parts[3].strip().lower() if len(parts) == 4 else ""
-    if len(parts) not in (3, 4) or spacing not in ("", "log"):
+    first, last, points = map(number, parts[:3] if len(parts) in (3, 4) else ["", "", ""])
+    if first is None or last is None or points is None or spacing not in ("", "log"):
         raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
-    first, last, points = map(number, parts[:3])
-    if first is None or last is None or points is None or not points.is_integer():
-        raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
-    if not (math.isfinite(first) and math.isfinite(last) and 1 <= points <= _MOST_POINTS):
+    finite = math.isfinite(first) and math.isfinite(last)
+    if not finite or points not in range(1, _MOST_POINTS + 1):
         raise InvalidValue(name, text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
-    found: list[float] = np.linspace(first, last, int(points)).tolist()
-    if not spacing:
-        return found
-    if first <= 0.0 or last <= 0.0:
+    if spacing and min(first, last) <= 0.0:
         remedy = "Leave :log out, or start above 0."
         raise InvalidValue(name, text, "has no logarithm of 0 or less", remedy=remedy)
-    geometric: list[float] = np.geomspace(first, last, int(points)).tolist()
-    return geometric
+    laid = np.geomspace if spacing else np.linspace
+    return [float(x) for x in laid(first, last, int(points))]
 
 
 def in_si(name: str, value: Any, units: str) -> float:
@@ -123,24 +118,23 @@ def in_si(name: str, value: Any, units: str) -> float:
     InvalidValue
         For what is no finite number, and for units that are unknown or of another kind.
     """
-    if isinstance(value, str):
-        converted: Any = _rounded(_of_text(name, value, units))
-    elif hasattr(value, "to") and hasattr(value, "magnitude"):
-        converted = _converted(name, value, value, units)
-    else:
-        converted = plain(name, value)
-    if isinstance(converted, bool) or not isinstance(converted, Real):
-        remedy = f"Give a number in {units}, or a text with units."
-        raise InvalidValue(name, value, "is no quantity", remedy=remedy)
-    if not math.isfinite(converted):
-        raise InvalidValue(name, value, "must be finite")
-    return float(converted)
+    return float(exact(name, value, units))
 
 
 def exact(name: str, value: Any, units: str) -> Fraction:
-    """A quantity in SI units, of a text before it is rounded; raises as `in_si`."""
-    rounded = in_si(name, value, units)
-    return Fraction(_of_text(name, value, units) if isinstance(value, str) else rounded)
+    """A quantity in SI units before it is rounded; raises as `in_si`."""
+    if isinstance(value, str):
+        found: Any = _of_text(name, value, units)
+    elif hasattr(value, "to") and hasattr(value, "magnitude"):
+        found = _converted(name, value, value, units)
+    else:
+        found = plain(name, value)
+    if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
+        remedy = f"Give a number in {units}, or a text with units."
+        raise InvalidValue(name, value, "is no quantity", remedy=remedy)
+    if not math.isfinite(_rounded(found)):
+        raise InvalidValue(name, value, "must be finite")
+    return Fraction(found)
 
 
 def factor(name: str, stated: str, units: str) -> Fraction:
