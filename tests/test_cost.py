@@ -60,20 +60,6 @@ def test_show_tells_it(tmp_path):
     assert "on one core here last" in " ".join(call("show", *few).stdout.split())
 
 
-@pytest.mark.parametrize(
-    ("seconds", "said"),
-    [
-        (0.04, "less than 0.1 s"),
-        (9.94, "9.9 s"),
-        (59.4, "59 s"),
-        (200.0, "3 min 20 s"),
-        (7500.0, "2 h 5 min"),
-    ],
-)
-def test_a_time_as_one_says_it(seconds, said):
-    assert cost.clock(seconds) == said
-
-
 # ---- advice on the engine ------------------------------------------------------------------------
 
 #: So many cells that SciPy takes above a minute.

@@ -172,22 +172,6 @@ def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
     assert len(points) == zeta.sizes["case"]
 
 
-def test_panels_are_repeated_along_an_axis_that_the_figure_does_not_know():
-    """Of few points, which titles say; of many points a map tells."""
-    rates = [0.01, 1.0, 100.0]
-    more = run("linear_stability", load_velocity_ratio=rates, b_over_a=[2.0, 2.5])
-    declared = [axes.get_title() for axes in plots.figure(more.isel(b_over_a=0)).axes]
-    titles = [axes.get_title() for axes in plots.figure(more).axes]
-    assert len(titles) == 2 * len(declared)
-    assert [title.rpartition("= ")[2] for title in titles] == ["2", "2", "2.5", "2.5"]
-
-
-def test_many_names_along_an_axis_are_thinned():
-    names = Axis("sample", {f"number {n}": {"phi": 50.0 + 0.05 * n} for n in range(300)})
-    (axes, *_others) = plots.figure(lattice(names)).axes
-    assert 20 < len(axes.get_xticks()) <= 45
-
-
 # ---- study by study -----------------------------------------------------------------------------
 
 
@@ -200,49 +184,6 @@ def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
         assert [label.split(":")[0] for label in curved] == [r"$\phi$ = 50"]
         fitted = [line for line in axes.lines if line.get_linestyle() != "None"]
         assert len(fitted) == len(labels) - len(curved)
-
-
-def test_stress_below_zero_is_marked(tmp_path_factory):
-    dataset, _path = named_results("limit_cycles", tmp_path_factory)
-    drawn = plots.figure(dataset)
-    marked = [
-        "below 0: stress reversed" in axes.get_legend_handles_labels()[1] for axes in drawn.axes
-    ]
-    lowest = [float(dataset.frictional_stress.sel(law=law).min()) for law in dataset.law.values]
-    assert marked == 2 * [low < 0.0 for low in lowest]
-
-
-def test_all_decades_of_bounded_slip_are_seen(tmp_path_factory):
-    """The quasi-static peak at 10^87 V_*, and the motions in more than half of their panel."""
-    dataset, _path = named_results("bounded_slip", tmp_path_factory)
-    panels = plots.figure(dataset).axes
-    assert panels[2].get_ylim()[1] > float(dataset.max_log10_slip_rate.max()) > 80.0
-    for axes in panels[:2]:
-        low, high = axes.get_ylim()
-        stresses = np.concatenate([line.get_ydata() for line in axes.lines[:2]])
-        assert np.ptp(stresses) > 0.5 * (high - low)
-
-
-def test_each_case_of_the_lattice_has_its_own_cells(tmp_path_factory):
-    dataset, _path = named_results("rate_step_lattice", tmp_path_factory)
-    drawn = plots.figure(dataset)
-    assert len(drawn.axes) == dataset.sizes["case"]
-    for axes, case in zip(drawn.axes, dataset.case.values, strict=True):
-        (unstable,) = (found for found in axes.collections if found.get_label() == "unstable")
-        assert len(unstable.get_offsets()) == int((dataset.unstable.sel(case=case) == 1.0).sum())
-
-
-def test_no_error_and_no_work_are_said_in_words(tmp_path_factory):
-    dataset, _path = named_results("hard_cases", tmp_path_factory)
-    errors, work = plots.figure(dataset).axes
-    said = [text.get_text() for text in errors.texts]
-    known = dataset.answer.notnull()
-    assert said.count("exact") == int(((dataset.measured_error == 0.0) & known).sum())
-    assert len(said) == said.count("exact") + int((~known).sum())
-    assert [text.get_text() for text in work.texts] == ["none"] * int(
-        (dataset.rhs_evaluations == 0).sum()
-    )
-    assert len(work.patches) == int((dataset.rhs_evaluations > 0).sum())
 
 
 # ---- any lattice --------------------------------------------------------------------------------
@@ -294,20 +235,6 @@ def test_any_lattice_is_printable(axes):
     test_symbols_are_written_as_symbols(drawn)
 
 
-def test_lines_say_little_and_join_no_names():
-    named = plots.figure(lattice(Axis("case", AWKWARD), Axis("law", ["slip", "slowness"])))
-    assert {line.get_linestyle() for line in named.axes[0].lines} == {"None"}
-    labels = plots.figure(lattice(Axis("phi", [50.0, 60.12345678901234]), RATES)).axes[0]
-    assert labels.get_legend_handles_labels()[1] == [r"$\phi$ = 50°", r"$\phi$ = 60.12°"]
-    assert labels.get_xscale() == "log"
-
-
-def test_lines_draw_all_that_was_measured_and_varies():
-    drawn = plots.figure(lattice(RATES)).axes
-    assert drawn[0].get_ylabel() == r"Critical stiffness, $k_{cr}D_c/\sigma_*$"
-    assert len(drawn) == 4
-
-
 def test_curves_that_lie_on_each_other_are_one():
     """An angle means nothing at constant normal stress: one curve, named once."""
     stress = Axis("normal_stress", ["constant", "variable"])
@@ -317,11 +244,6 @@ def test_curves_that_lie_on_each_other_are_one():
         r"variable normal stress, $\phi$ = 50°",
         r"variable normal stress, $\phi$ = 60°",
     ]
-
-
-def test_statuses_are_drawn_by_their_names_where_there_is_no_map():
-    (axes,) = plots.figure(lattice(RATES), variable="status").axes
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["ok"]
 
 
 def test_two_axes_of_numbers_are_a_map_with_statuses_that_are_no_number():
@@ -405,19 +327,6 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     assert imread(tmp_path / "mine.steady_friction.png").shape[1] == int(84.0 / MM * 50)
     assert call("plot", results, "--figure", "svg", "--output", tmp_path).returncode == 0
     assert (tmp_path / "mine.svg").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "status", "message"),
-    [
-        (["--style", "nothing"], 2, "is neither a style sheet"),
-        (["--variable", "nothing"], 1, "variable = 'nothing': is no number"),
-    ],
-)
-def test_what_is_wrong_is_told(words, status, message, results):
-    ran = call("plot", results, *words)
-    assert ran.returncode == status
-    assert message in " ".join(ran.stderr.split())
 
 
 def test_run_takes_a_format_and_a_style(tmp_path, monkeypatch):

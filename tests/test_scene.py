@@ -8,10 +8,9 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from IPython.core.completer import IPCompleter, provisionalcompleter
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, run
+from rsfstudy import Axis, Scene
 from rsfstudy.slider import laws, synonyms
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.registry import FIELDS
@@ -97,20 +96,6 @@ def test_the_signature_of_a_scene_names_its_fields():
     assert tuple(stated) == (*FIELDS, "dynamics", "loading")
     assert stated["law"].default == "slip"
     assert stated["a"].default == Scene().a
-
-
-def test_what_takes_fields_completes_them():
-    """With TAB, where the interpreter asks for signatures; a line of Python reads like one."""
-    rig = Laboratory(normal_stress=5e6, slip_distance=1e-5, reference_velocity=1e-6)
-    for takes in (rig.scene, Scene().with_, run):
-        stated = inspect.signature(takes).parameters
-        assert {"a", "stiffness", "loading"} <= set(stated)
-        assert stated["a"].kind is inspect.Parameter.KEYWORD_ONLY
-    assert "load_velocity" in inspect.signature(rig.scene).parameters
-    completer = IPCompleter(namespace={"rig": rig, "run": run, "scene": Scene()})
-    for text in ("rig.scene(hold_ti", "run('dilatancy', hold_ti", "scene.with_(hold_ti"):
-        with provisionalcompleter():
-            assert "hold_time=" in {found.text for found in completer.completions(text, len(text))}
 
 
 @pytest.mark.parametrize(

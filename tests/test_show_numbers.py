@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from running import call, run, study_of
 
-import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis
 from rsfstudy.files import numbers, store
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 
@@ -53,12 +51,6 @@ def test_a_small_one_is_whole_and_names_how_cells_ended(map_of_stiffness, tmp_pa
     assert (row[2], row[-1]) == ("-", "no_steady_state")
 
 
-def test_the_headline_is_what_the_measure_says():
-    base, axes = Scene(normal_stress="constant"), [Axis("stiffness_ratio", [50.0])]
-    study = Study(name="steps", title="Steps", base=base, axes=axes, measure=VelocityStep())
-    assert numbers.headline(run(study, rtol=1e-3)) == "apparent_a_minus_b"
-
-
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
     at = numbers.sample(sizes, 24)
@@ -67,10 +59,3 @@ def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
     assert len(numbers.sample({"x": 5}, 24)["x"]) == 5
-
-
-def test_slopes_are_shown_too(tmp_path, monkeypatch):
-    options = {"b_over_a": [2.0, 2.5, 3.0], "case": ["constant normal stress"], "rtol": 1e-4}
-    dataset = rsfstudy.run("rate_step_boundary", workers=0, output=None, progress=False, **options)
-    slope = float(dataset["zeta"].squeeze())
-    assert f" {slope:.6g} " in shown(dataset, tmp_path, monkeypatch).split("zeta")[2]

@@ -2,7 +2,6 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,8 +10,8 @@ import xarray as xr
 from running import run
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study
-from rsfstudy.declare import catalogue, names
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
 from rsfstudy.files import numbers
@@ -97,26 +96,6 @@ def test_symbols_need_no_mathjax(formula, written):
 
 def test_texts_of_strangers_stay_texts():
     assert "<script>" not in table(["<script>"], [["<script>"]], "<script>")
-
-
-def test_a_rig_shows_what_it_states():
-    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
-    shown = {row[0]: row[1:4] for row in rows(rig._repr_html_())}
-    assert shown["normal_stress"] == ["\u03c3*", "5e+06", "Pa"]
-    assert set(shown) == {"field", "normal_stress", "slip_distance", "reference_velocity"}
-    full = {"stiffness": "0.05 MPa/um", "mass": 1e3, "shear_modulus": "30 GPa", "density": 2700}
-    both = [{"stiffness": full["stiffness"], "mass": 1e3}, {"period": "5 ms"},
-            {"shear_modulus": full["shear_modulus"], "density": 2700}]  # fmt: skip
-    for more in both:
-        shown = rows(replace(rig, **more)._repr_html_())
-        assert set(more) < {row[0] for row in shown}
-
-
-def test_the_named_studies_are_a_table():
-    shown = rows(rsfstudy.studies()._repr_html_())
-    assert [row[0] for row in shown] == ["study", *names.names()]
-    (boundary,) = [row for row in shown if row[0] == "rate_step_boundary"]
-    assert boundary[2:] == ["84", "C6, C7"]
 
 
 def test_the_accessor_shows_numbers_and_verdicts():
