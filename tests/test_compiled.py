@@ -7,15 +7,12 @@ import os
 import subprocess
 import sys
 import types
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import agreement
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
-from rsfstudy.named_studies._random_scenes import QUESTIONS, random_scene
 from running import LEFT_TO_COMPILED, SMALL, enough, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
@@ -25,12 +22,10 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import DataError, Incomplete, InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import building, machine
 from rsfstudy.motion.engines import COMPILED, ENGINES, compiling
-from rsfstudy.slider import laws
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
@@ -52,33 +47,6 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
     pieces = LimitCycle(phases=50)(scene, accuracy)
     assert np.array_equal(whole.values["shear_stress"], pieces.values["shear_stress"])
     assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
-
-
-def asked() -> Iterator[tuple[Measure, Scene, Accuracy]]:
-    """Random scenes, dilatant ones, every other law, and falls of normal stress."""
-    for measure, scene, accuracy in agreement.random_scenes(24):
-        yield measure, scene, replace(accuracy, rtol=max(accuracy.rtol, 1e-7))
-    for law in ("slip", "slowness"):
-        like = Scene(law=law, fluid="dilatant", dilatancy=0.001, inertia=law == "slip")
-        for question in sorted(QUESTIONS):
-            yield QUESTIONS[question].measure, random_scene(like, question, 2), Accuracy(1e-4)
-        for stress in ({"normal_stress": "imposed", "alpha": 0.56}, {"alpha": 0.4, "phi": 55.0}):
-            scene = Scene(law=law, inertia=True, stiffness_ratio=1.25, **stress)
-            fall = CriticalStep(of="normal_stress_step", direction="down")
-            yield fall, scene, Accuracy(1e-6)
-    for law in sorted(set(laws.PARTS) - {"slip", "slowness"}):
-        heavy = Scene(law=law, inertia=True, stiffness_ratio=1.25)
-        for of in ("load_velocity_ratio", "displacement_step"):
-            yield CriticalStep(of=of), heavy, Accuracy(1e-6)
-        cycling = heavy.with_(stiffness_ratio=0.8, load_velocity_ratio=2.0)
-        yield LimitCycle(phases=2), cycling, Accuracy(1e-6)
-
-
-@pytest.mark.parametrize(("measure", "scene", "accuracy"), list(asked()))
-def test_both_engines_end_alike_within_their_errors(measure, scene, accuracy):
-    one = agreement.compared(measure, scene, accuracy)
-    assert one.same_end, one.what
-    assert not one.worst > 1.0, one.what
 
 
 def test_hard_cases_come_out():
@@ -311,15 +279,6 @@ def test_folders_of_others_are_left_alone(empty_cache, monkeypatch):
     assert files_in(empty_cache) == before
 
 
-def test_what_users_of_a_group_share_is_kept_all_the_same(empty_cache):
-    """Folders are made for the user alone, whatever the umask lets others do."""
-    before = os.umask(0o002)
-    try:
-        assert [compiled_programs() for _ in range(2)] == [1, 0]
-    finally:
-        os.umask(before)
-
-
 def test_a_user_without_a_home_is_served(monkeypatch):
     """As in a container whose user is not in passwd."""
     for name in ("HOME", "XDG_CACHE_HOME"):
@@ -370,10 +329,3 @@ def test_a_number_of_another_module_counts_too(monkeypatch):
     before = building.digest_of(by_module)
     monkeypatch.setattr(known, "NUMBER", 3.0)
     assert building.digest_of(by_module) != before
-
-
-def test_equations_are_shared_by_scenes_of_the_same_parts():
-    before = len(machine._ADDRESSES)
-    for ratio in (1.1, 1.2, 1.3):
-        CriticalStep()(Scene(stiffness_ratio=ratio), Accuracy(1e-4, engine=COMPILED))
-    assert len(machine._ADDRESSES) <= before + 1

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import EACH_STEP, cot_phi, follow
+from conftest import EACH_STEP, follow
 from hypothesis import given
 from hypothesis import strategies as st
 from in_time import InTime
@@ -27,7 +27,6 @@ from rsfstudy.slider.equations import (
     between_ruptures,
     by_displacement,
     by_inertial_time,
-    log_slip_rate_at,
 )
 from rsfstudy.slider.places import LAW
 from rsfstudy.slider.point import Point
@@ -283,33 +282,6 @@ def test_inertia_is_integrated_only_where_it_acts():
     switch = 0.5 * math.log(Accuracy(1e-7).switch_weight * fast.a / fast.stiffness)
     assert all(norm <= switch + 1e-9 for regime, norm in regimes if regime == "slow_manifold")
     assert {regime for regime, _norm in regimes} == {"slow_manifold", "inertial"}
-
-
-@pytest.mark.parametrize("displacement", [0.5, -0.5])
-def test_psi_is_continuous_across_a_displacement_step(displacement):
-    """Quasi-statically the step moves the spring alone; the state jumps by -alpha
-    ln(sigma/sigma_*), eq. 2.
-    """
-    scene = Scene(displacement_step=displacement)
-    first = next(course.follow(scene, Accuracy(), Meter(10**4))).point
-    assert first.psi == 0.0
-    assert first.spring_stress == pytest.approx(scene.stiffness * displacement, rel=1e-15)
-    ratio = 1.0 + cot_phi(scene) * first.spring_stress
-    state = first.imbalance - scene.b * first.log_slip_rate
-    assert state == pytest.approx(-scene.alpha * math.log(ratio), abs=1e-15)
-
-
-def test_mass_follows_a_displacement_step_within_the_inertial_time():
-    """With mass, a step too fast for the slow manifold moves the spring alone; slip rate
-    follows.
-    """
-    scene = Scene(normal_stress="constant", displacement_step=20.0, inertia=True)
-    fast = scene.inertial_time * math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
-    assert fast > 1.0
-    begun = next(course.follow(scene, Accuracy(), Meter(10**5)))
-    assert begun.regime == "inertial"
-    assert (begun.point.log_slip_rate, begun.point.friction) == (0.0, 0.0)
-    assert begun.point.spring_stress == scene.spring_stress_step
 
 
 #: phi = 33 degrees is just above atan(0.6): slowed down, normal stress grows without bound.

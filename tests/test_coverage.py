@@ -13,7 +13,6 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import limit_cycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED
 from rsfstudy.reduce import reduced
 from rsfstudy.status import Status
 
@@ -64,29 +63,6 @@ def test_an_estimate_that_is_too_small_shows(monkeypatch):
     assert known.sum() == 5
     assert (ratios[known] <= 1.0).all()
     assert (smaller[known] > 1.0).any()
-
-
-@pytest.mark.parametrize(
-    ("question", "law", "normal_stress", "sample", "digits", "most"),
-    [
-        ("rigid response", "slowness", "variable", 9, 7, 1.0),  # of 1,000 random scenes the worst
-        ("velocity step", "slip", "imposed", 19, 9, 3.0),
-        ("healing", "slowness", "variable", 19, 4, 3.0),
-        ("normal stress transient", "slowness", "imposed", 50, 4, 2.0),
-        ("normal stress response", "slip", "variable", 27, 4, 1.0),
-    ],
-)
-def test_two_runs_that_agree_by_chance(question, law, normal_stress, sample, digits, most):
-    """They erred by 2.4, 5.9, 22, 12 and 1.8 times their estimates: on stiff machines, where
-    stability limits the steps.
-    """
-    cell = Coverage(question=question, sample=sample, requested_digits=digits)
-    like = Scene(law=law, normal_stress=normal_stress)
-    found = cell(like, Accuracy(engine=COMPILED))
-    assert found.values["ended_as"] == Status.OK
-    ratios = found.values["error_over_estimate"]
-    assert np.isfinite(ratios).sum() == len(READINGS[question].measure.estimated)
-    assert np.nanmax(ratios) < most
 
 
 def test_a_scene_without_a_number_counts_its_status():

@@ -16,7 +16,6 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis import after_step
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
@@ -276,40 +275,6 @@ def test_mass_counts_at_a_norm_just_above_the_loading_rate():
     assert error < 5e-9
 
 
-#: Scenes in which the tolerance used to decide the status: (fields, direction, status).
-DECIDED = [
-    (
-        {"law": "slowness", "a": 0.021181644904389653, "b_over_a": 1.137092583705905,
-         "mu_star": 0.5552661225537985, "period": 0.7568223330364047,
-         "reference_rate": 1.1289390053970302e-08, "phi": 53.38530796435979,
-         "alpha": 0.0617045668824441, "stiffness_ratio": 1.8731115660211108,
-         "load_velocity_ratio": 11.030784157843362},
-        "down",
-        Status.STABLE_FOR_ALL_STEPS,  # the critical path starts beyond the end of shear stress
-    ),
-    (
-        {"law": "slowness", "a": 0.0074952301383459955, "b_over_a": 3.409016633081082,
-         "period": 0.11388174879575831, "reference_rate": 1.2408525574485156e-08,
-         "stiffness_ratio": 1.5381593043991868, "load_velocity_ratio": 6.78099797865174,
-         "inertia": True, **CONSTANT},
-        "up",
-        Status.OK,  # the jump of slip rate, which mass delays
-    ),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("fields", "direction", "status"), DECIDED)
-def test_the_tolerance_does_not_decide_the_status(fields, direction, status):
-    measure = CriticalStep(of=DISPLACEMENT, direction=direction)
-    rtols = (1e-4, 1e-7, 1e-9)
-    outcomes = [measure(Scene(**fields), Accuracy(rtol)) for rtol in rtols]
-    assert {outcome.status for outcome in outcomes} == {status}
-    if status is Status.OK:
-        *values, tight = (outcome.values["critical_displacement"] for outcome in outcomes)
-        for value, rtol in zip(values, rtols, strict=False):
-            assert value == pytest.approx(tight, rel=rtol)
-
-
 def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
     """A drop of V_0 that ends in a cycle: by a root of its peak, in 5 times the usual work. A cycle
     attracts little: it is not known to much more than seven digits, whatever is asked for.
@@ -326,16 +291,6 @@ def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
     assert "was asked for" in tight.message
     assert error < 1e-5 * (1.0 - value)
     assert outcome.rhs_evaluations < 100_000
-
-
-def test_mass_moves_the_boundary_where_it_acts():
-    """At a norm that mass can resist, the slowness law takes a larger step with mass than
-    without.
-    """
-    norm = 1.0
-    light = found(Scene(law="slowness", instability_norm=norm))[0]
-    heavy = found(Scene(law="slowness", instability_norm=norm, inertia=True))[0]
-    assert heavy > 1.01 * light
 
 
 # ---- statuses
@@ -427,12 +382,6 @@ def test_public_call_returns_a_small_dataset():
     assert float(step.critical_displacement) == float(held.critical_displacement)
     assert float(moving.critical_displacement) < float(held.critical_displacement)
     assert np.isfinite(float(step.slip_rate_after_step))
-
-
-def test_no_critical_step_is_told_and_not_only_nan():
-    with pytest.warns(NoAnswer, match="critical_step has no number: unstable_at_any_step"):
-        step = rsfstudy.critical_step(Scene(stiffness_ratio=0.8), rtol=1e-4)
-    assert np.isnan(float(step.critical_velocity_ratio))
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])

@@ -65,19 +65,6 @@ def test_steps_as_a_history_tell_what_the_steps_do(slider, engine):
     np.testing.assert_allclose(told(history(record), slider, engine), known, atol=3e-7, rtol=0.0)
 
 
-def test_slide_hold_slide_is_that_of_its_fields():
-    known = simulate(Scene(**PLAIN, hold_time=9.0), times=TIMES, engine=COMPILED)
-    record = history({"time": [0.0, 9.0, 30.0], "velocity": [0.0, 0.0, 0.0]})
-    assert record.segments[1].load_velocity == 0.0
-    record = history({"time": [0.0, 9.0, 30.0], "displacement": [0.0, 0.0, 21.0]})
-    scene = Scene(**PLAIN, loading=record)
-    motion = simulate(scene, times=TIMES, engine=COMPILED)
-    for name in WHAT:
-        np.testing.assert_allclose(motion[name], known[name], atol=1e-8)
-    # all of it is followed by default
-    assert float(simulate(scene, engine=COMPILED).time[-1]) == 30.0
-
-
 @pytest.mark.parametrize("law", ["slip", "two_slowness_states", "cut_off"])
 def test_all_engines_tell_one_motion(law):
     fields = {"law": law}

@@ -121,14 +121,6 @@ def test_public_call_and_si_units():
         rsfstudy.to_si(cycle.drop_vars("reference_rate"), normal_stress=1.0, slip_distance=1.0)
 
 
-def test_no_cycle_is_told_and_not_only_nan():
-    with pytest.warns(NoAnswer, match="limit_cycle has no number: no_limit_cycle"):
-        settled = rsfstudy.limit_cycle(
-            Scene(load_velocity_ratio=1.1, stiffness_ratio=3.0), rtol=1e-4
-        )
-    assert math.isnan(settled.recurrence_interval)
-
-
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_an_orbit_of_two_points_is_the_ends_of_any(case):
     """It is not recorded, and all numbers are the same. Recording halves steps of the second run,

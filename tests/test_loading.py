@@ -1,17 +1,15 @@
 """A loading is a sequence of segments; their motion is one, told as it is wherever it is cut."""
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.errors import Incomplete
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
@@ -151,20 +149,6 @@ def test_a_step_that_takes_all_stress_is_refused_wherever_it_stands():
         motion = simulate(of, duration=5.0)
     assert motion.attrs["status"] == "shear_stress_reversed"
     assert float(motion.time[-1]) == pytest.approx(1.0)
-
-
-def test_whether_a_step_triggers_is_asked_of_one_step():
-    with pytest.raises(InvalidValue, match="two_segments.*is no single step.*step_response"):
-        Triggered().find(scene(), Accuracy(), Meter(10))
-
-
-def test_time_without_a_clock_is_not_known():
-    motion = follow(
-        Scene(load_velocity_ratio=1.5), Accuracy(), Meter(10**4), [maximum("log_slip_rate")]
-    )
-    event = next(event for event in motion if event.watch is not None)
-    assert math.isnan(event.time)
-    assert math.isnan(event.slip)
 
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 1.2}

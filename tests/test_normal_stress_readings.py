@@ -162,20 +162,6 @@ def test_where_slip_does_not_come_as_far_nothing_is_read():
     assert outcome.values["closed_form_departure"] < 1.0
 
 
-@pytest.mark.parametrize("step", [0.1, -0.1])
-def test_of_no_effect_on_the_state_no_part_is_left(step):
-    """What is left after D_c is over the direct change of the state, and that is rounding."""
-    scene = Scene(law="slip", **IMPOSED, stiffness_ratio=50.0, normal_stress_step=step,
-                  load_velocity_ratio=1.0)  # fmt: skip
-    found = read(NormalStressTransient(), scene)
-    assert math.isfinite(found["evolution_left_error"])
-    without = NormalStressTransient()(scene.with_(alpha=0.0), Accuracy(engine=COMPILED))
-    assert without.status is Status.NOT_APPLICABLE
-    assert "no part of that can be left" in without.message
-    assert "evolution_left" not in without.values
-    assert math.isfinite(without.values["apparent_alpha_error"])
-
-
 @pytest.mark.parametrize("samples", [32, 64, 128])
 def test_overtones_beyond_the_samples_are_part_of_the_error(samples):
     """Held to 512, at an accuracy that asks for no more than the first; estimates stay small."""
@@ -230,24 +216,6 @@ def test_responses_of_more_periods(ratio, forcing, repeats):
     outcome = NormalStressResponse(samples=32)(scene, Accuracy(1e-4, engine=COMPILED))
     assert outcome.values.get("response_period", 0.0) == repeats
     assert outcome.status is (Status.OK if repeats else Status.NOT_PERIODIC)
-
-
-def test_weak_oscillations_are_answered_every_time_alike():
-    scene = Scene(**STRONG).with_(oscillation_amplitude=1e-3)
-    found = read(NormalStressResponse(), scene, 1e-6)
-    assert (found["response_period"], found["settled"]) == (1.0, 1.0)
-    assert found["gain"] == pytest.approx(found["linear_gain"], rel=1e-2)
-
-
-def test_a_response_without_a_period_says_so():
-    scene = Scene(law="slowness", normal_stress="imposed", alpha=0.25, b_over_a=2.0,
-                  stiffness_ratio=1.2, oscillation_amplitude=0.05,
-                  oscillation_period=2.0 * math.pi)  # fmt: skip
-    outcome = NormalStressResponse(samples=32)(scene, Accuracy(1e-5, engine=COMPILED))
-    assert outcome.status is Status.NOT_PERIODIC
-    assert outcome.values["settled"] == 0.0
-    assert "gain" not in outcome.values
-    assert "none of 1 to 4 periods" in outcome.message
 
 
 @pytest.mark.parametrize("ratio", [60.0, 600.0])

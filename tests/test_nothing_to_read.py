@@ -18,7 +18,7 @@ from rsfstudy.measures.fit import Fit
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.engines import COMPILED
 from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
 
@@ -129,21 +129,6 @@ def test_evolution_in_the_direction_of_the_direct_effect_has_its_slip_distance()
     level = friction(40.0) + (friction(trough) - friction(40.0)) / math.e
     left = min(t for t in friction.solve(level, extrapolate=False) if t > trough)
     assert found["apparent_slip_distance"] == pytest.approx(0.5 * (left - trough), rel=2e-4)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_one_step_of_the_integrator_may_hold_a_peak_and_what_is_on_either_side(engine):
-    """Friction is below the level before this step and after it."""
-    scene = Scene(
-        law="cut_off", cutoff_velocity_ratio=37636.873010838295, normal_stress="constant",
-        a=0.015843391107432936, b_over_a=1.2851363057799494, mu_star=0.7632291812253668,
-        stiffness_ratio=1.0718746434241289, load_velocity_ratio=7.966252844601684,
-    )  # fmt: skip
-    rough, exact = (
-        read(VelocityStep(phases=2), scene, rtol, engine=engine) for rtol in (1e-2, 1e-7)
-    )
-    for name in ("apparent_slip_distance", "corrected_slip_distance"):
-        assert abs(rough[name] - exact[name]) <= rough[f"{name}_error"] + exact[f"{name}_error"]
 
 
 NOTHING = Record({name: np.arange(3.0) for name in ("time", "displacement", "friction")})

@@ -8,7 +8,7 @@ from rsfstudy.named_studies._bifurcation import Bifurcation, _growth
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
-from rsfstudy.analysis.approach import Approach, course, recurrence
+from rsfstudy.analysis.approach import Approach, course
 from rsfstudy.analysis.cycles import Cycle
 from rsfstudy.analysis.return_map import ReturnMap, product, section
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -166,25 +166,11 @@ def test_motions_that_still_grow_are_not_said_to_have_no_period():
     assert found.message.endswith("--set transient=32 (transient=) waits for more")
 
 
-@pytest.mark.parametrize("events", [1, 3, 6])
-def test_few_events_say_nothing_of_periods(events):
-    found = LimitCycle(phases=2, events=events)(slow(0.853), Accuracy(1e-4))
-    assert found.status is Status.WORK_BUDGET_SPENT
-    assert f"--set events={2 * events}" in found.message
-
-
 def test_a_start_that_no_stress_holds_leads_nowhere():
     """Spring stress so low that the fault opens."""
     scene = Scene(law="two_slip_states", load_velocity_ratio=1.0)
     lost = np.array([-3.0, 0.0, 0.0])
     assert ReturnMap(scene, Accuracy(), Meter(1000)).events(lost, 1) == []
-
-
-def test_recurrence_counts_events():
-    scene = slow(0.86)
-    period, off = recurrence(scene, followed(scene, 32))
-    assert period == 2
-    assert off < 1e-3
 
 
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):

@@ -4,7 +4,6 @@ owes the loop.
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import math
 from types import SimpleNamespace
@@ -187,11 +186,6 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
     assert tuple(space.within[:2]) == pytest.approx(new, rel=1e-12)
     stepper.unknowns_at(motion, space, began)
     assert tuple(space.within[:2]) == pytest.approx(start, rel=1e-12)
-
-
-def test_a_debugger_shows_the_step_that_is_written_out():
-    attempt = unrolled._made("attempt", "y", ["return y[0]"], {})
-    assert inspect.getsource(attempt) == "def attempt(y):\n    return y[0]"
 
 
 @pytest.mark.parametrize("method", [DOP853, RK45, Radau])

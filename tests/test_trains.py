@@ -6,14 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from running import cell_key
 from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene, history, simulate
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.slider.laws import PARTS as LAWS
 
@@ -176,19 +173,6 @@ def test_records_come_to_an_oscillation_of_the_load_point(amplitude):
     assert np.log2(np.divide(off[:-1], off[1:])) == pytest.approx(2.0, abs=0.1)
 
 
-def test_slip_rate_jumps_where_it_begins():
-    """By (mu_* - alpha) A sin(phase)/a less, to first order in A; with mass too, where that has
-    settled: a jump as small never leaves the slow manifold.
-    """
-    for inertia in (False, True):
-        fields = {**STABLE, **IMPOSED, **TRAIN, "inertia": inertia}
-        motion = simulate(Scene(**fields, oscillation_amplitude=SMALL), engine=COMPILED)
-        first = int(np.argmax(motion.time.values > BEGIN - 1e-9))
-        x = motion.log10_slip_rate.values * math.log(10.0)
-        jump = -(0.76 - 0.3) * SMALL * 0.5 / 0.0145
-        assert x[first + 1] - x[first] == pytest.approx(jump, rel=1e-3)
-
-
 def test_what_is_not_stated_is_no_part_of_names_and_declarations():
     """Keys of cells are those of before there were trains."""
     kept = {
@@ -203,10 +187,3 @@ def test_what_is_not_stated_is_no_part_of_names_and_declarations():
     train = Scene(normal_stress="imposed", oscillation_amplitude=0.1, **TRAIN)
     assert {*TRAIN} <= {*train.as_dict()}
     assert Scene(**train.as_dict()) == train
-
-
-def test_a_steady_response_is_not_asked_of_a_train():
-    for fields in ({"oscillation_cycles": 3.0}, {"oscillation_begin": 1.0}):
-        scene = Scene(**STABLE, **IMPOSED, oscillation_amplitude=0.01, **fields)
-        with pytest.raises(InvalidValue, match="begins later or ends.*Leave out osc.*_begin and"):
-            NormalStressResponse()(scene, Accuracy())

@@ -115,44 +115,6 @@ def test_states_that_rest_apart_begin_at_rest():
     agree(RigidResponse(points=5), one, two)
 
 
-def of_lengths(b_over_a: float, second: float, over: float, **fields) -> Scene:
-    """Two states by b, b_2 and L_1/L_2, at constant normal stress."""
-    second /= Scene().a
-    parts = {"b1_over_a": b_over_a - second, "b2_over_a": second, "length_ratio": 1.0 / over}
-    return Scene(law="two_slip_states", **parts, **fields, **CONSTANT)
-
-
-@pytest.mark.parametrize(
-    ("b_over_a", "second", "over", "load"),
-    [
-        (1.4651462863, 0.0138187125, 3.7746346349, 1.3),
-        (2.3188214826, 0.0143733403, 0.1910147365, 1.1),
-    ],
-)
-def test_peaks_of_two_states_may_fall_before_they_rise(b_over_a, second, over, load):
-    """With three unknowns paths pass each other: only the norm, or rest, decides."""
-    scene = of_lengths(b_over_a, second, over, stiffness_ratio=0.9, load_velocity_ratio=load)
-    outcome = Triggered()(scene, Accuracy(1e-5, 2_000_000))
-    assert (outcome.status, outcome.values.get("unstable")) == (Status.OK, 1.0)
-
-
-MASSIVE = {"inertia": True, "period": 227374.0, "load_velocity_ratio": math.exp(1.6316)}
-
-
-@pytest.mark.parametrize(
-    ("b_over_a", "part", "over", "fields"),
-    [(12.0, 0.05, 3.0, {}), (16.0, 0.05, 2.0, {}), (1.4658, 0.3854, 0.4007, MASSIVE)],
-)
-def test_growth_of_two_states_has_its_threshold_at_the_critical_stiffness(
-    b_over_a, part, over, fields
-):
-    scene = of_lengths(b_over_a, part * b_over_a * Scene().a, over, **fields)
-    outcome = LinearStability()(scene, Accuracy())
-    assert outcome.status is Status.OK
-    values = outcome.values
-    assert values["critical_stiffness_error"] < 1e-6 * values["critical_stiffness"]
-
-
 @pytest.mark.parametrize("law", LAWS.values())
 @pytest.mark.parametrize("effect", [{}, {"stress_dependence": 2.0, **CONSTANT}])
 def test_what_stress_takes_is_shared_within_bounds(law, effect):
