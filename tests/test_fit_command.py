@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from running import call
 
 import rsfstudy
 from rsfstudy.api import fit_results
 from rsfstudy.api.fit_results import with_error
-from rsfstudy.errors import DataError, Incomplete, InvalidValue
+from rsfstudy.errors import DataError, Incomplete
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
 #: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
@@ -128,16 +127,6 @@ def test_a_rerun_says_what_it_lacks(written):
         assert "Fit them again" in " ".join(ran.stderr.split())
 
 
-def test_numbers_of_its_file_say_what_they_are(written):
-    here, _said = written
-    found = xr.load_dataset(here / "fit.nc")
-    assert found.slip_distance.attrs["units"] == "um"
-    assert found.slip_distance_stderr.attrs["long_name"].startswith("standard error of the ")
-    assert "misfit of the fitted law" not in found.a_stderr.attrs["long_name"]
-    for name, values in found.data_vars.items():
-        assert values.attrs["long_name"], name
-
-
 def test_a_file_that_is_not_there_is_told():
     ran = call("fit", "nowhere.csv", *FIT)
     assert (ran.returncode, ran.stderr.strip()) == (1, "error: there is no file nowhere.csv")
@@ -150,31 +139,6 @@ def test_files_of_others_are_not_replaced(written, tmp_path):
     assert ran.returncode == 2
     assert "no fit" in ran.stderr
     assert (tmp_path / "fit.nc").read_text() == "mine"
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("--free", "a,b,Dc"), "slip_distance"),
-        (("--free", "a,b,k"), "stiffness"),
-        (("--law", "magic"), "law"),
-        (("--step", "one"), "--step"),
-        (("--step", "7"), "has 2"),
-        (("--columns", "time"), "NAME=HEADING"),
-        (("--columns", "time=t,displacement=lp (um),friction=mu"), "states no units"),
-        (("--columns", "time=t (s),displacement=lpd (um),friction=mu"), "lp (um)"),
-        (("--stiffness", "0.04 MPa/um"), "normal stress"),
-        (("--stiffness", "5 mm"), "another kind"),
-        (("--noise", "pink"), "white"),
-        (("--output", "fit.txt"), ".png"),
-    ],
-)
-def test_what_is_wrong_is_told_in_one_message(written, words, told):
-    here, _said = written
-    ran = call("fit", str(here / "record.csv"), *FIT, "--output", str(here / "x.png"), *words)
-    assert ran.returncode == 2, ran.stderr
-    assert told in " ".join(ran.stderr.split())
-    assert "Traceback" not in ran.stderr
 
 
 def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
@@ -196,26 +160,6 @@ def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
     assert found == pytest.approx([found[0]] * 4, rel=1e-12)
 
 
-def test_plain_numbers_are_in_units_of_records(written, tmp_path):
-    here, _said = written
-    said = []
-    for number, (stiffness, after) in enumerate((("0.002", "150"), ("2e-6 1/nm", "0.15 mm"))):
-        words = ("--stiffness", stiffness, "--after", after, "--step", "1", "--noise", "white")
-        file = str(tmp_path / f"{number}.png")
-        ran = call("fit", str(here / "record.csv"), *FIT, *words, "--output", file)
-        assert ran.returncode == 0, ran.stderr
-        said.append(ran.stdout.partition("wrote")[0])
-    assert said[0] == said[1]
-
-
-def test_laws_are_named_as_a_list(written):
-    here, _said = written
-    record = rsfstudy.read_record(here / "record.csv", {"time": "t (s)", "displacement": "lp (um)",
-                                                        "friction": "mu"})  # fmt: skip
-    with pytest.raises(InvalidValue, match="laws="):
-        rsfstudy.fit(record, stiffness=STIFFNESS, law="slip")
-
-
 def test_a_number_has_the_digits_that_its_error_gives_it():
     def told(value, error):
         return with_error(xr.Dataset({"x": value, "x_stderr": error}), "x")
@@ -229,28 +173,6 @@ def test_a_number_has_the_digits_that_its_error_gives_it():
     assert told(3.0, 0.0) == "3 +- 0"
     assert told(math.nan, math.nan) == "-"
     assert told(1e-4, 1e7) == "not told"
-
-
-def test_the_figure_shows_each_record_and_says_what_panels_show(written):
-    """Symbols for all parameters; no grid over the matrix; letters beside titles, not on them."""
-    here, _said = written
-    figure = rsfstudy.open(here / "fit.nc").rsf.plot()
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    record, residual, lags, matrix = figure.axes
-    labels = [text.get_text() for text in matrix.get_xticklabels()]
-    assert len(labels) == 5
-    assert all(label.startswith("$") for label in labels)
-    assert not any(line.get_visible() for line in matrix.get_xgridlines())
-    assert record.get_xlabel() == residual.get_xlabel() == r"Load point displacement ($\mu$m)"
-    assert lags.get_xlabel() == "Lag (rows)"
-    for axes in figure.axes:
-        letter, title = (
-            next(t for t in axes.get_children() if t is getattr(axes, name)).get_window_extent(
-                renderer
-            )
-            for name in ("_left_title", "title")
-        )
-        assert letter.x1 <= title.x0 or not axes.get_title()
 
 
 #: A number and its error as they are printed, times a power of ten perhaps.

@@ -50,18 +50,6 @@ def test_one_step_together_is_that_step() -> None:
         assert float(both[name].item()) == float(alone[name].item()), name
 
 
-def test_two_records_share_a_law_and_have_trends_of_their_own() -> None:
-    records = [record(trend=2e-5, seed=1), record(trend=-3e-5, seed=2)]
-    alone = rsfstudy.fit(records, laws=["slowness"], **OPTIONS)
-    both = rsfstudy.fit(records, laws=["slowness"], together=True, **OPTIONS).squeeze()
-    true = {n: TRUTH[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": 0.6}
-    for name, value in (true | {"trend1_1": 2e-5, "trend1_2": -3e-5}).items():
-        assert abs(off(both, name, value)) < 4.0, name
-    for name in SHARED:  # two like records tell twice as much: 1/sqrt 2, as far as noise is told
-        ratio = float(both[f"{name}_stderr"] / alone[f"{name}_stderr"].mean())
-        assert ratio == pytest.approx(math.sqrt(0.5), rel=0.2), name
-
-
 def test_derivatives_of_windows_are_differences() -> None:
     scene = Scene(
         law="slip", a=0.01, b_over_a=1.3, normal_stress="constant", stiffness=0.03, mu_star=0.6
@@ -312,15 +300,6 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     correlation = np.corrcoef(drawn.values, rowvar=False)
     assert np.abs(correlation - fit.correlation).max() < 5.0 / math.sqrt(draws) + slack
     assert 1.0 < fit.autocorrelation_time < 20.0
-
-
-def test_a_chain_that_is_too_short_is_refused() -> None:
-    one, options = record(seed=4, count=200), {"laws": ["slowness"], **OPTIONS}
-    enough = int(rsfstudy.fit(one, **options).rhs_evaluations.item()) + 20_000
-    with pytest.warns(Incomplete):
-        fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
-    assert fit.rsf.table().status.item() == "work_budget_spent"
-    assert np.isnan(fit.posterior).all()
 
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,6 @@ from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.noise import Noise, Run
-from rsfstudy.errors import InvalidValue
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]
@@ -160,19 +159,6 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
     assert noises._runs(time) == (Run(0, 2_000, 0, 0),)
-
-
-def test_noise_without_size() -> None:
-    time = np.arange(100.0)
-    for name in ("white", "ar", "ar2"):
-        found = noises.fitted(name, time, np.zeros(100), np.ones((100, 1)))
-        assert np.isfinite(found.whitened(np.ones((100, 1)))).all()
-
-
-@pytest.mark.parametrize("name", ["red", "ar13", "ar-1", "AR", 3, "ar1.5"])
-def test_noise_that_is_unknown(name: str) -> None:
-    with pytest.raises(InvalidValue, match="noise"):
-        noises.check_noise(name)
 
 
 @pytest.mark.parametrize("order", [0, 3])
