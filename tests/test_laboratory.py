@@ -240,20 +240,6 @@ def test_the_picture_of_a_motion(laboratory, against):
     assert np.asarray(path.get_xdata()).max() > 2.5
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"displacement_step": 0.5, "stiffness_ratio": 3.0},
-        {"normal_stress": "imposed", "normal_stress_step": -0.03},
-    ],
-)
-def test_where_the_load_point_is_held_slip_is_the_abscissa(fields):
-    motion = simulate(Scene(**fields), duration=0.5, rtol=1e-4)
-    assert "Slip" in picture(motion).axes[1].get_xlabel()
-    asked = picture(motion, against="load_point_displacement")
-    assert "Load point displacement" in asked.axes[1].get_xlabel()
-
-
 def test_the_command_simulates_a_rig(tmp_path):
     path = tmp_path / "test.csv"
     path.write_text(RECORD)
@@ -312,19 +298,6 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
         assert ran.returncode == 2
         assert "is there already, and no motion" in " ".join(ran.stderr.split())
         assert data.read_bytes() == other
-
-
-def test_a_stiffness_of_friction_is_multiplied_by_normal_stress() -> None:
-    """k D_c/sigma_* does not depend on sigma_* then; one of stress is read as before."""
-    for stress in ("5 MPa", "20 MPa"):
-        stated = {"normal_stress": stress, "slip_distance": "10 um", "reference_velocity": 1e-6}
-        rig = Laboratory(**stated, stiffness="0.01 1/um")
-        # a product and quotient of a few numbers: some roundings of 1e-16 each
-        assert rig.scene(**LAW).stiffness == pytest.approx(0.1, rel=1e-14)
-        asked = Laboratory(**stated).scene(**LAW, stiffness="0.02 1/um")
-        assert asked.stiffness == pytest.approx(0.2, rel=1e-14)
-    with pytest.raises(InvalidValue, match="another kind than Pa/m"):
-        Laboratory(**stated, stiffness="1 um")
 
 
 @pytest.mark.parametrize(

@@ -84,34 +84,11 @@ def test_fields_of_scenes_in_units():
     assert np.array(at) == pytest.approx(np.array(expected), rel=EXACT)
 
 
-def test_an_axis_of_one_point_is_an_axis_still():
-    """What depends on it lies along it, so that fits on it are there and say that they are none."""
-    made = study(RIG.axis("load_velocity", ["3 um/s"]), RIG.axis("normal_stress", ["1 MPa"]))
-    dims, values = made.rig.beside()["load_velocity_ratio"]
-    assert dims == ("load_velocity",)
-    assert values == pytest.approx([3.0], rel=EXACT)
-
-
 def test_rigs_as_an_axis():
     rig20 = Laboratory(**STATED | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
     made = study(Axis("rig", {"5 MPa": RIG, "20 MPa": rig20}), hold_time="10 s")
     for scene, rig in zip(made.scenes(), (RIG, rig20), strict=True):
         assert numbers(scene) == pytest.approx(numbers(rig.scene(**LAW, hold_time="10 s")))
-
-
-def test_plain_numbers_are_in_si_units_as_everywhere_in_a_rig():
-    made = study(Axis("hold_time", [10.0, 100.0]), Axis("b_over_a", [1.2, 1.4]))
-    assert made.axes[0].units == {"hold_time": "s"}
-    assert made.axes[1].units == {}
-    assert made.scene(0).hold_time == RIG.scene(**LAW, hold_time=10.0).hold_time
-
-
-def test_mass_of_a_rig_acts():
-    stiffness = RIG.axis("stiffness", ["10 GPa/m", "20 GPa/m"])
-    made = study(RIG.axis("mass", ["1e4 kg/m^2"]), stiffness)
-    for scene, k in zip(made.scenes(), (1e10, 2e10), strict=True):
-        assert scene.inertia
-        assert scene.period == pytest.approx(2.0 * np.pi * np.sqrt(1e4 / k), rel=EXACT)
 
 
 LATTICE = (
@@ -200,25 +177,6 @@ def test_what_states_the_same_takes_the_place_of_an_axis():
         study(RIG.axis("load_velocity", ["1 um/s"]), Axis("load_velocity_ratio", [2.0]))
 
 
-def test_what_does_not_go_with_the_rig_is_refused_before_any_work():
-    hold = RIG.axis("hold_time", ["10 s"])
-    parts = {"name": "x", "title": "t", "measure": LinearStability()}
-    with pytest.raises(InvalidValue, match="Study.laboratory=rig"):
-        Study(base=Scene(), axes=[hold], **parts)
-    with pytest.raises(InvalidValue, match="is not that of the laboratory"):
-        Study(base=Scene(), axes=[hold], laboratory=RIG, **parts)
-    bare = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    with pytest.raises(InvalidValue, match="does not state stiffness"):
-        study(Axis("rig", {"bare": bare}))
-    ratio, stress = Axis("stiffness_ratio", [0.8]), RIG.axis("normal_stress", ["1 MPa"])
-    with pytest.raises(InvalidValue, match="cell stiffness_ratio=0.8"):
-        list(study(ratio, stress, measure=LimitCycle()).scenes())
-    with pytest.raises(InvalidValue, match="mass or period"):
-        list(study(RIG.axis("mass", [1e4]), RIG.axis("period", ["1 ms"])).scenes())
-    with pytest.raises(InvalidValue, match="Laboratory"):
-        Study(base=Scene(), axes=[hold], laboratory="5 MPa", **parts)
-
-
 # ---- results in units ----------------------------------------------------------------------------
 
 
@@ -285,19 +243,6 @@ def test_a_map_of_flags_names_them():
     (panel,) = rsfstudy.plot(results, "slip_mode").axes
     names = [text.get_text() for text in panel.get_legend().get_texts()]
     assert names == [SLIP_MODES[int(mode)].replace("_", " ") for mode in there]
-
-
-def test_a_cycle_is_that_of_its_own_rig(cycles):
-    """The cell of another stress and slip distance, asked alone of the rig that states them."""
-    rig = Laboratory(**SOFT | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
-    fields = {"period": "5 ms", "inertia": True, "load_velocity_ratio": 10.0}
-    alone = rsfstudy.limit_cycle(rig.scene(**LAW, **fields), rtol=1e-5, engine="compiled")
-    theirs = rig.in_units(alone, stress="MPa", length="um")
-    ours = cycles.rsf.in_units().sel(sigma_star=20.0, slip_distance=5.0, load_velocity=10.0)
-    # one scene apart from its last bits: both estimates cover what that makes of the cycle
-    for name in ("recurrence_interval", "static_stress_drop"):
-        error = float(ours[f"{name}_error"] + theirs[f"{name}_error"])
-        assert float(ours[name]) == pytest.approx(float(theirs[name]), abs=error)
 
 
 def test_one_scale_for_several_rigs_is_refused(cycles):
@@ -372,20 +317,3 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
         there = rigs.on(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass
-
-
-def test_options_of_the_rig_and_values_in_units_in_show():
-    words = ["show", "rig_recurrence", "--normal-stress", "7 MPa", "--slip-distance", "2e-5"]
-    words += ["--load-velocity", "3 um/s", "--set", "stiffness=1:10:3:log kPa/um"]
-    status, said = called(words)
-    assert status == 0
-    assert "axis sigma_star (1) 7 MPa" in said
-    assert "axis load_velocity (1) 3 um/s" in said
-    assert "axis stiffness (3) 1 kPa/um, 3.16228 kPa/um, 10 kPa/um" in said
-    assert "slip_distance = 2e-05 m" in said
-
-
-def test_the_stiffness_of_a_rig_takes_the_place_of_an_axis():
-    scales = ("--normal-stress=10 MPa", "--slip-distance=15 um", "--reference-velocity=1 um/s")
-    _code, said = called(["show", "slide_hold_slide", *scales, "--stiffness", "20 MPa/mm"])
-    assert "axis stiffness (1) 20 MPa/mm" in said

@@ -72,16 +72,6 @@ def test_fields_are_functions_of_what_is_drawn():
     assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
 
 
-def test_twice_the_samples_compute_those_that_are_new(tmp_path, monkeypatch):
-    original, counted = cells.computed, []
-    monkeypatch.setattr(
-        cells, "computed", lambda *given, **more: counted.append(1) or original(*given, **more)
-    )
-    for n in (8, 16):
-        run(study(Axis.samples(LOGS, n, 3, fields=FIELDS)), output=tmp_path)
-    assert len(counted) == 16
-
-
 def test_the_first_samples_are_a_sample_still():
     whole = study(Axis.samples(LOGS, 16, 3, fields=FIELDS))
     half = whole.with_(sample=list(range(8)))
@@ -190,14 +180,6 @@ def test_a_table_in_units_of_a_rig(tmp_path):
         assert restore.study_of(found).describe() == declared.describe()
 
 
-def test_samples_in_units_of_a_rig():
-    base = RIG.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
-    lengths = Axis.samples({"slip_distance": norm(10.0, 1.0)}, 4, units={"slip_distance": "um"})
-    declared = study(lengths, base=base, laboratory=RIG)
-    for row, scene in zip(lengths.rows, declared.scenes(), strict=True):
-        assert scene.stiffness == pytest.approx(2e-4 * row["slip_distance"], rel=1e-12)
-
-
 # ---- from a fit ----------------------------------------------------------------------------------
 
 
@@ -295,15 +277,6 @@ def test_statistics_with_the_errors_of_sampling():
         # that of the cells is told apart: a mean of them, and of a quantile at most theirs
         assert float(found[f"{name}_error"].max()) <= 1.0001e-6
         assert found[f"{name}_points"].values.tolist() == [200] * 500
-
-
-def test_answers_without_a_number_are_left_out_and_counted():
-    values = np.where(np.arange(20) % 4 == 0, np.nan, 2.0 + np.arange(20.0))
-    found = reduced(measured(values, np.where(np.isnan(values), 3, 0)), STATISTICS)
-    known = values[~np.isnan(values)]
-    assert float(found["mean"]) == pytest.approx(known.mean(), rel=1e-14)
-    assert float(found["low"]) == pytest.approx(np.quantile(known, 0.2), rel=1e-14)
-    assert int(found["mean_points"]) == 15
 
 
 def test_failed_samples_are_refused_and_shares_tell_of_them():
@@ -433,10 +406,6 @@ def test_samples_are_drawn_as_histograms_and_scatters(tmp_path):
     other = plots.figure(found, variable="steady_friction")
     assert other.axes[0].get_xlabel() != drawn.axes[0].get_xlabel()
     plots.save(found, tmp_path / "samples.svg")
-
-
-def test_a_single_case_is_drawn():
-    assert plots.figure(run(study(Axis.cases({"a": [0.01], "b_over_a": [1.5]})))).axes
 
 
 # ---- the command line ---------------------------------------------------------------------------
