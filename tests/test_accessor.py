@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ import rsfstudy.api.accessor  # datasets of others have it too, whichever test i
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.slider import laws
 
 STUDY = Study(
     name="soft_and_stiff",
@@ -81,40 +79,6 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
         step.rsf.plot()
 
 
-def test_an_answer_shares_nothing_with_the_next():
-    """Both are copies of one blank dataset."""
-    scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    first = rsfstudy.limit_cycle(scene, rtol=1e-3).assign_attrs(history="")
-    kept = first.copy(deep=True)
-    with pytest.warns(NoAnswer):
-        missing = rsfstudy.limit_cycle(scene.with_(stiffness_ratio=1.5), rtol=1e-3)
-    for name in missing.data_vars:
-        missing[name].values[...] = 7
-        missing[name].attrs["units"] = "furlong"
-    missing["reference_rate"].values[...] = 7
-    missing.indexes["phase"].name = "spoiled"
-    again = rsfstudy.limit_cycle(scene, rtol=1e-3).assign_attrs(history="")
-    xr.testing.assert_identical(first, kept)
-    xr.testing.assert_identical(again, kept)
-    assert again.indexes["phase"].name == "phase"
-    with pytest.warns(NoAnswer):
-        unanswered = rsfstudy.limit_cycle(scene.with_(stiffness_ratio=1.5), rtol=1e-3)
-    assert np.isnan(unanswered.recurrence_interval)
-
-
-def test_a_part_of_a_users_own_must_be_known():
-    @dataclass(frozen=True, kw_only=True)
-    class Mine(laws.PARTS["slip"]):
-        name = "mine_alone"
-
-    scene = Scene(law=Mine, stiffness_ratio=2.0, load_velocity_ratio=1.1)
-    motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-3)
-    assert motion.rsf.scene == scene
-    stranger = motion.assign_attrs(scene=motion.attrs["scene"].replace("mine_alone", "yours"))
-    with pytest.raises(InvalidValue, match="law = 'yours': is a user's own, and not known here"):
-        _ = stranger.rsf.scene
-
-
 def test_results_know_their_study_and_each_cell_its_scene(results):
     assert results.rsf.study.describe()["axes"] == STUDY.describe()["axes"]
     for number, (law, stiffness) in enumerate(
@@ -150,14 +114,6 @@ def test_only_whole_results_in_their_own_units_are_checked_and_drawn(results):
             getattr(results.rsf.to_si(**SI).rsf, ask)()
 
 
-def test_units_of_scales_may_be_written(results):
-    written = results.rsf.to_si(normal_stress="100 MPa", slip_distance="10 um")
-    xr.testing.assert_allclose(written, results.rsf.to_si(**SI))
-    assert written.attrs["scales"].startswith("sigma_* = 1e+08 Pa, D_c = 1e-05 m")
-    beside = written.critical_velocity.attrs["ancillary_variables"].split()
-    assert set(beside) <= set(written.variables)
-
-
 def test_results_are_checked_drawn_and_converted(results):
     assert results.rsf.check().verdict.tolist() == ["reproduced"]
     assert isinstance(results.rsf.plot("critical_velocity_ratio"), Figure)
@@ -171,12 +127,6 @@ def test_a_foreign_dataset_is_refused():
     for ask in (*asks, lambda: rsf.scene, lambda: rsf.study):
         with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
             ask()
-
-
-@pytest.mark.parametrize("scene", ["LC08_L1TP", "[1]", '{"law": "slip"}'])
-def test_an_attribute_of_the_same_name_is_no_scene(scene):
-    with pytest.raises(DataError, match="^scene"):
-        _ = xr.Dataset(attrs={"scene": scene}).rsf.scene
 
 
 def test_a_file_that_xarray_opens_has_it_and_the_import_alone_loads_nothing(file):

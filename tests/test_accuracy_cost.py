@@ -17,7 +17,6 @@ from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
@@ -112,24 +111,6 @@ def test_times_are_relative_to_those_of_the_moment(monkeypatch):
     assert work == [yardstick, run, yardstick, run, yardstick, run, yardstick]
     assert found["relative_time"] == pytest.approx(run / yardstick, rel=1e-12)
     assert found["run_time"] == pytest.approx(4e-9 * run, rel=1e-12)  # the second of three
-
-
-def test_a_long_run_is_timed_once(monkeypatch):
-    calls = []
-    original = accuracy_cost._timed
-
-    def long(problem, scene, asked):
-        calls.append(asked)
-        return (1.0, *original(problem, scene, asked)[1:])
-
-    monkeypatch.setattr(accuracy_cost, "_timed", long)
-    assert solved("DOP853", 4.0).values["relative_time"] == 1.0
-    assert len(calls) == 3
-
-
-def test_what_has_no_known_answer_is_refused():
-    with pytest.raises(InvalidValue, match="has no known answer"):
-        WorkPrecision(problems=(PROBLEM,))(SCENE.with_(load_velocity_ratio=3.0), Accuracy())
 
 
 def runs(achieved, work) -> xr.Dataset:

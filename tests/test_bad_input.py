@@ -4,9 +4,7 @@ never a half-written output.
 
 import os
 import string
-import threading
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +13,10 @@ import xarray as xr
 from faulty import declared
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import FAULTY, SMALL, call, called, run, same_numbers
+from running import FAULTY, SMALL, call, called, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
-from rsfstudy.cli.console import console
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.registry import FIELDS
@@ -158,12 +155,6 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
         catalogue.load(str(path))
 
 
-def test_a_study_file_of_bytes(tmp_path):
-    (tmp_path / "mine.py").write_bytes(bytes(range(128, 255)))
-    with pytest.raises(InvalidValue, match="mine"):
-        catalogue.load(str(tmp_path / "mine.py"))
-
-
 # ---- where results go ---------------------------------------------------------------------------
 
 
@@ -175,13 +166,6 @@ def test_an_output_that_cannot_be_written(output, monkeypatch):
         run(output=output)
 
 
-def test_a_journal_that_cannot_be_written(tmp_path, monkeypatch):
-    """An old journal on what is now read-only; root may write anything but a directory."""
-    (tmp_path / "small.cells.sqlite").mkdir()
-    with pytest.raises(DataError, match="cannot use .*--output"):
-        run(output=tmp_path)
-
-
 def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
     (tmp_path / "faulty.png").mkdir()
     ran = call("run", FAULTY, "--serial", "--output", tmp_path)
@@ -189,14 +173,6 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
     assert "no figure:" in ran.stderr
     assert "faulty.png" not in ran.stdout
     assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"
-
-
-def test_a_figure_that_does_not_fit_is_told(tmp_path):
-    study = replace(declared(), plot="rate_step_boundary")
-    results = run(study)
-    with pytest.raises(InvalidValue, match="plot = 'rate_step_boundary': does not fit these"):
-        plots.save(results, tmp_path / "faulty.png")
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
@@ -211,12 +187,6 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatc
     assert os.listdir(tmp_path) == ["faulty.png"]
 
 
-def test_what_would_steer_the_terminal_is_spelt_out(capsys):
-    """A title from a file could rewrite what stands above it."""
-    console.print("a\x1b[2J\x07b\n[red]")
-    assert capsys.readouterr().out == "a\\x1b[2J\\x07b\n[red]\n"
-
-
 @pytest.mark.parametrize("command", ["check", "plot"])
 def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     command, tmp_path, monkeypatch
@@ -229,21 +199,3 @@ def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
     (tmp_path / "stress_drop.partial.nc").touch()
     code, said = called([command, "stress_drop", "--output", str(tmp_path)])
     assert (code, "partial.nc does: run the study again" in said) == (1, True)
-
-
-def test_threads_that_run_studies_do_not_mix():
-    """Two studies at the same time in one process."""
-    found = {}
-
-    def computes(name, values):
-        found[name] = run(SMALL.with_(b_over_a=values))
-
-    threads = [
-        threading.Thread(target=computes, args=(n, v)) for n, v in (("a", [2.0]), ("b", [3.0]))
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for name, value in (("a", 2.0), ("b", 3.0)):
-        same_numbers(found[name], run(SMALL.with_(b_over_a=[value])))

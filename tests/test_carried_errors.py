@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from rsfstudy.named_studies.rigid_response import Spread
-from running import called, named_results
+from running import named_results
 
-from rsfstudy.files.comparison import side_by_side
 from rsfstudy.reduce import (
     Boundary,
     DecadeFit,
@@ -202,21 +201,3 @@ def test_zeta_is_within_its_numerical_error_of_the_closed_form(boundary):
     assert set(dataset.zeta.attrs["ancillary_variables"].split()) == {
         f"zeta_{end}" for end in ("error", "stderr", "misfit", "points")
     }
-
-
-def test_slopes_that_differ_within_their_errors_agree(boundary):
-    dataset, _path = boundary
-    near, far = dataset.copy(deep=True), dataset.copy(deep=True)
-    near["zeta"] = near.zeta + 0.5 * near.zeta_error
-    far["zeta"] = far.zeta + 3.0 * far.zeta_error
-    assert side_by_side(dataset, near).agrees
-    assert side_by_side(dataset, far).beyond_errors == ["zeta"]
-
-
-def test_the_table_of_slopes_shows_them(boundary, monkeypatch):
-    dataset, path = boundary
-    monkeypatch.setenv("COLUMNS", "500")
-    code, said = called(["show", str(path)])
-    assert code == 0
-    assert "numerical error" in said
-    assert f" {float(dataset.zeta_error[0, 0]):.2g} " in said

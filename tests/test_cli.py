@@ -15,7 +15,6 @@ from rsfstudy.cli import assignments
 from rsfstudy.declare import catalogue, names
 from rsfstudy.files import store
 from rsfstudy.motion import engines
-from rsfstudy.status import Status
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -69,18 +68,6 @@ def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
     assert "differs, expected reproduced" in checked.stdout
 
 
-def test_a_failed_cell_is_listed_and_fails(tmp_path, monkeypatch):
-    study = rsfstudy.studies()[NAME]
-    dataset = rsfstudy.run(study, workers=0, output=None, progress=False, b_over_a=[2, 3])
-    dataset.status[1, 0] = int(Status.INTEGRATION_FAILED)
-    dataset.message[1, 0] = "step without length"
-    store.write(dataset, tmp_path / "failed.nc")
-    checked = call("check", tmp_path / "failed.nc")
-    assert checked.returncode == 1
-    assert "1 cells failed" in checked.stdout
-    assert "integration_failed" in checked.stdout
-
-
 @pytest.mark.parametrize(
     "settings",
     [
@@ -116,17 +103,6 @@ def test_list_and_show():
     assert shown.returncode == 0
     assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
     assert "right-hand sides" in shown.stdout
-
-
-def test_a_spent_budget_names_the_option_that_raises_it(tmp_path):
-    few = ["--serial", "--set", "b_over_a=2", "--output", tmp_path]
-    ran = call("run", NAME, *few, "--budget", "300")
-    assert ran.returncode == 1
-    assert "--budget 1200 (budget=)" in ran.stdout
-    motion = ("simulate", "--budget", "500", "--output", tmp_path / "motion.png")
-    ran = call(*motion, "--set", "load_velocity_ratio=1.2", "--duration", "1e3")
-    assert ran.returncode == 1
-    assert "--budget 2000 (budget=) allows more" in " ".join(ran.stdout.split())
 
 
 @pytest.mark.parametrize(
@@ -202,23 +178,6 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     }
     assert ended["moving"][1] == "1 differs"
     assert (tmp_path / "fine.nc").exists()
-
-
-def test_run_all_is_fine_where_every_study_is(catalogued, tmp_path):
-    catalogued(replace(declared(), name="one"), replace(declared(), name="two"))
-    ran = call("run", "--all", "--serial", "--output", tmp_path)
-    assert ran.returncode == 0
-    assert [row[-1] for row in rows(ran.stdout).values()] == ["ok", "ok"]
-    assert_short(ran.stdout, 2)
-    assert len(ran.stderr.splitlines()) == 2
-
-
-def assert_short(said: str, studies: int) -> None:
-    """So many blocks of few lines, and one table at the end."""
-    blocks, _rule, table = said.rpartition("───\n")
-    assert len(re.findall(r"^  in .*, wrote ", blocks, re.MULTILINE)) == studies
-    assert len(blocks.splitlines()) <= 6 * studies + 2
-    assert len(table.split("\n\n")[0].splitlines()) == studies
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ import os
 import re
 import runpy
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -223,25 +222,6 @@ def test_a_scheduler_that_does_not_answer_is_named(address):
         clusters.existing_cluster(address, timeout=0.3),
     ):
         pass
-
-
-def test_a_port_that_listens_and_says_nothing(tmp_path):
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        with (
-            pytest.raises(RunError, match="no Dask scheduler answers"),
-            clusters.existing_cluster(address, timeout=0.3),
-        ):
-            pass
-
-
-def test_a_client_that_is_closed(tmp_path):
-    from distributed import Client
-
-    with Client(n_workers=1, processes=False, **QUIET) as client:
-        pass
-    with pytest.raises(RunError, match="client is closed"):
-        run(client=client)
 
 
 # ---- the files of the page ----------------------------------------------------------------------

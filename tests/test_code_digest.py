@@ -8,7 +8,6 @@ import sys
 import textwrap
 from pathlib import Path
 
-import msgspec
 import pytest
 from rsfstudy.named_studies import effects
 
@@ -16,7 +15,7 @@ import rsfstudy
 from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.names import PACKAGE
-from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.errors import DataError, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -110,20 +109,6 @@ class Around(Measure):
 
 """
 
-KEEPING = """
-import dataclasses
-
-@dataclasses.dataclass
-class Kept:
-    x: float = 1.0
-
-    @functools.cached_property
-    def twice(self):
-        return 2.0 * self.x
-
-KEPT = Kept()
-
-"""
 
 FOUND = 'find(self, scene, accuracy, meter):\n        """A remark."""'
 
@@ -208,17 +193,6 @@ def test_the_code_of_a_measure_within_another_counts(tmp_path):
         assert len(set(found)) == 3
 
 
-def test_what_use_leaves_on_a_class_or_in_an_object_does_not_count(tmp_path):
-    """What a cached property made, and what msgspec keeps of a class that it has read."""
-    kept = HELPER.replace("class Tool(Base):", KEEPING + "class Tool(Base):")
-    using = MEASURE.replace("from helper import Tool", "from helper import Tool, KEPT")
-    study = study_in(tmp_path, helper=kept, measure=using.replace("TOOL.more", "KEPT.x"))
-    before, used = digest(study), type(study.measure).find.__globals__["KEPT"]
-    assert used.twice == 2.0
-    msgspec.convert({"x": 2.0}, type(used))
-    assert digest(study) == before
-
-
 def test_it_is_the_same_in_other_processes(tmp_path):
     """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
     expected = digest(study_in(tmp_path))
@@ -259,15 +233,6 @@ def test_helpers_reach_the_workers_and_those_of_other_files_do_not_mix(tmp_path,
         assert here.total.values.tolist() == there.total.values.tolist()
         factor = 2.0 if study is one else 3.0
         assert here.total.values.tolist() == [factor * 2 * b + 2.0 for b in (2.0, 3.0)]
-
-
-def test_a_measure_that_cannot_be_sent_is_told_before_any_work(tmp_path):
-    study = study_in(tmp_path)
-    with pytest.raises(
-        InvalidValue, match=r"'own': cannot be sent to a worker.*lru_cache.*--serial"
-    ):
-        rsfstudy.run(study, output=tmp_path / "results", progress=False)
-    assert not (tmp_path / "results").exists()
 
 
 def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster):

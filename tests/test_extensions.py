@@ -15,7 +15,6 @@ import cloudpickle
 import numpy as np
 import pytest
 from frozen_scenes import Motion
-from rsfstudy.named_studies._phase_plane import scene_of
 from running import call, run, same_numbers, study_of
 from telling import apart, told
 
@@ -23,7 +22,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.figure import Figure, Panel
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.slider import laws, places, registry
@@ -198,14 +197,6 @@ def test_the_saturating_laws(outside):
         assert ours == pytest.approx(exact, rel=tolerance)
 
 
-def test_what_does_not_run_away_needs_larger_steps_for_larger_norms(outside):
-    study = catalogue.load(str(outside["saturating_law"].study))
-    steps = run(study, instability_norm=[1e4, 1e8]).critical_displacement
-    growth = steps.isel(instability_norm=1) / steps.isel(instability_norm=0)
-    assert float(growth.sel(sharpness=1.0, stiffness_ratio=1.5)) > 1.2
-    assert float(growth.sel(sharpness=0.5, stiffness_ratio=1.5)) < 1.01
-
-
 def test_stress_that_wears_the_state_away(outside):
     """k_cr is 1/(1 + c) of that without, at constant normal stress; with all effects, that of the
     assembled equations.
@@ -227,17 +218,6 @@ def test_a_measure_a_reduction_and_a_figure(outside):
     study = catalogue.load(str(outside["own_figure"].study))
     drawn = plots.figure(outside["own_figure"].dataset, study.plot).axes[0]
     assert drawn.get_ylabel() == "Angle (degrees)"
-
-
-def test_a_figure_of_ones_own_may_lay_itself_out(outside):
-    own = outside["own_figure"]
-    draw = catalogue.load(str(own.study)).plot
-
-    def laid_out(dataset, axes):
-        axes.figure.set_layout_engine(None)
-        return draw(dataset, axes)
-
-    assert plots.figure(own.dataset, laid_out).get_layout_engine() is None
 
 
 # ---- without its file, and with another ---------------------------------------------------------
@@ -274,30 +254,6 @@ def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, mon
     assert rsfstudy.check(dataset).empty
     with pytest.raises(InvalidValue, match="law = 'saturating': is unknown"):
         Scene(law="saturating")
-
-
-def test_figures_of_rsfstudy_know_the_scenes(outside):
-    for name, place in PLACES.items():
-        study = catalogue.load(str(outside[name].study))
-        cell = outside[name].dataset.sel(place)
-        (ours,) = {c.scene for c in study.cells()} & {scene_of(cell)}
-        assert {n: ours.as_dict()[n] for n in place} == place
-
-
-def test_edited_code_is_refused_with_the_journal(tmp_path):
-    text, study = EXAMPLES[0].with_name("saturating_law.py").read_text(), tmp_path / "mine.py"
-    options = {"workers": 0, "output": tmp_path, "progress": False, "stiffness_ratio": 0.8}
-    study.write_text(text)
-    before = rsfstudy.run(study, **options)
-    edited = text.replace("/ sharpness\n", "/ sharpness * 1.5\n")
-    assert edited != text
-    study.write_text(edited)
-    with pytest.raises(DataError, match="own_code: .* there, .* now"):
-        rsfstudy.run(study, **options)
-    after = rsfstudy.run(study, fresh=True, **options)
-    assert (before.critical_displacement != after.critical_displacement).any()
-    study.write_text(text)  # in this process, where both have been known
-    same_numbers(rsfstudy.run(study, fresh=True, **options).drop_attrs(), before.drop_attrs())
 
 
 # ---- in a notebook, or anywhere -----------------------------------------------------------------

@@ -2,7 +2,6 @@
 is drawn from it unless one says so.
 """
 
-import logging
 import shlex
 import signal
 import subprocess
@@ -19,7 +18,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.api import tables
 from rsfstudy.cli import assignments, terminal
-from rsfstudy.compute import clusters, runner, worker_log, workers
+from rsfstudy.compute import clusters, runner, workers
 from rsfstudy.compute.plan import Batches
 from rsfstudy.errors import Incomplete, InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
@@ -216,17 +215,6 @@ def test_it_goes_on_when_told_to():
     assert (dataset.status == int(Status.CELL_RAISED)).all()
 
 
-def test_a_few_failures_or_a_small_lattice_do_not_stop_it(tmp_path):
-    """Nor does trying the failures of an earlier run again."""
-    failing = tuple(2.0 + 0.5 * i for i in range(40))
-    half = declared("raises", at=failing, cells=80)
-    for _ in range(2):
-        dataset = run_with_failures(half, output=tmp_path)
-        assert int((dataset.status == int(Status.CELL_RAISED)).sum()) == 40
-    nine = run_with_failures(declared("raises", cells=9))
-    assert (nine.status == int(Status.CELL_RAISED)).all()
-
-
 def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monkeypatch):
     for name, value in {"FAULT": "raises", "FAULT_AT": "2.5 3.5", "COLUMNS": "500"}.items():
         monkeypatch.setenv(name, value)
@@ -245,20 +233,6 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
     assert alone.returncode == 1
     assert "in find" in alone.stderr
     assert "ZeroDivisionError: in the cell" in alone.stderr
-
-
-def test_a_cell_of_a_named_study_alone(tmp_path):
-    fewer = {"case": ["constant normal stress"], "stiffness_ratio": [1.0], "b_over_a": [2.0, 3.0]}
-    whole = run("displacement_boundary", output=tmp_path, **fewer)
-    last = whole.isel(dict.fromkeys(whole.critical_displacement.dims, -1))
-    place = {str(d): last[d].item() for d in whole.critical_displacement.dims}
-    scene, outcome = rsfstudy.cell(tmp_path / "displacement_boundary.nc", place)
-    assert scene.b_over_a == 3.0
-    assert outcome.values["critical_displacement"] == whole.critical_displacement.sel(place).item()
-    with pytest.raises(InvalidValue, match="leaves .* open"):
-        rsfstudy.cell(tmp_path / "displacement_boundary.nc", {"law": "slip"})
-    with pytest.raises(InvalidValue, match="is not on its axis"):
-        rsfstudy.cell(tmp_path / "displacement_boundary.nc", {**place, "b_over_a": 9.0})
 
 
 AWKWARD = ["1:2:3", "p,q", "true", "3", "1e3", " lead", "a='b\"", "[red]", "Größe", "x = 1, y = 2"]
@@ -314,12 +288,6 @@ def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
     assert "reduced_despite" not in whole.attrs
 
 
-def test_a_missing_cell_is_refused_all_the_same():
-    partial = lattice(failing=(99.0,))
-    partial["status"][1] = int(Status.PENDING)
-    assert np.isnan(reduced(partial, FIT, despite_failures=True).slope)
-
-
 def test_the_run_passes_it_on(tmp_path):
     """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
     study = study_of(
@@ -342,21 +310,6 @@ def test_the_run_passes_it_on(tmp_path):
         told = run_with_failures(study, output=tmp_path, despite_failures=True)
     assert np.isfinite(told.slope)
     assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
-
-
-@pytest.mark.parametrize("named", [True, False])
-def test_what_is_said_at_the_end_has_a_file(named, tmp_path, capsys):
-    """Which does not stay where nothing is said; a temporary one where results are not kept."""
-    log = tmp_path / "faulty.workers.log" if named else None
-    with worker_log.kept(log) as file:
-        assert file.exists()
-    assert not file.exists()
-    with worker_log.kept(log) as file:
-        logging.getLogger("distributed.scheduler").error("a worker died")
-        logging.getLogger("distributed.scheduler").info("and so on")
-    assert file.read_text().endswith("a worker died\n")
-    assert "died" not in capsys.readouterr().err
-    file.unlink()
 
 
 def test_workers_that_never_come(monkeypatch):

@@ -9,16 +9,14 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from running import SMALL, call, cell_key, run
+from running import call, cell_key, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
-from rsfstudy.compute import provenance
 from rsfstudy.compute.provenance import git_state
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue
@@ -101,12 +99,6 @@ def test_a_motion_is_no_results_of_a_study(tmp_path):
         rsfstudy.compare(motion, motion)
 
 
-def test_an_output_that_is_a_file_is_named(tmp_path):
-    (tmp_path / "taken").write_text("")
-    with pytest.raises(DataError, match="cannot write.*choose another --output"):
-        store.write(dataset(), tmp_path / "taken" / "trial.nc")
-
-
 class Pair(Measure):
     """A number and a curve."""
 
@@ -136,16 +128,6 @@ def test_the_journal_returns_what_it_was_given(tmp_path):
     assert (found.work[0], found.seconds[0]) == (42, 0.1)
     np.testing.assert_array_equal(found.numbers[0], [1.5, 1.0, np.nan])
     assert np.isnan(found.numbers[1]).all()
-
-
-def test_failed_cells_are_kept_as_such(tmp_path):
-    failed = (Outcome(Status.CELL_RAISED, message="ValueError: x"), float("nan"))
-    with journal(tmp_path) as kept:
-        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *failed)])
-        assert kept.ended(KEYS).tolist() == [Status.CELL_RAISED, Status.PENDING]
-        found = kept.read(KEYS)
-    assert (found.status[0], found.message[0]) == (Status.CELL_RAISED, "ValueError: x")
-    assert np.isnan(found.seconds[0])
 
 
 def test_a_damaged_journal_is_named(tmp_path):
@@ -272,11 +254,6 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
         git("checkout", "-q", place)
 
 
-def test_a_file_says_from_which_checkout_it_comes():
-    said = json.loads(run().attrs["provenance"])["git"]
-    assert said == provenance.git_state(Path(rsfstudy.__file__).parent.parent)
-
-
 # ---- from the file alone ------------------------------------------------------------------------
 
 
@@ -346,12 +323,6 @@ def test_a_rerun_does_not_take_the_place_of_what_it_is_held_against(small):
         rsfstudy.rerun(small, workers=0, output=small.parent, progress=False)
 
 
-def test_a_rerun_takes_no_place_of_other_results(small, tmp_path):
-    run(SMALL, output=tmp_path)
-    with pytest.raises(InvalidValue, match=r"holds small\.(nc|cells\.sqlite), which this would"):
-        rsfstudy.rerun(small, workers=0, output=tmp_path, progress=False)
-
-
 def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     other = xr.load_dataset(small)
     about = json.loads(other.attrs["provenance"])
@@ -365,15 +336,6 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     words = [f"--cell={name}={value}" for name, value in place.items()]
     told = call("rerun", tmp_path / "other.nc", *words)
     assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
-
-
-def test_a_rerun_that_compares_nothing_says_so(small, tmp_path):
-    empty = xr.load_dataset(small)
-    empty["status"][:] = 25
-    store.write(empty, tmp_path / "empty.nc")
-    told = call("rerun", tmp_path / "empty.nc", "--serial", "--quiet")
-    assert told.returncode == 1
-    assert "nothing to compare" in told.stdout
 
 
 def test_show_tells_what_is_in_a_file(small):

@@ -112,26 +112,6 @@ def test_overrides_change_the_measure():
     assert axis.with_(factor=5.0).shape == (1, 2)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "complaint"),
-    [
-        ({"times": 1.5}, "times = 1.5: must be a whole number"),
-        ({"times": [1.0, 1.5]}, "times = 1.5: must be a whole number"),
-        ({"times": np.inf}, "times = inf: must be finite"),
-        ({"times": True}, "times = True: must be a number, as 1 is"),
-        ({"negative": 1.0}, "must be a flag"),
-        ({"unit": 1.0}, "must be a text"),
-        ({"factor": 13.0}, r"refused by the measure scaled \(RuntimeError: no luck\)"),
-        ({"factor": [1.0, 13.0]}, r"refused by the measure scaled \(RuntimeError: no luck\)"),
-        ({"table": [1.0, 2.0]}, "'table': is neither an axis nor a field"),
-        ({"fator": 1.0}, "Did you mean 'factor'"),
-    ],
-)
-def test_what_a_measure_cannot_be_set_to_is_refused(overrides, complaint):
-    with pytest.raises(InvalidValue, match=complaint):
-        scaled().with_(**overrides)
-
-
 def test_a_field_that_decides_the_shape_is_refused():
     kind = type("Long", (Scaled,), {
         "variables": {"total": (), "row": ("place",)},
@@ -146,16 +126,6 @@ def test_a_field_that_is_named_as_a_number_is_no_axis():
     named = type("Named", (Scaled,), {"headline": "factor", "variables": {"factor": ()}})
     with pytest.raises(InvalidValue, match="'factor': is the name of something measured"):
         scaled(Axis("case", {"one": {"factor": 2.0}}), measure=named())
-
-
-def test_a_name_that_both_have_is_the_scenes():
-    @dataclass(frozen=True)
-    class Both(Scaled):
-        phi: float = 1.0
-
-    declared = scaled(Axis("phi", [50.0, 60.0]), measure=Both())
-    assert [scene.phi for scene in declared.scenes()] == [50.0, 50.0, 60.0, 60.0]
-    assert all(cell.changes == {} for cell in declared.cells())
 
 
 def computed_by(study: Study, output) -> int:

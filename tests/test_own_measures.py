@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from running import claimed, run, run_with_failures
+from running import run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
@@ -125,28 +125,6 @@ def test_a_measure_states_its_outputs_once(tmp_path):
     assert dataset.slip_per_event.attrs["long_name"] == "slip per stick-slip cycle"
 
 
-@pytest.mark.parametrize(
-    ("outputs", "complaint"),
-    [
-        ((Output("total"), Output("total")), "'total': names something else"),
-        ((Output("total", error=True), Output("total_error")), "'total_error': names something"),
-        ((Output("total", dims=("x",)),), "dimension = 'x': of 'total' has no coordinate values"),
-        (("total",), "declares what no lattice can hold"),
-        ((), "variables = {}: must name a number"),
-    ],
-    ids=named,
-)
-def test_outputs_that_make_no_lattice(outputs, complaint):
-    odd = type("Odd", (Outputs,), {"outputs": outputs, "dimensions": (), "inner_coordinates": {}})
-    with pytest.raises(InvalidValue, match=complaint):
-        study(odd())
-
-
-def test_what_is_not_measured_is_not_described():
-    with pytest.raises(InvalidValue, match="quantities = 'heat': describes nothing"):
-        run(study(own(quantities=(Quantity("heat", "", "J", "heat"),))))
-
-
 # ---- what no lattice can hold -------------------------------------------------------------------
 
 
@@ -184,13 +162,6 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
     back = rsfstudy.open("own", tmp_path)
     assert back["x"].values.tolist() == np.asarray(values).tolist()
     assert back["curve"].values.tolist() == [[3.0, 4.0]] * 2
-
-
-def test_a_claim_on_a_text_is_refused_before_any_work(monkeypatch):
-    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
-    claim = claimed(id="T1", variable="message", where={"b_over_a": 2.0})
-    with pytest.raises(InvalidValue, match="is no place of the lattice, in claim T1"):
-        run(study(Own(), claims=[claim]))
 
 
 # ---- outcomes that cannot be --------------------------------------------------------------------
@@ -237,16 +208,6 @@ def test_outcomes_that_are_none(measure, message, tmp_path):
     found = rsfstudy.open("own", tmp_path)
     assert found["status"].values.tolist() == [Status.CELL_RAISED] * 2
     assert message in found["message"].values[0]
-
-
-def test_counts_of_numpy_are_counts(tmp_path):
-    class Counting(Own):
-        def find(self, scene, accuracy, meter):
-            meter.charge("any", np.int64(5))
-            return Outcome(Status.OK, {"total": 1.0})
-
-    run(study(Counting()), output=tmp_path)
-    assert rsfstudy.open("own", tmp_path)["rhs_evaluations"].values.tolist() == [5, 5]
 
 
 def test_an_endless_message_is_cut(tmp_path):

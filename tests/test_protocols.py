@@ -10,7 +10,7 @@ import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
 from running import run, study_of
 
-from rsfstudy import Axis, Scene, Segment, Study, protocol, simulate
+from rsfstudy import Axis, Scene, Segment, protocol, simulate
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
@@ -67,27 +67,6 @@ def test_a_very_long_hold_ends_when_it_should(engine):
     assert events[-1].time == 1e10 + 40.0
     motion = simulate(scene, duration=1e10 + 40.0, engine=engine)
     assert (np.diff(motion.time) > 0.0).all()
-
-
-def test_protocols_differ_by_their_segments(tmp_path):
-    """Two of one name are told apart by what they do, wherever cells are kept."""
-
-    def study(velocity: float) -> Study:
-        loading = protocol([{"velocity": velocity, "duration": 1.0}, {"velocity": 1.0}], "own")
-        return study_of(
-            "told_apart",
-            StepResponse(peaks=2, phases=2),
-            Axis("b_over_a", [2.0]),
-            base=Scene(**STIFF, loading=loading),
-        )
-
-    peaks = [
-        float(run(study(v), output=tmp_path / str(v), rtol=1e-4).max_log10_slip_rate.item())
-        for v in (2.0, 4.0)
-    ]
-    assert peaks[1] > peaks[0]
-    with pytest.raises(Exception, match="own code|computed differently"):
-        run(study(3.0), output=tmp_path / "2.0", rtol=1e-4)
 
 
 HOLDS = [{"velocity": 0.0, "duration": 5.0}, {"velocity": 1.0, "step": 0.5}]

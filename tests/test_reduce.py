@@ -126,19 +126,6 @@ def test_failed_cells_outside_of_the_support_do_not_matter():
     assert "refused" not in result.zeta.attrs
 
 
-def test_answers_without_a_number_are_left_out_and_counted():
-    codes, values = np.zeros(5), 1.0 + 0.5 * X
-    codes[0], values[0] = Status.STABLE_FOR_ALL_STEPS, np.nan
-    result = reduced(lattice(values, codes), (FIT,))
-    assert float(result.zeta) == pytest.approx(0.5)
-    assert int(result.zeta_points) == 2
-
-
-def test_a_fit_needs_a_coordinate():
-    with pytest.raises(InvalidValue, match="must be a coordinate along one dimension"):
-        reduced(lattice(X), (ProportionalFit(name="zeta", of="critical_velocity_ratio", on="z"),))
-
-
 def test_relative_difference():
     compare = RelativeDifference(
         name="lowering", of="critical_velocity_ratio", along="case", reference="reference"
@@ -147,18 +134,6 @@ def test_relative_difference():
     np.testing.assert_allclose(result.lowering.sel(case="other"), 0.25, rtol=1e-15)
     without = reduced(lattice([2.0 * X, 1.5 * X]).isel(case=[1]), (compare,))
     assert "lowering" not in without
-
-
-def test_reductions_describe_themselves():
-    """Names and units are those of the vocabulary, whatever the variable they come from bears."""
-    described = lattice(1.0 + 0.5 * X)
-    described.critical_velocity_ratio.attrs = {"long_name": "else", "scale": "V_*", "units": "1"}
-    described.a_over_b_minus_a.attrs = {"long_name": "coordinate"}
-    result = reduced(described, (FIT,))
-    assert result.zeta.attrs["long_name"] == "slope of V_0/V_star - 1 against a/(b-a)"
-    assert "scale" not in result.zeta.attrs
-    assert result.zeta_points.attrs["long_name"].startswith("number of points fitted for slope")
-    assert result.zeta.attrs["comment"].startswith("least squares of critical_velocity_ratio = 1 +")
 
 
 def test_a_range_without_points_gives_nothing():
@@ -494,20 +469,3 @@ def test_cells_on_the_wrong_side_of_the_linear_boundary_are_counted(row, crossin
     assert int(result.edge_misplaced) == expected > 0
     assert (result.edge_crossings == crossings).all()
     assert result.edge.isnull().all() == (crossings > 1)
-
-
-def test_an_edge_beyond_the_cells_is_none():
-    result = reduced(cycling([[1] * 5, [0] * 5, AS_THE_EIGENVALUES_SAY[2]]), (EDGE,))
-    assert result.edge.isnull().values.tolist() == [True, True, False]
-    assert float(result.edge_unstable[0]) == 1.1
-    assert float(result.edge_stable[1]) == 0.6
-
-
-def test_a_failed_cell_refuses_its_edge_and_the_summaries():
-    lattice = cycling(AS_THE_EIGENVALUES_SAY)
-    lattice.status[0, 2] = int(Status.WORK_BUDGET_SPENT)
-    result = reduced(lattice, (EDGE,))
-    assert result.edge.isnull().values.tolist() == [True, False, False]
-    assert np.isnan(result.edge_farthest)
-    assert np.isnan(result.edge_misplaced)
-    assert "failed or are missing" in result.edge.attrs["refused"]

@@ -209,14 +209,6 @@ def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
     goes_on(tmp_path, CELLS)
 
 
-def test_what_a_killed_write_left_is_no_result(tmp_path):
-    """It is not taken for one, and goes with the next."""
-    run(declared(cells=CELLS), output=tmp_path)
-    (tmp_path / ".faulty.nc.new").write_bytes(b"what a killed run left")
-    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
-    goes_on(tmp_path, CELLS)
-
-
 def test_fresh_leaves_no_half_transaction_behind(tmp_path):
     """SQLite would roll the old file's journal back into the new file."""
     (tmp_path / "faulty.cells.sqlite").write_bytes(b"")

@@ -38,16 +38,6 @@ def test_equal_scenes_are_computed_once():
     assert dataset.sel(case="variable").critical_velocity_ratio.diff("phi").item() != 0.0
 
 
-def test_a_plain_axis_bears_its_values_even_where_some_cells_have_no_use_for_them():
-    dataset = run(SMALL.with_(phi=[55.0, 60.0], b_over_a=[2.0]))
-    assert dataset.phi.values.tolist() == [55.0, 60.0]
-
-
-def test_values_that_do_not_apply_are_nan_coordinates():
-    assert np.isnan(run().alpha.sel(case="constant"))
-    assert run().alpha.sel(case="variable").item() == 0.56
-
-
 @dataclass(frozen=True)
 class Profile(Measure):
     """A measure with an inner dimension."""

@@ -12,7 +12,7 @@ from running import SMALL, run, same_numbers
 from scale import apart
 
 import rsfstudy
-from rsfstudy import Axis, Study, plots
+from rsfstudy import plots
 from rsfstudy.compute import plan
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import pieces
@@ -74,12 +74,6 @@ def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
     assert batches.size() == 1
     batches.learn(seconds)
     assert batches.size() == size
-
-
-def test_every_worker_has_several_batches_of_a_small_study():
-    batches = plan.Batches(None, np.arange(40), workers=2)
-    batches.learn(1e-6)
-    assert batches.size() == 5
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
@@ -149,15 +143,6 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
     same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), in_memory())
 
 
-def test_a_chunk_that_is_damaged_is_told(tmp_path):
-    run(SMALL, output=tmp_path, format="zarr")
-    chunk = tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0"
-    whole = chunk.read_bytes()
-    chunk.write_bytes(whole[:8] + b"\xff" * 8 + whole[16:])
-    with pytest.raises(DataError, match=r"small\.zarr (cannot be read|is damaged)"):
-        rsfstudy.open(tmp_path / "small.zarr")
-
-
 @pytest.mark.parametrize("codec", ["numcodecs.pickle", "gzip"])
 def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
     """It may run code of its own."""
@@ -195,11 +180,3 @@ def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(pieces.importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(InvalidValue, match=r"pip install 'rsfstudy\[zarr\]'"):
         run(SMALL, output=tmp_path, format="zarr")
-
-
-def test_large_axes_are_checked_in_no_time():
-    """A hundred thousand values: by their hashes, not each against each."""
-    axis = Axis("b_over_a", np.linspace(1.5, 3.0, 100_000))
-    assert len(axis) == 100_000
-    study = Study(name="n", title="t", base=Scene(), axes=[axis], measure=SMALL.measure)
-    assert study.scene(99_999).b_over_a == 3.0

@@ -233,31 +233,6 @@ def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, 
             again()
 
 
-@pytest.mark.parametrize("name", ["problem", "cycles"])
-def test_a_measure_that_is_no_measure_of_ours(name, tiny, tmp_path):
-    """Though a module beside the measures bears its name."""
-    other = with_other_attributes(tiny, ("", "declaration", "measure", "name"), replaced(name))
-    with pytest.raises(InvalidValue, match=f"measure = '{name}': is not part of rsfstudy"):
-        rsfstudy.rerun(sealed(other, tmp_path / "tiny.nc"), workers=0, progress=False)
-
-
-def test_objects_are_no_texts(tiny):
-    """As a notebook may make them; no file holds such."""
-    other = tiny.copy(deep=True)
-    other["message"][0, 0] = None
-    with pytest.raises(DataError, match="message holds objects, and must hold texts"):
-        contents.check(other)
-
-
-def test_a_claim_does_not_apply_where_numbers_have_become_times(tiny):
-    """In memory, where a notebook may have made anything of a dataset."""
-    assert rsfstudy.check(tiny).verdict.tolist() == ["reproduced"]
-    for name in ("critical_stiffness", "load_velocity_ratio", "case"):
-        for how in ("dates", "spans of time"):
-            other = with_another_variable(tiny, name, how)
-            assert rsfstudy.check(other).verdict.tolist() == ["not applicable"]
-
-
 def test_a_variable_without_a_name_is_shown(tiny, tmp_path):
     mine = tiny.copy(deep=True)
     mine["log"] = np.log(mine["critical_stiffness"]).drop_attrs()
@@ -327,28 +302,7 @@ def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
     assert (code, "wrote" in said) == (0, True)
 
 
-def test_what_may_not_be_read_is_told(tiny, tmp_path, monkeypatch):
-    file = sealed(tiny, tmp_path / "tiny.nc")
-
-    def forbidden(*_args, **_options):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "exists", forbidden)
-    with pytest.raises(DataError, match=r"tiny.nc cannot be read: .*Permission denied"):
-        rsfstudy.open(file)
-    for use in (lambda: run(output=tmp_path), lambda: rsfstudy.open("tiny", tmp_path)):
-        with pytest.raises(InvalidValue, match="output = .*: cannot be used .Permission denied"):
-            use()
-
-
 # ---- options ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("output", ["a\0b", "\udcff", "a" * 10_000, "a/" * 5000])
-def test_an_output_that_can_be_no_directory(output):
-    with pytest.raises(InvalidValue, match="output = ") as refused:
-        run(output=output)
-    assert len(str(refused.value)) < 500
 
 
 @pytest.mark.parametrize(("cores", "most"), [(1, 8), (2, 8), (3, 12), (64, 256), (None, 8)])

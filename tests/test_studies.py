@@ -12,13 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from compliance_checker.cf import util as cfutil
 from compliance_checker.runner import CheckSuite, ComplianceChecker
 from running import enough, named_results
 
 import rsfstudy
-from rsfstudy import plots, vocabulary
+from rsfstudy import plots
 from rsfstudy.declare import catalogue, names
 from rsfstudy.status import Status
 
@@ -231,15 +230,6 @@ def test_the_plain_plot_draws_any_lattice(result):
     assert figure.axes[0].has_data()
 
 
-def test_vocabulary_describes_itself():
-    for name, quantity in vocabulary.QUANTITIES.items():
-        assert quantity.name == name
-        assert quantity.long_name
-    error = vocabulary.quantity("critical_displacement_error")
-    assert error.long_name.startswith("numerical error estimate of critical load point")
-    assert error.scale == "D_c"
-
-
 def test_the_plain_lattice_agrees_with_the_critical_steps_within_its_bracket(tmp_path_factory):
     """Cells followed forward in time against critical paths followed back, for every row."""
     cells, _path = named_results("rate_step_lattice", tmp_path_factory)
@@ -272,11 +262,3 @@ def test_amplitudes_at_which_linear_theory_fails_are_within_their_errors(tmp_pat
         place = place.sel(oscillation_period=period * resonant, method="nearest")
         off = abs(float(place.failing_amplitude) - root)
         assert off <= float(place.failing_amplitude_error) < 0.3 * root
-
-
-def test_the_fits_of_stress_drop_leave_out_cells_without_stick_slip(tmp_path_factory):
-    """And count what they have."""
-    dataset, _path = named_results("stress_drop", tmp_path_factory)
-    cycling = (dataset.status == int(Status.OK)).sum("load_velocity_ratio")
-    assert 1 < int(cycling.min()) < dataset.sizes["load_velocity_ratio"]
-    xr.testing.assert_equal(dataset.static_slope_points.drop_attrs(), cycling.drop_attrs())

@@ -55,13 +55,6 @@ def test_override_of_an_axis_replaces_its_values():
     assert study(Axis("b_over_a", [2.0, 3.0])).with_(b_over_a=7).shape == (1,)
 
 
-def test_override_of_a_fixed_value():
-    assert {
-        s.stiffness_ratio
-        for s in study(Axis("b_over_a", [2.0])).with_(stiffness_ratio=1.5).scenes()
-    } == {1.5}
-
-
 def test_a_list_for_a_fixed_value_makes_an_axis():
     changed = study(Axis("b_over_a", [2.0, 3.0])).with_(phi=[50, 60, 70])
     assert changed.dimensions == ("phi", "b_over_a")

@@ -34,43 +34,6 @@ def written(tmp_path, text: str) -> str:
     return str(path)
 
 
-CLAIM = """
-from rsfstudy.declare.claims import Claim
-
-study = dataclasses.replace(study, claims=[Claim(
-    id="M1", statement="", source="", published=1.0, tolerance=0.1, reason="", {}
-)])
-"""
-
-
-@pytest.mark.parametrize(
-    ("names", "complaint"),
-    [
-        (
-            'variable="critcal_displacement", where={"phi": 55.0}',
-            "'critcal_displacement': is no variable.*M1",
-        ),
-        (
-            'variable="critical_displacement", where={"ph": 55.0}',
-            "'ph': is no coordinate.*M1.*'phi'",
-        ),
-        (
-            'variable="critical_displacement", where={"phi": 55.0}, minus={"b": 1.0}',
-            "'b': is no coordinate.*M1",
-        ),
-        ('variable="critical_displacement", where={"phi": 50.0}', "'phi': 50.0.*no place.*M1"),
-    ],
-)
-def test_a_claim_on_what_is_not_there_is_told_before_anything_is_computed(
-    names, complaint, tmp_path
-):
-    """It would never apply, and so never be checked."""
-    file = written(tmp_path, "import dataclasses" + DECLARATION + CLAIM.replace("{}", names))
-    with pytest.raises(InvalidValue, match=complaint):
-        rsfstudy.run(file, output=tmp_path / "results")
-    assert not (tmp_path / "results").exists()
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -96,17 +59,6 @@ def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp
     taken = DECLARATION.replace('"mine"', '"stress_drop"')
     with pytest.raises(InvalidValue, match="the name of a named study"):
         catalogue.load(written(tmp_path, taken))
-
-
-def test_a_reduction_that_does_not_fit_is_told_before_anything_is_computed(tmp_path):
-    unfit = DECLARATION.replace(
-        "measure=",
-        'reductions=[LinearFit(name="s", of="critical_displacement", on="log_load")], measure=',
-    )
-    unfit = "from rsfstudy.reduce import LinearFit\n" + unfit
-    with pytest.raises(InvalidValue, match="must be a coordinate along one dimension"):
-        rsfstudy.run(written(tmp_path, unfit), output=tmp_path, progress=False)
-    assert not list(tmp_path.glob("*.sqlite"))
 
 
 @dataclass(frozen=True)
