@@ -1,9 +1,9 @@
-"""``PYTHONPATH=tests python tests/benchmarks/referee_answers.py [NUMBER ...]`` writes the answers
-of the referee, with the digits that two ways agree on (a quarter of an hour for all).
+"""``python tests/benchmarks/referee_answers.py [NUMBER ...]`` writes the answers of the referee,
+with the digits that two ways agree on (a quarter of an hour for all).
 
 The first way, here, solves the equations as the problems state them, in SI units: spring stress,
 theta in s and slip, slip rate by the friction law (or the root of it and damping), with 30 digits
-(mpmath), of order 20. The second is that of `tests/test_referee.py`.
+(mpmath), of order 20. The second is `referee_ways.py`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """Answers to the problems of the referee by a way that shares neither equations nor arithmetic with
-that by which they are written (`benchmarks/referee_answers.py`), and nothing of the package.
+that by which they are written (`referee_answers.py`), and nothing of the package.
 
 It differentiates friction: ln(V/V_*), logarithms of theta, stress deviation and slip,
 dimensionless, in double precision, by extrapolated modified midpoint steps (Gragg, Bulirsch and

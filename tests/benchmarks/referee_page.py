@@ -1,4 +1,4 @@
-"""``python tests/referee_page.py`` writes what the page of the referee says of each problem."""
+"""``python tests/benchmarks/referee_page.py`` writes what the page says of each problem."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 from referee_ways import PROBLEMS, stated
 
-PAGE = Path(__file__).parent.parent / "studies" / "pages" / "referee.md"
-MARK = "<!-- problems: written by tests/referee_page.py -->\n"
+PAGE = Path(__file__).parents[2] / "studies" / "pages" / "referee.md"
+MARK = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"
 
 
 def part(number: int, problem: dict[str, Any]) -> str:
