@@ -39,14 +39,6 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
     assert begin.coefficient == pytest.approx(friction, abs=1e-12)
 
 
-def test_stress_is_what_a_displacement_step_of_it_leaves():
-    """Where stress takes nothing from the state, which is that of steady sliding after both."""
-    scene = Scene(normal_stress="constant", load_velocity_ratio=2.0, stiffness_ratio=1.5)
-    stated = scene.with_(initial_stress=scene.stiffness * 0.7)
-    stepped = scene.with_(displacement_step=0.7)
-    assert starting(stated) == starting(stepped)
-
-
 def test_steps_come_on_top():
     """With mass, slip rate at the instant of a step is that of the stated stress and state."""
     scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)

@@ -3,30 +3,24 @@ formulation.
 """
 
 import dataclasses
-import itertools
 import math
 
 import numpy as np
 import pytest
-from conftest import EACH_STEP, follow
+from conftest import follow
 from hypothesis import given
 from hypothesis import strategies as st
-from in_time import InTime
-from scipy.integrate import solve_ivp
 
 from rsfstudy import Scene
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.equations import (
     Equations,
     between_ruptures,
     by_displacement,
-    by_inertial_time,
 )
 from rsfstudy.slider.places import LAW
 from rsfstudy.slider.point import Point
@@ -128,55 +122,6 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
     assert 4.0 < errors[2e-3] / errors[1e-3] < 16.0
 
 
-def peaks(displacement, accuracy):
-    """A peak on the slow manifold, its weight of mass, and (f, ln V) where the full equations peak,
-    integrated implicitly from where mass is 1e-6 of that.
-    """
-    scene = Scene(
-        law="slowness", stiffness_ratio=0.95, load_velocity_ratio=1.5, inertia=True,
-        displacement_step=displacement,
-    )  # fmt: skip
-    full, meter, begin = by_inertial_time(scene), Meter(10**6), None
-    for event in course.follow(scene, accuracy, meter, [maximum("log_slip_rate"), EACH_STEP]):
-        if event.kind is Kind.MAXIMUM:
-            break
-        begin = event.point if begin is None and event.point.log_slip_rate > 10.0 else begin
-    assert set(meter.by_regime) == {"slow_manifold"}
-    top = event.point
-    stops = [lambda _t, y: full.rates(tuple(y))[1]]
-    stops[0].terminal, stops[0].direction = True, -1.0
-    theirs = solve_ivp(
-        lambda _t, y: full.rates(tuple(y)),
-        (0.0, 1e9),
-        [begin.spring_stress, begin.log_slip_rate, begin.friction],
-        method="Radau",
-        rtol=1e-12,
-        atol=1e-14,
-        events=stops,
-    )
-    norm = scene.inertial_time * math.exp(top.log_slip_rate)
-    return top, scene.stiffness / scene.a * norm**2, theirs.y_events[0][0][:2]
-
-
-def test_slip_is_fastest_where_the_full_equations_say():
-    """Without the growth of what mass takes, spring stress there would be off by 8.7e-6."""
-    top, _weight, (spring_stress, log_slip_rate) = peaks(2.0, Accuracy(1e-8))
-    assert top.log_slip_rate == pytest.approx(log_slip_rate, abs=2e-8)
-    assert top.spring_stress == pytest.approx(spring_stress, abs=1e-9)
-
-
-@pytest.mark.parametrize("displacement", [2.05, 2.08])
-def test_error_where_slip_peaks_goes_with_the_third_power_of_the_weight(displacement):
-    """What `Accuracy.switch_weight` rests on, at weights of 0.004 and 0.016."""
-
-    class Never(Accuracy):
-        switch_weight = property(lambda _self: 1.0)
-        switch_correction = property(lambda _self: math.inf)
-
-    top, weight, (_spring, log_slip_rate) = peaks(displacement, Never(1e-10))
-    assert top.log_slip_rate - log_slip_rate == pytest.approx(-1.55 * weight**3, rel=0.05)
-
-
 @pytest.mark.parametrize(
     "fields",
     [
@@ -223,45 +168,6 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
     along = between_ruptures(scene, clock=False).rates(state)
     for ours, theirs in zip(along, by.rates(state), strict=True):
         assert ours * math.sqrt(1.0 + (growth / 6.0) ** 2) == pytest.approx(theirs, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-@pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
-def test_a_rupture_is_that_of_inertial_time(law, effects):
-    """Through its arrest, by the equations of `in_time`, at a mass that a clock of slow slip cannot
-    follow.
-    """
-    scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True, **effects)
-    inside = []
-
-    def until(event):
-        inside.extend([event.point] if event.regime == "inertial" else [])
-        return len(inside) > 3
-
-    follow(scene, 1e-9, until)
-    # begun anew, at the end of a step, for a time that is no difference of large ones
-    again = course.follow(
-        scene, Accuracy(1e-9), Meter(10**6), [EACH_STEP], start=inside[3], clock=True
-    )
-    stretch = list(itertools.takewhile(lambda event: event.regime == "inertial", again))
-    first, last = stretch[0].point, stretch[-1].point
-    theirs, eps = InTime(scene), scene.inertial_time
-    ran = solve_ivp(
-        lambda _tau, y: eps * np.array(theirs.both(0.0, y, 0.0)[0]),
-        (0.0, stretch[-1].time / eps),
-        [first.spring_stress, first.state, first.log_slip_rate],
-        method="Radau",
-        rtol=1e-10,
-        atol=1e-13,
-    )
-    end = theirs.both(0.0, ran.y[:, -1], 0.0)[1]
-    # Radau at 1e-10 over a thousand steps; ln V at arrest falls so fast that a time off by 1e-8
-    # shows
-    assert ran.success
-    assert end.f == pytest.approx(last.spring_stress, abs=3e-9)
-    assert end.x == pytest.approx(last.log_slip_rate, abs=1e-8 * stretch[-1].time * abs(end.growth))
-    psi = end.theta + theirs.alpha * math.log(end.s)
-    assert psi == pytest.approx(last.psi, abs=1e-6 * scene.a)
 
 
 def test_inertia_is_integrated_only_where_it_acts():

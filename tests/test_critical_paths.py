@@ -6,7 +6,6 @@ import pytest
 from conftest import cot_phi, reaches_the_norm
 
 from rsfstudy import Scene
-from rsfstudy.analysis import search_of_steps
 from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.kinds_of_steps import RateSteps
 from rsfstudy.measures.critical_step import CriticalStep
@@ -61,23 +60,6 @@ def test_where_orbits_grow_the_second_peak_decides(damping):
         assert peaks[0][0] is Kind.MAXIMUM
         assert any(kind is Kind.RISE for kind, _rate in peaks) is reaches
         assert reaches or peaks[3][1] < peaks[2][1] < peaks[1][1]
-
-
-def test_the_slope_of_the_misfit_is_that_of_paths():
-    """Where they end, beyond the root, there is a mere verdict, which has no slope."""
-    found = {}
-
-    def misfit(log_size: float) -> float:
-        if log_size > 0.7501:
-            return -1.0
-        found[log_size] = 2.0 * (0.75 - log_size)
-        return found[log_size]
-
-    root, slope = search_of_steps._root(misfit, found, 0.5, 1.0)
-    assert root == pytest.approx(0.75, abs=2e-4)
-    assert slope == pytest.approx(-2.0, rel=1e-9)
-    found.clear()
-    assert search_of_steps._root(lambda size: 1.0 if size < 0.7 else -1.0, found, 0.5, 1.0) is None
 
 
 def test_a_fall_of_normal_stress_leaves_sigma_3_positive():

@@ -19,12 +19,11 @@ from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.engines import SCIPY
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.regimes import error_of_slow_manifold, on_slow_manifold
+from rsfstudy.motion.regimes import error_of_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
-from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT = "load_velocity_ratio", "displacement_step"
@@ -159,19 +158,6 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
         allowed = loose.values[f"{name}_error"] + tight.values[f"{name}_error"]
         assert abs(value - exact) <= allowed
         assert loose.values[f"{name}_stable"] < value < loose.values[f"{name}_unstable"]
-
-
-def test_a_large_step_that_motions_find_is_as_accurate_as_asked_for():
-    """They find its logarithm, whose error is four times as large in the ratio of velocities."""
-    scene = Scene(
-        law="slowness", b_over_a=1.21, stiffness_ratio=0.97, radiation_damping=1e-6, alpha=0.4,
-        phi=55.0,
-    )  # fmt: skip
-    exact, its_error, _outcome = found(scene, rtol=1e-6)
-    value, error, _outcome = found(scene, rtol=1e-4)
-    assert exact > 57.0
-    assert error < 1e-4 * (value - 1.0)
-    assert abs(value - exact) <= error + its_error
 
 
 # ---- a second formulation
@@ -356,18 +342,6 @@ def test_a_spent_budget_is_a_failure_with_a_name():
     assert 300 < outcome.rhs_evaluations < 400
 
 
-def test_downward_steps_can_trigger_too():
-    """Slowing the load point weakens stability (k_cr grows as V falls): a large enough drop of V_0
-    triggers.
-    """
-    scene = Scene(stiffness_ratio=1.1)
-    value, error, outcome = found(scene, direction="down", rtol=1e-5, engine=COMPILED)
-    assert 0.0 < value < 1.0
-    assert outcome.values["critical_velocity_ratio_unstable"] < value
-    tight = found(scene, direction="down", rtol=1e-6, engine=COMPILED)[0]
-    assert abs(value - tight) <= error + 1e-6
-
-
 def test_public_call_returns_a_small_dataset():
     """The value the scene holds for the quantity sought is ignored; the rest of the scene is
     not.
@@ -395,21 +369,6 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     point = system.at(start)
     assert point.log_slip_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
-
-
-@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
-@pytest.mark.parametrize("law", ["slip", "slowness"])
-def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_stress):
-    """The engine that compiles compiles what the search evaluates; sums may be rounded together
-    there, which the state, a difference of numbers below ten, shows.
-    """
-    for load in (1e-3, 1.5, 40.0):
-        scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
-        plain, compiled = (CriticalPath.of(scene, engine).tangency for engine in (SCIPY, COMPILED))
-        assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
-        at = [on_slow_manifold(scene, 0.01, (-0.02,), engine) for engine in (SCIPY, COMPILED)]
-        assert all(isinstance(point, Point) for point in at)
-        assert np.hstack(at[1]) == pytest.approx(np.hstack(at[0]), rel=1e-11, abs=1e-14)
 
 
 def test_a_root_is_that_of_the_same_method_elsewhere():

@@ -4,18 +4,14 @@ round, and against the same scene in other words.
 
 import math
 
-import numpy as np
 import pytest
 from in_time import InTime
 from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
-from rsfstudy.analysis.approach import Approach
-from rsfstudy.analysis.return_map import ReturnMap, section
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import Meter
 from rsfstudy.status import Status
 
 HEADLINES = [output.name for output in LimitCycle().outputs if output.error]
@@ -116,24 +112,6 @@ def test_the_cycle_of_one_event_is_that_of_the_limit_cycle():
         )
     assert found[0]["floquet_multiplier"] == pytest.approx(0.0977767, abs=1e-6)
     assert found[1]["floquet_multiplier"] == pytest.approx(0.0977767, abs=2e-6)
-
-
-@pytest.mark.parametrize("words", ["one", "two", "dilatant"])
-def test_cycles_close_in_every_unknown(words):
-    """Where V passes V_0, mass takes 1.3e-5 of the spring stress here."""
-    scene = in_words("slowness")[words]
-    by = ReturnMap(scene, Accuracy(1e-7, engine=COMPILED), Meter(500_000, engine=COMPILED))
-    approach = Approach(in_words("slowness")["one"], by.accuracy, Meter(500_000, engine=COMPILED))
-    approach.follow(300)
-    begin = approach.orbit.begin
-    parts = {"two": (1.5 / 2.6, 1.1 / 2.6)}.get(words, (1.0,))
-    begin = np.array([begin[0], *(part * begin[1] for part in parts)])
-    if words == "dilatant":
-        begin = np.append(begin, (0.0, 0.0))
-    (cycle,) = by.events(begin, 1)
-    assert cycle.begin.log_slip_rate == cycle.end.log_slip_rate == scene.log_load_rate
-    assert section(cycle.end) == pytest.approx(section(cycle.begin), abs=1e-6 * scene.a)
-    assert cycle.begin.spring_stress - cycle.begin.friction > 1e-5
 
 
 def test_what_is_known_far_worse_than_asked_is_not_ok(monkeypatch):

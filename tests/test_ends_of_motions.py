@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import rsfstudy
-from rsfstudy import Scene, protocol
+from rsfstudy import Scene
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.errors import Incomplete, NoAnswer
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, SCIPY
@@ -105,18 +103,3 @@ def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
     # stress falls and strength rises with x, where normal stress is left
     expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
     assert starting(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)
-
-
-def test_formulas_speak_of_no_other_normal_stress():
-    """The published critical stiffness is that of sigma_*."""
-    scene = Scene(normal_stress="imposed", load_velocity_ratio=1.0)
-    for step in (0.0, 0.5):
-        found = LinearStability()(scene.with_(normal_stress_step=step), Accuracy(1e-4)).values
-        explicit = found["critical_stiffness_explicit"]
-        assert math.isnan(explicit) is (step != 0.0)
-
-
-def test_one_segment_lasts_as_stated():
-    kind = protocol([{"velocity": 2.0, "duration": 4.2}])
-    motion = rsfstudy.simulate(Scene(loading=kind, stiffness_ratio=2.0))
-    assert np.isclose(float(motion.time[-1]), 4.2, rtol=1e-12)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from conftest import cot_phi
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
@@ -26,7 +25,6 @@ from rsfstudy.motion.regimes import check_start
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
     between_ruptures,
-    by_inertial_time,
     rigid,
 )
 from rsfstudy.slider.fluid import Fluid
@@ -83,29 +81,6 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
 # ---- the relation and the equations --------------------------------------------------------------
 
 
-@given(st.floats(-0.2, 0.2), st.floats(-0.3, 0.5), st.floats(55.0, 85.0), st.floats(0.1, 0.9))
-def test_friction_knows_effective_normal_stress_alone(g, pressure, phi, alpha):
-    """tau/(sigma - p) - mu_* + alpha ln(sigma - p), and its derivatives by g and by p."""
-    scene = dilatant(phi=phi, alpha=alpha)
-    relation, p = scene.functions.friction.strength, scene.numbers
-
-    def exact(at: float, under: float) -> float:
-        ratio = 1.0 + cot_phi(scene) * at - under
-        return (0.76 + at) / ratio - 0.76 + alpha * math.log(ratio)
-
-    value, slope, shift, shift_slope = relation(g, (0.0, 0.0, pressure), p)
-    gained, shifted = scene.functions.friction.by_pressure(g, (0.0, 0.0, pressure), p)
-    ratio = 1.0 + cot_phi(scene) * g - pressure
-    assert value == pytest.approx(exact(g, pressure), abs=1e-14)
-    assert shift == pytest.approx(alpha * math.log(ratio), abs=1e-15)
-    assert shift_slope == pytest.approx(alpha * cot_phi(scene) / ratio, rel=1e-13)
-    assert shifted == pytest.approx(-alpha / ratio, rel=1e-13)
-    step = 1e-5  # a central difference has step**2 of the third derivative, below 200
-    by_stress = (exact(g + step, pressure) - exact(g - step, pressure)) / (2.0 * step)
-    by_pressure = (exact(g, pressure + step) - exact(g, pressure - step)) / (2.0 * step)
-    assert (slope, gained) == pytest.approx((by_stress, by_pressure), rel=1e-7, abs=1e-7)
-
-
 @pytest.mark.parametrize("rate", [0.1, 20.0])
 @pytest.mark.parametrize("drainage", [1e-9, 0.5, 30.0])
 def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
@@ -133,22 +108,6 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
         assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
         point = equations.at((friction, porosity, pressure))
         assert point.coefficient == pytest.approx(coefficient, abs=1e-10)
-
-
-@pytest.mark.parametrize("stress", STRESS)
-def test_the_state_of_the_law_evolves_by_the_law_where_mass_acts(stress):
-    """It is no unknown there: what friction leaves of strength is its evolution."""
-    scene = dilatant(0.02, law="slowness", inertia=True, period=1e7, **stress)
-    equations, evolutions = by_inertial_time(scene), scene.functions.friction.evolutions
-    state = np.array((0.015, 1.0, 0.01, -0.01, 0.03))
-    rates, step = np.array(equations.rates(tuple(state))), 1e-6
-    ahead, behind = (equations.at(tuple(state + s * rates)) for s in (step, -step))
-    here = equations.at(tuple(state))
-    shift = here.psi - here.state
-    share = scene.inertial_time * math.exp(1.0)
-    by_law = evolutions(1.0, here.psis, shift, share, scene.numbers)
-    differences = (np.array(ahead.psis) - np.array(behind.psis)) / (2.0 * step)
-    assert differences == pytest.approx(np.array(by_law), rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import pytest
 from conftest import reaches_the_norm
 
 from rsfstudy import Scene, simulate
-from rsfstudy.analysis import held
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
@@ -129,22 +128,6 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
     last = points[-1]
     if drainage > 10.0:
         assert bound(last.log_slip_rate, last.psis[1:]) == pytest.approx(last.psis[-1], rel=0.05)
-
-
-def test_states_that_weaken_as_slip_rate_falls_prove_nothing():
-    """With b < 0 a state rests lower at lower slip rate; with two positive ones all is over as soon
-    as both strengthen.
-    """
-    ends = {}
-    for second in (0.8, -0.8):
-        scene = Scene(law="two_slip_states", **CONSTANT, b1_over_a=2.8, b2_over_a=second,
-                      length_ratio=0.15, stiffness_ratio=1.5, displacement_step=0.05,
-                      load_velocity_ratio=0.0)  # fmt: skip
-        watches = tuple(fall("log_slip_rate", x, ends=x == -20.0) for x in (-5.0, -20.0))
-        meter = Meter(20_000, engine=COMPILED)
-        events = list(follow(scene, Accuracy(1e-6, engine=COMPILED), meter, watches))
-        ends[second] = [held._stays_below_norm(scene, event.point) for event in events[1:]]
-    assert ends == {0.8: [True, True], -0.8: [False, False]}
 
 
 @pytest.mark.parametrize("stiffness_ratio", [1e3, 1e6])

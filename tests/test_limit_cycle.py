@@ -268,23 +268,6 @@ def test_a_slow_peak_is_slow_by_the_norm_where_nothing_radiates():
         assert float(again.slip_mode) == mode
 
 
-def test_a_cycle_that_does_not_repeat_loosely_is_followed_as_asked():
-    """Looked for at 1e-4, cycles of this scene scatter by more than that would allow, and none
-    repeats; at 1e-7 they do. The interval is that of a cycle known to 1e-9, within its error.
-    """
-    scene = Scene(
-        law="slip", normal_stress="constant", inertia=True, stiffness=0.0061621392251526965,
-        a=0.009975485653594105, b_over_a=2.9636256702801482,
-    )  # fmt: skip
-    found, fine = (
-        LimitCycle(phases=2)(scene, Accuracy(rtol, engine="compiled")) for rtol in (1e-7, 1e-9)
-    )
-    assert found.status is fine.status is Status.OK, found.message
-    interval = found.values["recurrence_interval"]
-    error = found.values["recurrence_interval_error"] + fine.values["recurrence_interval_error"]
-    assert abs(interval - fine.values["recurrence_interval"]) <= error <= 1e-4
-
-
 def test_cycles_that_go_to_and_fro_by_numerical_errors_repeat():
     """As nearly as a loose tolerance lets them, after a few events, which might else be hundreds;
     their numbers are as accurate as they say, within the hundred tolerances that are held ok.

@@ -51,30 +51,6 @@ def told(of: Scene, *watches, until: float, rtol: float = 1e-7) -> list:
 
 
 @pytest.mark.parametrize(
-    "fields", [{"stiffness_ratio": 1.5}, {"stiffness_ratio": 0.5, "inertia": True}]
-)
-@pytest.mark.parametrize("cut", [0.3, 11.0, 11.019738, 30.0])
-def test_a_cut_changes_nothing(fields, cut):
-    """The same load in two segments is the same motion, be the cut in a rupture or not."""
-    one = Scene(
-        law="slowness",
-        normal_stress="constant",
-        load_velocity_ratio=1.0,
-        displacement_step=0.1,
-        **fields,
-    )
-    two = scene((1.0, 0.1, cut), **fields)
-    watches = (maximum("log_slip_rate"), fall("log_slip_rate", 0.0), rise("log_slip_rate", 0.0))
-    whole = [e for e in told(one, *watches, until=40.0) if e.watch is not None]
-    parts = [e for e in told(two, *watches, until=40.0) if e.watch is not None]
-    assert [e.watch for e in parts] == [e.watch for e in whole]
-    for event, again in zip(whole, parts, strict=True):
-        assert again.time == pytest.approx(event.time, rel=2e-6)
-        assert again.slip == pytest.approx(event.slip, rel=2e-6)
-        assert again.point.spring_stress == pytest.approx(event.point.spring_stress, abs=2e-6)
-
-
-@pytest.mark.parametrize(
     "first", [(0.0, 0.0, 1e4), (1.0, 0.1, 120.0), (3.0, 0.0, 60.0), (1e-6, 0.0, 1e4)]
 )
 def test_the_limit_cycle_is_that_of_the_last_segment(first):

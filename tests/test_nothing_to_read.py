@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
-from test_readings import PLAIN, read, recorded
+from test_readings import PLAIN
 
 from rsfstudy import Scene, measures, named_studies, protocol, simulate, vocabulary
 from rsfstudy.analysis.fitting.record import Record
@@ -113,22 +113,6 @@ def test_no_number_of_a_step_that_is_ok_is_missing():
             if outcome.status is Status.OK:
                 assert np.isfinite(np.concatenate([np.ravel(v) for v in found.values()])).all()
     assert set(ended) >= {Status.OK, Status.NOT_APPLICABLE}
-
-
-def test_evolution_in_the_direction_of_the_direct_effect_has_its_slip_distance():
-    """With a second state that strengthens, over a larger distance."""
-    scene = Scene(
-        law="two_slowness_states", normal_stress="constant", a=0.003, b1_over_a=1.275,
-        b2_over_a=-0.79, length_ratio=8.0, stiffness_ratio=5.0, load_velocity_ratio=0.5,
-    )  # fmt: skip
-    found = read(VelocityStep(phases=2), scene, 1e-8, engine=COMPILED)
-    friction, _highest, _lowest = recorded(scene, 0.0, 40.0)
-    trough = min(t for t in friction.derivative().roots(extrapolate=False) if t > 0.0)
-    assert found["apparent_b"] < 0.0
-    assert found["peak_friction"] == pytest.approx(float(friction(trough)), abs=1e-9)
-    level = friction(40.0) + (friction(trough) - friction(40.0)) / math.e
-    left = min(t for t in friction.solve(level, extrapolate=False) if t > trough)
-    assert found["apparent_slip_distance"] == pytest.approx(0.5 * (left - trough), rel=2e-4)
 
 
 NOTHING = Record({name: np.arange(3.0) for name in ("time", "displacement", "friction")})

@@ -44,21 +44,6 @@ def test_the_amplitude_does_not_drift(rtol):
     assert off[1] < 3.0 * off[0] + 1e-12
 
 
-def test_it_fades_in():
-    """The motion of a small one tends to that without any, in proportion."""
-    still = Scene(**CASES["imposed"], stiffness_ratio=2.0, load_velocity_ratio=2.0)
-    small = still.with_(oscillation_amplitude=1e-7, oscillation_period=8.0)
-    at = [_end(which) for which in (still, small, small.with_(oscillation_amplitude=2e-7))]
-    springs = np.array([event.point.spring_stress for event in at])
-    assert 0.0 < abs(springs[1] - springs[0]) < 1e-6
-    assert springs[2] - springs[0] == pytest.approx(2.0 * (springs[1] - springs[0]), rel=1e-3)
-
-
-def _end(scene: Scene):
-    *_earlier, end = follow(scene, Accuracy(1e-10), Meter(10**6), until=11.0)
-    return end
-
-
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_it_never_settles(slider):
     scene, watches = Scene(**SLIDERS[slider], **OSCILLATES), [settling(0.9, ends=True)]

@@ -34,18 +34,6 @@ def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
     assert of_law.status is Status.UNVERIFIED
 
 
-def test_the_faster_a_state_falls_above_steady_sliding_the_smaller_the_critical_step():
-    """Per slip as -b sinh z, -b z and -b (1 - exp(-z)), z = Theta/b + ln V: in this order."""
-    prz, slip, slowness = (
-        CriticalStep()(Scene(law=law, stiffness_ratio=1.1), Accuracy(1e-5)).values[
-            "critical_velocity_ratio"
-        ]
-        for law in ("perrin_rice_zheng", "slip", "slowness")
-    )
-    assert prz < slip
-    assert math.isnan(slowness) or slip < slowness
-
-
 def test_a_part_owns_its_fields():
     """Each is described once, by the part."""
     described = {quantity.name for quantity in registry.QUANTITIES}

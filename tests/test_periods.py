@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from rsfstudy.named_studies._bifurcation import Bifurcation, _growth
+from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
@@ -66,17 +66,6 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
         expected = math.exp(-2.0 * fastest.real * 2.0 * math.pi / abs(fastest.imag))
         found = Bifurcation(transient=60, events=4)(scene, quick(1e-8)).values
         assert 1.0 - found["floquet_multiplier"] == pytest.approx(1.0 - expected, rel=40.0 * off)
-
-
-def test_departures_of_a_motion_shrink_as_the_multipliers_say():
-    """Independent of differences: event after event, on the way to the cycle of one event."""
-    scene = slow(0.88)
-    seen = followed(scene, 24)
-    orbit = came_to(scene).orbit
-    end = section(orbit.events[0].begin)
-    away = [np.linalg.norm(section(cycle.end) - end) for cycle in seen[8:13]]
-    ratios = np.array(away[1:]) / np.array(away[:-1])
-    assert ratios == pytest.approx([abs(orbit.multipliers[0])] * 4, rel=0.05)
 
 
 def followed(scene: Scene, count: int) -> list[Cycle]:
@@ -192,18 +181,3 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
         grown.append(math.log(np.linalg.norm(direction)))
     expected = np.mean(grown[transient:])
     assert found["lyapunov_exponent"] == pytest.approx(expected, abs=1e-3)
-
-
-def test_the_growth_of_departures_has_a_standard_error():
-    """Windows of a long motion scatter by about as much around all of it; a cycle has none."""
-    scene, kept, windows = slow(0.853), 32, 12
-    seen = came_to(scene, 32 + windows * kept, 1e-5, to_its_end=True).seen
-    by = ReturnMap(scene, quick(1e-5), Meter(10_000_000, engine=COMPILED))
-    told = [_growth(by, seen[: 32 + (1 + n) * kept], kept) for n in range(windows)]
-    means, errors = np.array(told).T
-    scatter = np.std(means, ddof=1)
-    # a mean of variances of five blocks, of twelve windows: known to a factor of two
-    assert 0.5 * scatter < math.sqrt(np.mean(errors**2)) < 5.0 * scatter
-    away = np.abs(means - _growth(by, seen, windows * kept)[0])
-    assert np.median(away / errors) < 1.5
-    assert "lyapunov_exponent_stderr" not in Bifurcation(8, 8)(slow(0.95), quick(1e-5)).values

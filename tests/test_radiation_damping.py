@@ -2,20 +2,14 @@
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import between_ruptures, relation_of
-from rsfstudy.status import Status
-
-#: Impedance of spring and mass of the paper's slider, K T V_*/(2 pi D_c).
-IMPEDANCE = Scene().stiffness * Scene().inertial_time
 
 
 @given(
@@ -51,25 +45,3 @@ def test_at_zero_strength_it_is_the_effect_absent(law, of):
         for damping in (0.0, 1e-17)
     )
     assert faint == pytest.approx(absent, rel=1e-8)
-
-
-def test_stronger_damping_makes_slower_ruptures():
-    rates = []
-    for damping in (0.1 * IMPEDANCE, IMPEDANCE, 10.0 * IMPEDANCE):
-        scene = Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, radiation_damping=damping)
-        outcome = LimitCycle(phases=2)(scene, Accuracy(1e-5))
-        assert outcome.status is Status.OK
-        rates.append(outcome.values["max_log10_slip_rate"])
-    assert (np.diff(rates) < -0.5).all()
-
-
-def test_damped_cycles_do_not_overshoot():
-    """With mass the drop in deceleration is nearly that in acceleration (slip law); with damping
-    there is hardly any.
-    """
-    fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "normal_stress": "constant"}
-    cycles = [
-        LimitCycle(phases=2)(Scene(**fields, **effect), Accuracy()).values["static_stress_drop"]
-        for effect in ({"inertia": True}, {"radiation_damping": IMPEDANCE})
-    ]
-    assert 0.4 < cycles[1] / cycles[0] < 0.65

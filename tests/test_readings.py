@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import DOP853, quad
+from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
@@ -15,7 +15,6 @@ from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.slider.equations import LONGEST_STRIDE, between_ruptures, in_rupture, rigid
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")
@@ -88,29 +87,6 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, ratio):
     assert abs(left[1]) < 0.25 * abs(left[0])
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        {"law": "perrin_rice_zheng"},
-        {"law": "family", "law_exponent": 0.3},
-        {"law": "cut_off", "cutoff_velocity_ratio": 3.0},
-        {"law": "slip", "radiation_damping": 1e-3},
-    ],
-)
-def test_every_closed_form_is_come_close_to(law):
-    """Its departure falls in proportion to 1/K."""
-    departures = [
-        read(
-            VelocityStep(record=3.0, phases=2),
-            Scene(**law, normal_stress="constant", stiffness=stiffness, load_velocity_ratio=5.0),
-            engine=COMPILED,
-        )["closed_form_departure"]
-        for stiffness in (10.0, 100.0)
-    ]
-    assert departures[0] < 0.02 * 0.01
-    assert departures[1] == pytest.approx(0.1 * departures[0], rel=0.15)
-
-
 SOFT = {"normal_stress": "constant", "stiffness": 5.0, "velocity_steps": 2, "velocity_ratio": 2.0}
 
 
@@ -178,47 +154,6 @@ def test_healing_is_read_off_friction_not_off_the_spring(fields):
         found = read(Healing(phases=2), scene, 1e-8, engine=engine)
         assert found["healing"] == pytest.approx(friction(highest) - scene.mu_star, abs=1e-7)
         assert found["peak_displacement"] == pytest.approx(highest, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    "equations",
-    [
-        between_ruptures(Scene(**APART[0], load_velocity_ratio=3.0), clock=True),
-        between_ruptures(Scene(**APART[2], load_velocity_ratio=3.0), clock=False),
-        between_ruptures(Scene(**APART[4], law="two_slip_states", b1_over_a=1.5), clock=False),
-        in_rupture(Scene(inertia=True, stiffness_ratio=0.5, period=1e7)),
-        in_rupture(Scene(**DILATANT, inertia=True, stiffness_ratio=0.5, period=1e7)),
-        rigid(Scene(fluid="dilatant", law="two_slowness_states", b1_over_a=1.5), 1.0),
-    ],
-)
-def test_the_change_of_what_is_read_is_its_derivative(equations):
-    """By a difference of order four along a step: of spring stress over normal stress less the
-    pressure outside the fault, which is the effective one and the pressure inside.
-    """
-    start = [0.01 * (1.0 + n) for n in range(len(equations.unknowns))]
-    scales = 1e-10 * np.array(equations.scales)
-    steps = DOP853(
-        lambda _clock, state: equations.rates(tuple(state.tolist())), 0.0, start, math.inf,
-        rtol=1e-10, atol=scales, max_step=LONGEST_STRIDE,
-    )  # fmt: skip
-    for _ in range(21):
-        steps.step()
-        begin, end, within = steps.t_old, steps.t, steps.dense_output()
-        middle, reach = 0.5 * (begin + end), 0.1 * (end - begin)
-
-        def at(clock, within=within):
-            return equations.at(tuple(within(clock).tolist()))
-
-        def reads(clock, at=at):
-            point = at(clock)
-            inside = point.psis[-1] if "pore_pressure" in equations.unknowns else 0.0
-            return (equations.p[2] + point.spring_stress) / (point.normal_stress + inside)
-
-        assert at(begin).reading == pytest.approx(reads(begin), rel=1e-13)
-        near, far = (reads(middle + n * reach) - reads(middle - n * reach) for n in (1, 2))
-        change = (8.0 * near - far) / (12.0 * reach)
-        size = abs(reads(end) - reads(begin)) / abs(end - begin)
-        assert at(middle).reading_growth == pytest.approx(change, rel=1e-5, abs=1e-4 * size + 1e-9)
 
 
 def test_a_hold_of_a_longer_protocol_is_read_from_where_it_begins():

@@ -64,23 +64,6 @@ def test_the_error_estimate_covers_the_error_and_is_smooth(rtol):
     assert max(errors) < 10.0 * min(errors)
 
 
-def test_no_step_leaps_over_a_turn():
-    """A step of 3 D_c across V = V_0 used to err by 750 times its tolerance, unnoticed."""
-    found, tight = (
-        response(
-            peaks=2,
-            rtol=rtol,
-            b_over_a=1.5471776782243598,
-            load_velocity_ratio=32.890368113291856,
-            **SLOWNESS,
-        ).values
-        for rtol in (1e-6, 1e-10)
-    )
-    error = abs(found["max_log10_slip_rate"] - tight["max_log10_slip_rate"])
-    assert error <= found["max_log10_slip_rate_error"]
-    assert error < 1e-6 * tight["max_log10_slip_rate"]
-
-
 def test_mass_lowers_the_peak_after_a_large_step_and_leaves_small_ones_alone():
     large, small = (
         [

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from test_steady import PLAIN, WITH_ONE_B
 
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
@@ -19,7 +18,6 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import relation_of
 from rsfstudy.slider.laws.slip import SlipLaw
-from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -164,19 +162,3 @@ def test_critical_stiffness_itself_is_left_open():
     for law in ("slip", "slowness"):
         scene = Scene(law=law, stress_dependence=1.0, **CONSTANT)
         assert CriticalStep()(scene, Accuracy(1e-5)).status is Status.UNVERIFIED
-
-
-def bent(friction, p):
-    return 0.1 * friction**2, 0.2 * friction
-
-
-@dataclass(frozen=True, kw_only=True)
-class Bent(NormalStress):
-    name = "bent"
-    normal_stress = staticmethod(bent)
-
-
-def test_normal_stress_of_which_the_integral_is_not_known_is_refused():
-    assert Scene(normal_stress=Bent).stress_dependence == 0.0
-    with pytest.raises(InvalidValue, match="stress_dependence = 1.0: is known for .* not for bent"):
-        Scene(normal_stress=Bent, stress_dependence=1.0)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rsfstudy import Scene, simulate
+from rsfstudy import Scene
 from rsfstudy.analysis import after_step
-from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
@@ -21,7 +20,6 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import laws, stability
-from rsfstudy.slider.laws.two_slip_states import TwoSlipStates
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
@@ -87,34 +85,6 @@ def test_two_of_one_length_are_one(law, stress):
     agree(Triggered(), *both(law, stiffness_ratio=1.3, load_velocity_ratio=30.0, **stress), 1e-4)
 
 
-APART = 0.05
-
-
-@dataclass(frozen=True, kw_only=True)
-class TwoStatesApart(TwoSlipStates):
-    name = "two_states_apart"
-
-    @staticmethod
-    def evolutions(log_slip_rate, psis, shift, share, p):
-        return TwoSlipStates.evolutions(
-            log_slip_rate, (psis[0] - APART, psis[1] + APART), shift, share, p
-        )
-
-    @staticmethod
-    def steady_states(log_slip_rate, shift, p):
-        one, other = TwoSlipStates.steady_states(log_slip_rate, shift, p)
-        return one + APART, other - APART
-
-
-def test_states_that_rest_apart_begin_at_rest():
-    """Steady sliding at V_* is that of the law, which need not be zero in each state."""
-    one, two = both("slip", stiffness_ratio=1.5, load_velocity_ratio=1.3)
-    two = two.with_(law=TwoStatesApart)
-    ends = [float(simulate(s, duration=10.0)["log10_slip_rate"][-1]) for s in (one, two)]
-    assert ends[1] == pytest.approx(ends[0], abs=1e-6)
-    agree(RigidResponse(points=5), one, two)
-
-
 @pytest.mark.parametrize("law", LAWS.values())
 @pytest.mark.parametrize("effect", [{}, {"stress_dependence": 2.0, **CONSTANT}])
 def test_what_stress_takes_is_shared_within_bounds(law, effect):
@@ -137,30 +107,6 @@ def test_b_follows_from_its_parts():
     assert scene.with_(b2_over_a=-0.4, stiffness=0.001).b == pytest.approx(0.5 * scene.a, rel=1e-15)
     assert Scene(law="two_slip_states", stiffness=0.01, b2_over_a=0.0).b == scene.a
     assert scene.with_(law="slip").b == 2.0 * scene.a
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unbounded(TwoSlipStates):
-    """Shares b_i/(b_1 + b_2) of what stress takes, which exceed 1 where signs differ."""
-
-    name = "unbounded"
-
-    def numbers(self, scene):
-        first, second, *_shares, over = super().numbers(scene)
-        return first, second, first / scene.b, second / scene.b, over
-
-
-@pytest.mark.parametrize("mass", [{}, {"inertia": True}])
-def test_what_grows_at_every_stiffness_is_not_called_stable(mass):
-    fields = {"b1_over_a": 2.7, "b2_over_a": -1.4, "length_ratio": 60.0, "stress_dependence": 2.0}
-    scene = Scene(law=Unbounded, stiffness=0.02, **fields, **mass)
-    for stiffness in (1e-3, 0.1, 10.0):
-        assert stability.growth_rates(scene.with_(stiffness=stiffness), 0.0)[0].real > 1e-3
-    assert scene.critical_stiffness == math.inf
-    assert scene.stiffness_ratio == 0.0
-    assert LinearStability()(scene, Accuracy()).status is Status.UNSTABLE_AT_ANY_STIFFNESS
-    with pytest.raises(InvalidValue, match="no critical stiffness.*give stiffness itself"):
-        Scene(law=Unbounded, **fields)
 
 
 #: Unstable between two stiffnesses only, the first of them 0.66 of the second.
