@@ -58,16 +58,6 @@ def test_overrides_make_a_study_or_are_refused(overrides):
     assert len(scenes) == study.size
 
 
-def test_an_axis_may_be_unsorted():
-    """The values stay in the order they were given, and fits do not depend on it."""
-    down = run(SMALL.with_(b_over_a=[3.0, 2.0, 2.5]))
-    assert down.b_over_a.values.tolist() == [3.0, 2.0, 2.5]
-    up = run(SMALL)
-    xr.testing.assert_equal(
-        down.critical_velocity_ratio.sortby("b_over_a"), up.critical_velocity_ratio
-    )
-
-
 # ---- the command line ---------------------------------------------------------------------------
 
 
@@ -185,17 +175,3 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatc
             plots.save(results, tmp_path / "faulty.png")
     assert (tmp_path / "faulty.png").read_bytes() == old
     assert os.listdir(tmp_path) == ["faulty.png"]
-
-
-@pytest.mark.parametrize("command", ["check", "plot"])
-def test_a_study_that_is_none_is_told_apart_from_one_that_was_not_run(
-    command, tmp_path, monkeypatch
-):
-    monkeypatch.setenv("COLUMNS", "500")
-    code, said = called([command, "stress_drp", "--output", str(tmp_path)])
-    assert (code, "Did you mean 'stress_drop'" in said) == (2, True)
-    code, said = called([command, "stress_drop", "--output", str(tmp_path)])
-    assert (code, "Run the study first" in said) == (1, True)
-    (tmp_path / "stress_drop.partial.nc").touch()
-    code, said = called([command, "stress_drop", "--output", str(tmp_path)])
-    assert (code, "partial.nc does: run the study again" in said) == (1, True)

@@ -12,7 +12,7 @@ import xarray as xr
 
 import rsfstudy
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 
 ROWS = 400
@@ -104,23 +104,6 @@ def test_friction_that_is_zeroed_is_told() -> None:
     found = fitted(GOOD | {"friction": np.zeros(ROWS)})
     assert found.status.item() == Status.NOT_APPLICABLE
     assert "friction before the step is 0" in found.message.item()
-
-
-def test_steps_fitted_together_share_no_row() -> None:
-    loading = ((0.0, 1.0), (60.0, 10.0), (80.0, 1.0))
-    time = synthetic.rows(loading, synthetic.end(loading), 600)
-    record = {"time": time, "displacement": synthetic.load_point(loading, time)}
-    friction = synthetic.motion("slip", time, loading)[0]
-    friction += synthetic.correlated(600, 0.0, 1e-4, 3)
-    found = fitted(record | {"friction": friction}, together=True, noise="white")
-    assert found.rows_fitted.item() == 600  # all rows, each once
-    assert found.slip_distance.item() == pytest.approx(10.0, rel=0.02)  # 5 sd
-
-
-def test_a_warning_names_the_line_of_who_asks() -> None:
-    with pytest.warns(Incomplete) as caught:
-        fitted(GOOD, budget=100)
-    assert [one.filename for one in caught] == [__file__]
 
 
 def test_a_load_point_that_is_recorded_with_noise_takes_bounded_work() -> None:

@@ -7,7 +7,6 @@ import ipaddress
 import json
 import os
 import re
-import runpy
 import signal
 import subprocess
 import sys
@@ -225,17 +224,6 @@ def test_a_scheduler_that_does_not_answer_is_named(address):
 
 
 # ---- the files of the page ----------------------------------------------------------------------
-
-
-def test_the_slurm_job_is_what_it_says():
-    from dask_jobqueue import SLURMCluster
-
-    job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
-    with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
-        script = cluster.job_script()
-    assert "#SBATCH -p normal" in script
-    assert "#SBATCH --cpus-per-task=16" in script
-    assert re.search("--nthreads 1 .*--nworkers 16 ", script)
 
 
 #: Jobs that are processes of this machine, in place of SLURM's.

@@ -16,12 +16,9 @@ from numba.core.bytecode import FunctionIdentity
 from running import LEFT_TO_COMPILED, SMALL, enough, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
-from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.cell import Cell
 from rsfstudy.errors import DataError, Incomplete, InvalidValue
-from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import building, machine
@@ -141,20 +138,6 @@ def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
         run(small, output=tmp_path)
 
 
-@dataclass(frozen=True)
-class Compiles(Measure):
-    """Takes no time, of which it spends a thousand seconds compiling."""
-
-    name = "compiles"
-    headline = "answer"
-    variables = {"answer": ()}  # noqa: RUF012
-    typical_work = 1
-
-    def find(self, scene, accuracy, meter):
-        compiling.seconds += 1_000.0
-        return Outcome(Status.OK, {"answer": 42.0})
-
-
 # waves are compared with the same motion without them, which is another's equations
 @pytest.mark.parametrize("name", [name for name in LEFT_TO_COMPILED if name != "wave_triggering"])
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
@@ -175,12 +158,6 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     study.measure(scene, study.accuracy)
     assert set(wanted)
     assert set(wanted) <= prepared
-
-
-def test_compiling_is_not_in_the_time_of_a_cell(monkeypatch):
-    monkeypatch.setattr(compiling, "seconds", compiling.seconds)
-    task = cells.Task(Scene(), Compiles(), Accuracy())
-    assert cells.computed(task, Cell(Scene(), {}))[1] < -900.0
 
 
 # ---- the cache -----------------------------------------------------------------------------------

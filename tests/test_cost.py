@@ -79,14 +79,6 @@ def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
     assert cost.faster(Plan(MANY), tmp_path) == ""
 
 
-def test_it_is_not_where_it_would_save_little_or_is_not_there(tmp_path, monkeypatch):
-    assert cost.faster(Plan(SMALL), tmp_path) == ""
-    compiled = replace(MANY, accuracy=replace(MANY.accuracy, engine="compiled"))
-    assert cost.faster(Plan(compiled), tmp_path) == ""
-    monkeypatch.setattr(cost, "lacking", lambda _engine: "needs Numba")
-    assert cost.faster(Plan(MANY), tmp_path) == ""
-
-
 def test_show_and_run_say_so(tmp_path, monkeypatch):
     monkeypatch.setattr(cost, "_WORTH", 0.0)
     few = ("rate_step_boundary", "--set", "b_over_a=2", "--output", tmp_path)

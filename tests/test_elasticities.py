@@ -4,12 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 import pytest
-from running import run
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.files import restore
+from rsfstudy import Scene
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.elasticities import Elasticities
@@ -142,21 +139,6 @@ def test_ends_without_elasticities():
     found, _outcome = told(measure, SCENE.with_(mu_star=0.1))
     elasticity, error = found["mu_star"]
     assert abs(elasticity + 0.1) <= error < 1e-4
-
-
-def test_a_study_of_elasticities():
-    """In the file they lie along the dimension `parameter`; the declaration brings all back."""
-    measure = Elasticities(LinearStability(), parameters=("a", "b_over_a"))
-    study = Study(
-        name="felt", title="Felt", base=SCENE, axes=[Axis("b_over_a", [2.0, 3.0])], measure=measure
-    )
-    found = run(study)
-    assert found["elasticity"].dims == ("b_over_a", "parameter")
-    assert found["elasticity"].sel(parameter="b_over_a").values == pytest.approx([2.0, 1.5])
-    assert np.isfinite(found["elasticity_error"]).all()
-    again = restore.study_of(found)
-    assert again.measure == measure
-    assert again.describe() == study.describe()
 
 
 def test_the_elasticities_that_uncertain_recurrence_states():

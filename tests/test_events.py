@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 import rsfstudy
 from rsfstudy import Laboratory, Scene
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import InvalidValue
 
 STICK_SLIP = Scene(b_over_a=2.0, stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
 
@@ -88,11 +88,6 @@ def test_events_have_the_units_of_the_motion(motion):
     assert after.peak_slip_rate.attrs["units"] == "um s-1"
 
 
-def test_other_datasets_have_no_events():
-    with pytest.raises(DataError, match="time is not there"):
-        rsfstudy.limit_cycle(STICK_SLIP, engine="compiled").rsf.events()
-
-
 # ---- records ------------------------------------------------------------------------------------
 
 SAMPLES = 20_000
@@ -157,10 +152,3 @@ def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
     xr.testing.assert_identical(rsfstudy.events(file), rsfstudy.events(record))
     plain = rsfstudy.events(**{name: values.values for name, values in record.items()})
     assert not any("units" in plain[name].attrs for name in ("slip", "peak_slip_rate", "noise"))
-
-
-def test_coarse_digits_are_no_events():
-    """Noise of a tenth of the last digit: mostly the same value, now and then the next."""
-    stress = np.round(0.45 + 0.1 * noise(3))
-    found = rsfstudy.events(time=np.arange(SAMPLES), shear_stress=stress)
-    assert not found.sizes["event"]

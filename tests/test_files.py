@@ -2,11 +2,9 @@
 kept.
 """
 
-import contextlib
 import json
 import os
 import shutil
-import sqlite3
 import subprocess
 import sys
 
@@ -145,20 +143,6 @@ def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     content = path.read_bytes()
     assert content.count(right) == 1
     path.write_bytes(content.replace(right, wrong))
-    with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
-        kept.read(KEYS)
-
-
-def test_results_exchanged_in_the_journal_are_noticed(tmp_path):
-    """Each of two cells holds what was written, but for the other."""
-    other = Outcome(Status.OK, {"v": 2.5, "profile": np.array([3.0, 4.0])}, "", 42)
-    with journal(tmp_path) as kept:
-        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
-        kept.add([LAYOUT.finished(KEYS[1].tobytes(), other, 0.1)])
-    first, second, aside = KEYS[0].tobytes(), KEYS[1].tobytes(), b"aside"
-    with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
-        for before, now in ((first, aside), (second, first), (aside, second)):
-            db.execute("UPDATE cells SET key = ? WHERE key = ?", (now, before))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
         kept.read(KEYS)
 

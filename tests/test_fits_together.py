@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 import warnings
-from typing import Any
 
 import numpy as np
 import pytest
@@ -119,29 +118,6 @@ def test_two_states_come_back_in_their_order(guess: float) -> None:
     assert fit.slip_distance_high < fit.slip_distance_2_low
 
 
-def test_a_stiff_spring_is_followed_over_a_long_window() -> None:
-    """Of 3,000 um, for which it takes 2 k x/a right-hand sides."""
-    loading = ((0.0, 1.0), (500.0, 10.0))
-    values = TWO_STATES | {"a": 0.0008, "stiffness": 0.01}
-    ratios = {f"{n}_over_a": values[n] / values["a"] for n in ("b1", "b2")}
-    scene = Scene(
-        law="two_slip_states",
-        normal_stress="constant",
-        mu_star=0.6,
-        a=values["a"],
-        stiffness=0.2,
-        length_ratio=25.0,
-        **ratios,
-    )
-    accuracy, meter = Accuracy(1e-9, ENOUGH, engine=COMPILED), Meter(ENOUGH, engine=COMPILED)
-    times = np.linspace(0.0, 750.0, 100)
-    pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
-    moved = synthetic.load_point(loading, times)
-    found = Model(scene, times, moved, 0.0 * times, pieces, accuracy, meter).curve(values)
-    assert meter.spent > 50_000  # beyond what motions of records take else
-    assert np.abs(found - synthetic.two_states(times, loading, values)).max() < 1e-6
-
-
 def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
     curved, times = 1e-6, synthetic.rows(STEP, synthetic.end(STEP) + 10.0, 200)
     moved = synthetic.load_point(STEP, times)
@@ -220,17 +196,6 @@ def test_a_window_does_not_begin_within_a_hold() -> None:
         assert float(hold[f"{name}_stderr"]) < 0.1 * TRUTH[name], name
     assert "begins in a hold" in str(reloading.message.values)
     assert np.isnan(float(reloading.a))
-
-
-def test_a_negative_b_is_found() -> None:
-    times = synthetic.rows(STEP, synthetic.end(STEP), 300)
-    friction = synthetic.motion("slowness", times, STEP, TRUTH | {"b": -0.004})[0]
-    arrays: dict[str, Any] = {"time": times, "displacement": synthetic.load_point(STEP, times)}
-    arrays["friction"] = friction + synthetic.correlated(300, 0.5, 2e-4, 6)
-    one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
-    fit = rsfstudy.fit(one, laws=["slowness"], **OPTIONS).squeeze()
-    assert abs(off(fit, "b", -0.004)) < 4.0
-    assert float(fit.b_high) < 0.0
 
 
 @pytest.mark.parametrize("law", ["family", "slowness"])

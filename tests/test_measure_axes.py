@@ -122,12 +122,6 @@ def test_a_field_that_decides_the_shape_is_refused():
         scaled(Axis("times", [1.0, 2.0]), measure=kind())
 
 
-def test_a_field_that_is_named_as_a_number_is_no_axis():
-    named = type("Named", (Scaled,), {"headline": "factor", "variables": {"factor": ()}})
-    with pytest.raises(InvalidValue, match="'factor': is the name of something measured"):
-        scaled(Axis("case", {"one": {"factor": 2.0}}), measure=named())
-
-
 def computed_by(study: Study, output) -> int:
     """How many cells a run of it computes."""
     with asked_for() as asked:

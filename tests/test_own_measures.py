@@ -9,11 +9,10 @@ import pytest
 from running import run, run_with_failures
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.quantity import Output, Quantity
-from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status
 
 
@@ -51,28 +50,6 @@ def along(values) -> Measure:
 
 
 # ---- its numbers have units ---------------------------------------------------------------------
-
-
-def test_a_measure_says_what_its_numbers_are(tmp_path):
-    """In the file, in what is reduced from them, on the axes of the figure, and in SI."""
-    heat = Quantity("total", "$Q$", "1", "heat per area", "sigma_*")
-    place = Quantity("x", "", "m", "distance along the fault")
-    measure = own(
-        variables={"total": (), "curve": ("x",)},
-        inner_coordinates={"x": [1.0, 2.0]},
-        quantities=(heat, place),
-        find=lambda self, scene, _accuracy, _meter: Outcome(
-            Status.OK, {"total": scene.b_over_a, "curve": np.ones(2)}
-        ),
-    )
-    fit = LinearFit(name="slope", of="total", on="b_over_a")
-    dataset = run(study(measure, reductions=[fit]), output=tmp_path)
-    assert dataset.total.attrs["long_name"] == "heat per area"
-    assert (dataset.x.attrs["long_name"], dataset.x.attrs["units"]) == (place.long_name, "m")
-    drawn = plots.figure(dataset).axes[0]
-    assert drawn.get_ylabel().startswith("Heat per area")
-    pressure = rsfstudy.to_si(dataset, normal_stress=1e6, slip_distance=1e-5).total
-    assert (float(pressure[0]), pressure.attrs["units"]) == (2e6, "Pa")
 
 
 class Outputs(Measure):

@@ -400,14 +400,6 @@ def test_where_paths_part_and_merge():
     assert np.isnan(reduced(same, (parting,)).paths_parting)
 
 
-def test_one_answer_is_no_spread():
-    values = np.array([[np.nan, 2.0, np.nan, np.nan, np.nan], X])
-    spread = Spread(name="spread", of="critical_velocity_ratio", on="a_over_b_minus_a")
-    result = reduced(lattice(values), (spread,))
-    assert np.isnan(result.spread[0])
-    assert result.spread_points.values.tolist() == [1, 5]
-
-
 def test_reductions_of_reductions_keep_to_their_dimensions():
     dataset = lattice([X, 3.0 * X]).expand_dims(law=["slip", "slowness"]).copy()
     slope = ProportionalFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")

@@ -201,26 +201,6 @@ def test_the_estimates_that_uncertain_recurrence_states(fitted):
     np.testing.assert_allclose(stated.COVARIANCE, covariance, rtol=2.5e-4)
 
 
-def test_draws_of_a_fit_are_cases_of_a_rig(fitted):
-    """With units that the draws state, or that a DataFrame of them is told: k_cr = (b - a)
-    sigma_*/D_c, to rounding and the width of a root, on a machine whose K goes with D_c.
-    """
-    draws = fitted.rsf.draw(16, seed=1)
-    fields = {
-        "a": "a",
-        "b_over_a": lambda drawn: drawn["b"] / drawn["a"],
-        "slip_distance": "slip_distance",
-    }
-    base = RIG.scene(law="slowness", a=0.006, b_over_a=1.1, normal_stress="constant")
-    for table, units in ((draws, None), (draws.to_dataframe(), {"slip_distance": "um"})):
-        axis = Axis.cases(table, fields=fields, units=units, dimension="draw")
-        found = run(study(axis, base=base, laboratory=RIG))
-        assert found["slip_distance"].attrs["units"] == "um"
-        np.testing.assert_allclose(found["slip_distance"], draws["slip_distance"], rtol=1e-15)
-        np.testing.assert_allclose(found["critical_stiffness"], draws["b"] - draws["a"], rtol=1e-7)
-        np.testing.assert_allclose(found["stiffness"], 2e-4 * draws["slip_distance"], rtol=1e-12)
-
-
 # ---- what is refused ----------------------------------------------------------------------------
 
 

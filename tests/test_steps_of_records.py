@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
-from rsfstudy.analysis.fitting.steps import Step, steps_of
+from rsfstudy.analysis.fitting.steps import steps_of
 
 UP = ((0.0, 1.0), (60.0, 10.0))
 MANY = ((0.0, 1.0), (60.0, 10.0), (70.0, 1.0), (130.0, 0.0), (200.0, 1.0), (260.0, 3.0))
@@ -79,7 +79,3 @@ def test_a_million_rows() -> None:
 @pytest.mark.parametrize("moved", [np.zeros(100), np.arange(100.0), -np.arange(100.0)])
 def test_a_load_point_that_rests_or_keeps_moving(moved: np.ndarray) -> None:
     assert steps_of(np.arange(100.0), moved) == ()
-
-
-def test_a_step_has_fields() -> None:
-    assert Step._fields == ("begins", "ends", "before", "after")
