@@ -6,7 +6,6 @@ b/a, and whether cells wait until they are let through.
 
 from __future__ import annotations
 
-import asyncio
 import collections
 import ctypes
 import itertools
@@ -22,11 +21,6 @@ import numpy as np
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-
-
-class Unprintable(Exception):
-    def __str__(self):
-        raise RuntimeError
 
 
 def _raise(error: BaseException):
@@ -59,29 +53,21 @@ def _wait_at(gate: Path):
 
 FAULTS: dict[str, Callable] = {
     "raises": lambda _meter: _raise(ZeroDivisionError("in the cell")),
-    "raises unprintable": lambda _meter: _raise(Unprintable()),
     "runs out of memory": lambda _meter: np.ones(10**15),
     "recurses": lambda meter: FAULTS["recurses"](meter),
-    "exits": lambda _meter: _raise(SystemExit("bye")),
     "spends": lambda meter: meter.charge("any", 10**9),
     "nan": lambda _meter: Outcome(Status.OK, {"total": np.nan}),
-    "nothing": lambda _meter: Outcome(Status.OK),
     "no outcome": lambda _meter: 3.0,
     "undeclared": lambda _meter: Outcome(Status.OK, {"totla": 1.0}),
     "too many": lambda _meter: Outcome(Status.OK, {"total": np.ones(3)}),
     "text": lambda _meter: Outcome(Status.OK, {"total": "one"}),
-    "text anywhere": lambda _meter: Outcome(Status.UNVERIFIED, {"total": "one"}),
-    "complex": lambda _meter: Outcome(Status.OK, {"total": 1j}),
-    "no status": lambda _meter: Outcome("ok", {"total": 1.0}),
     "pending": lambda _meter: Outcome(Status.PENDING, {"total": 1.0}),
     "surrogate": lambda _meter: _raise(OSError("no \udc80 file")),
     "nul": lambda _meter: _raise(ValueError("bad\0byte [/red]")),
-    "cancelled": lambda _meter: _raise(asyncio.CancelledError()),
     "generator": lambda _meter: _raise(GeneratorExit()),
     "interrupts": lambda _meter: _raise(KeyboardInterrupt()),
     "masked": lambda _meter: Outcome(Status.OK, {"total": np.ma.masked}),
     "number for message": lambda _meter: Outcome(Status.OK, {"total": 1.0}, np.array([1, 2])),
-    "unprintable message": lambda _meter: Outcome(Status.OK, {"total": 1.0}, Unprintable()),
     "dies": lambda _meter: os._exit(1),
     "segfaults": lambda _meter: ctypes.string_at(0),
     "sleeps": lambda _meter: (time.sleep(3.0), Outcome(Status.OK, {"total": 1.0}))[1],

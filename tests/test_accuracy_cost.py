@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 from conftest import EACH_STEP
 from extended_precision import critical_velocity, slider
-from rsfstudy.named_studies import accuracy_cost
 from rsfstudy.named_studies._cheapest import Cheapest
 from rsfstudy.named_studies._problem import Problem
 from rsfstudy.named_studies.accuracy_cost import WorkPrecision
@@ -94,23 +93,6 @@ def test_what_is_for_mass_does_not_apply_without_it(integrator):
     assert found.status is Status.NOT_APPLICABLE
     assert found.status.is_answer
     assert found.rhs_evaluations == 0
-
-
-def test_times_are_relative_to_those_of_the_moment(monkeypatch):
-    """On a machine that slows down all the time, a right-hand side costs the same in all runs."""
-    original, moment, work = accuracy_cost._timed, itertools.count(1.0), []
-
-    def slower_and_slower(problem, scene, asked):
-        _seconds, outcome, spent = original(problem, scene, asked)
-        work.append(spent.spent)
-        return 1e-9 * next(moment) * spent.spent, outcome, spent
-
-    monkeypatch.setattr(accuracy_cost, "_timed", slower_and_slower)
-    found = solved("RK23", 4.0, repeats=3).values
-    yardstick, run = work[:2]
-    assert work == [yardstick, run, yardstick, run, yardstick, run, yardstick]
-    assert found["relative_time"] == pytest.approx(run / yardstick, rel=1e-12)
-    assert found["run_time"] == pytest.approx(4e-9 * run, rel=1e-12)  # the second of three
 
 
 def runs(achieved, work) -> xr.Dataset:

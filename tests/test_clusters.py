@@ -12,7 +12,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import dask
 import psutil
 import pytest
 import yaml
@@ -20,7 +19,6 @@ from faulty import declared
 from running import (
     FAULTY,
     HANGS,
-    QUIET,
     SMALL,
     command,
     ended,
@@ -184,32 +182,6 @@ def test_nothing_listens_beyond_this_machine(cluster):
         listening = [found.laddr for found in sockets if found.status == psutil.CONN_LISTEN]
         assert listening
         assert [a for a in listening if not ipaddress.ip_address(a.ip).is_loopback] == []
-
-
-@pytest.fixture
-def encrypted():
-    """A scheduler and a worker that talk to the holders of a certificate only."""
-    from distributed import LocalCluster, Security
-
-    pytest.importorskip("cryptography")
-    security = Security.temporary()
-    with LocalCluster(1, processes=False, protocol="tls", security=security, **QUIET) as encrypted:
-        yield encrypted
-
-
-def test_a_scheduler_by_tls(encrypted):
-    """With the certificates of Dask's configuration, as of its other clients."""
-    pem = encrypted.security.get_tls_config_for_role("client")
-    names = {f"distributed.comm.tls.{name}": pem[key] for name, key in (
-        ("ca-file", "ca_file"), ("client.cert", "cert"), ("client.key", "key"))}  # fmt: skip
-    address = encrypted.scheduler_address
-    with dask.config.set(names), clusters.existing_cluster(address, timeout=HANGS) as client:
-        same_numbers(run(client=client), run())
-    with (
-        pytest.raises(RunError, match=r"ssl_context.*certificates for tls://"),
-        clusters.existing_cluster(address, timeout=HANGS),
-    ):
-        pass
 
 
 @pytest.mark.parametrize(

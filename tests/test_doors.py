@@ -176,6 +176,17 @@ def test_a_call_that_does_not_fit_is_a_type_error_of_python():
 # ---- datasets -----------------------------------------------------------------------------------
 
 
+def declared_in(dataset: xr.Dataset) -> dict[str, object]:
+    """What its declaration says, if it has one."""
+    return json.loads(dataset.attrs.get("declaration", "{}"))
+
+
+def undeclared(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """The dataset without a part of its declaration."""
+    rest = {n: part for n, part in declared_in(dataset).items() if n != name}
+    return dataset.assign_attrs(declaration=json.dumps(rest))
+
+
 def alterations(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
     """Whatever a notebook may make of a dataset."""
     dims = list(map(str, dataset.dims))
@@ -187,7 +198,8 @@ def alterations(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
         **{f"reversed {d}": dataset.isel({d: slice(None, None, -1)}) for d in dims},
         **{f"no index {d}": dataset.drop_indexes(d) for d in dims},
         **{f"mean {d}": dataset[numbers].mean(d, keep_attrs=True) for d in dims},
-        "without status": dataset.drop_vars("status", errors="ignore"),
+        **{f"without {n}": dataset.drop_vars(n) for n in map(str, dataset.variables)},
+        **{f"without declared {n}": undeclared(dataset, n) for n in declared_in(dataset)},
         **{
             f"{n} is {junk!r:.20}": dataset.assign_attrs({n: junk})
             for n, junk in itertools.product(("declaration", "provenance", "id", "scene"), JUNK)

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.signal import lfilter
 
 import rsfstudy
-from rsfstudy import Laboratory, Scene
+from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 
 STICK_SLIP = Scene(b_over_a=2.0, stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
@@ -73,19 +73,6 @@ def test_a_part_of_an_event_is_said_to_be_one(motion):
     assert ends.cut.values.tolist() == [0, 0, 2]
     begins = motion.sel(time=slice(begin + 0.5 * duration, None)).rsf.events()
     assert begins.cut.values.tolist() == [1, 0]
-
-
-def test_events_have_the_units_of_the_motion(motion):
-    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
-    scene = rig.scene(**{n: getattr(STICK_SLIP, n) for n in ("stiffness_ratio", "inertia")},
-                      load_velocity_ratio=10.0, b_over_a=2.0)  # fmt: skip
-    there = rsfstudy.simulate(scene, duration=12.0, engine="compiled")
-    after = rig.in_units(there.rsf.events(), stress="MPa", length="um")
-    before = rig.in_units(there, stress="MPa", length="um").rsf.events()
-    for name in ("time", "duration", "slip", "static_stress_drop"):
-        np.testing.assert_allclose(after[name], before[name], rtol=1e-8)
-        assert after[name].attrs["units"] == before[name].attrs["units"] != "1"
-    assert after.peak_slip_rate.attrs["units"] == "um s-1"
 
 
 # ---- records ------------------------------------------------------------------------------------

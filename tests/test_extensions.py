@@ -458,19 +458,6 @@ def squares(dataset, axes):
     axes.set_title("squares")
 
 
-def test_a_module_or_a_function_draws(tmp_path):
-    study = study_of("n", Held(), Axis("phi", [60, 70]), plot=squares)
-    dataset = run(study)
-    assert json.loads(dataset.attrs["declaration"])["plot"] == "squares"
-    assert plots.figure(dataset, squares).axes[0].get_title() == "squares"
-    with pytest.raises(InvalidValue, match="plot = 'squares': is unknown"):
-        plots.figure(dataset)
-    module = SimpleNamespace(__name__="mine.squares", draw=squares)
-    assert plots.figure(dataset, module).axes[0].get_title() == "squares"
-    partial = dataset.assign_attrs(completeness="partial: 1 of 2 cells")
-    assert "partial" in plots.figure(partial, squares).axes[0].get_title()
-
-
 def test_panels_draw():
     """By the name of their study; with labels and units from what the measure says of itself."""
     figure = Figure([Panel(x="phi", y="held", each=["law"]), squares])

@@ -13,25 +13,21 @@ from scipy.interpolate import PchipInterpolator
 from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import READ, STATES, Recording
-from rsfstudy.motion.regimes import check_start
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
-    between_ruptures,
     rigid,
 )
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import Dilatant
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import FLUID
-from rsfstudy.status import Status
 
 LAWS = PLAIN
 CONSTANT = {"normal_stress": "constant"}
@@ -148,25 +144,6 @@ def test_without_dilatancy_the_fluid_does_nothing(law, stress):
 # ---- measures ------------------------------------------------------------------------------------
 
 
-SLOW = {"a": 0.01, "b_over_a": 1.5, "mu_star": 0.6, "stiffness": 0.0025, **CONSTANT}
-
-
-def test_critical_steps_of_a_fault_that_drains_fast():
-    """Drainage holds steps of the integrator to its stability there, and what it leaves of a small
-    swing never dies down: that its peaks stay the same is an answer. A tighter run agrees.
-    """
-    scene = dilatant(0.002, 10.0, law="slip", **SLOW).with_(stiffness=0.006)
-    found = [CriticalStep()(scene, Accuracy(rtol)) for rtol in (1e-4, 1e-6)]
-    assert [outcome.status for outcome in found] == [Status.OK] * 2
-    (value, error), (tighter, rest) = (
-        (o.values["critical_velocity_ratio"], o.values["critical_velocity_ratio_error"])
-        for o in found
-    )
-    assert value == pytest.approx(tighter, abs=error + rest)
-    drained = CriticalStep()(scene.with_(fluid="drained"), Accuracy(1e-4))
-    assert tighter > 1.2 * drained.values["critical_velocity_ratio"]
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_a_hold_drains(law):
     """Slip goes on ever slower while the load point is held: pore pressure that compaction has
@@ -181,17 +158,6 @@ def test_a_hold_drains(law):
     # fluid that has left is porosity lost: c times the time integral of P
     left = 0.1 * PchipInterpolator(motion["time"].values, pressure).integrate(0.0, 1e3)
     assert left == pytest.approx(-porosity[-1] - pressure[-1], rel=1e-3)
-
-
-def test_effective_normal_stress_decides_whether_it_is_lost():
-    """A motion ends by the normal stress of its points, and none begins without."""
-    scene = dilatant(**CONSTANT)
-    there = between_ruptures(scene, clock=False).at((0.0, 0.0, 0.0, 0.4))
-    assert there.normal_stress == pytest.approx(0.6, rel=1e-14)
-    check_start(scene, there)
-    with pytest.raises(Halt) as halted:
-        check_start(scene, there._replace(psis=(0.0, 0.0, 1.0)))
-    assert halted.value.status is Status.NORMAL_STRESS_LOST
 
 
 # ---- scenes --------------------------------------------------------------------------------------

@@ -212,27 +212,12 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rows = [f"{t:.17g},{d:.17g}" for t, d in zip(*wave(20).values(), strict=True)]
     Path("record.csv").write_text("\n".join(["time (D_c/V_*), displacement (D_c)", *rows]))
-    Path("steps.csv").write_text("velocity (V_*), duration (D_c/V_*)\n3, 5\n0.5, 15\n")
     words = [f"--set={name}={value}" for name, value in PLAIN.items()]
     for told in (["--set", "loading=record.csv"], ["--protocol", "record.csv"]):
         status, said = called(["simulate", *words, *told, "--rtol", "1e-4"])
         assert status == 0, said
         motion = xr.load_dataset("motion.nc")
         assert motion.rsf.scene.parts.loading == history(wave(20), name="record")
-    Path("mine.py").write_text(
-        "from rsfstudy import Axis, Scene, Study\n"
-        "from rsfstudy.measures.step_response import StepResponse\n"
-        "study = Study(name='mine', title='Mine', base=Scene(normal_stress='constant', "
-        "stiffness=0.02), axes=[Axis('a', [0.01, 0.012])], "
-        "measure=StepResponse(peaks=2, phases=2))\n"
-    )
-    words = ["--set", "loading=record.csv,steps.csv", "--rtol", "1e-4", "--serial", "--quiet"]
-    status, said = called(["run", "mine.py", *words])
-    assert status == 0, said
-    assert rsfstudy.open("mine").loading.values.tolist() == ["record", "steps"]
-    status, said = called(["rerun", "outputs/mine.nc", "--serial", "--quiet"])
-    assert status == 0, said
-    assert "every number is the same" in said
     status, said = called(["simulate", "--set", "loading=absent.csv"])
     assert status == 1
     assert "absent.csv: cannot be read as CSV" in said

@@ -13,7 +13,7 @@ from rsfstudy.named_studies import what_matters
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import limit_cycle
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -93,32 +93,6 @@ def test_balances_of_the_orbit(case):
     # both the slow part and the rupture are resolved: no stride longer than a few per cent of the
     # range
     assert np.abs(np.diff(found["log10_slip_rate"])).max() < 0.05 * np.ptp(found["log10_slip_rate"])
-
-
-def test_public_call_and_si_units():
-    """sigma_* = 100 MPa, D_c = 10 micrometres."""
-    cycle = rsfstudy.limit_cycle(scene(law="slowness"))
-    si = rsfstudy.to_si(cycle, normal_stress=100e6, slip_distance=1e-5)
-    rate, fastest = 1e-5 * 1.17e-8, 10 ** float(cycle.max_log10_slip_rate)
-    for name, expected, units in (
-        ("recurrence_interval", cycle.recurrence_interval / 1.17e-8, "s"),
-        ("static_stress_drop", 100e6 * cycle.static_stress_drop, "Pa"),
-        ("slip_per_event", 1e-5 * cycle.slip_per_event, "m"),
-        ("shear_stress", 100e6 * cycle.shear_stress, "Pa"),
-        ("effective_normal_stress", 100e6 * cycle.normal_stress_ratio, "Pa"),
-        ("max_slip_rate", rate * fastest, "m s-1"),
-        ("max_slip_rate_error",
-         rate * fastest * math.log(10.0) * cycle.max_log10_slip_rate_error, "m s-1"),
-        # what has no scale stays as it is
-        ("max_log10_slip_rate", cycle.max_log10_slip_rate, "1"),
-    ):  # fmt: skip
-        np.testing.assert_allclose(si[name], expected, rtol=1e-12)
-        assert si[name].attrs["units"] == units
-    assert not [n for n, v in si.variables.items() if "scale" in v.attrs or "ss_ratio" in n]
-    with pytest.raises(InvalidValue, match="must be positive"):
-        rsfstudy.to_si(cycle, normal_stress=-1.0, slip_distance=1e-5)
-    with pytest.raises(InvalidValue, match="State it"):
-        rsfstudy.to_si(cycle.drop_vars("reference_rate"), normal_stress=1.0, slip_distance=1.0)
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)

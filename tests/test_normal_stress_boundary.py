@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies._triggers import Triggers
 
-import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis.after_step import (
     friction_acts_alone,
@@ -20,10 +19,10 @@ from rsfstudy.analysis.after_step import (
     reaches_norm,
 )
 from rsfstudy.measures import critical_step
-from rsfstudy.measures.critical_step import KINDS, CriticalStep
+from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
-from rsfstudy.slider import closed_forms, stability, steady
+from rsfstudy.slider import closed_forms, stability
 from rsfstudy.status import Status
 
 STEP, VALUE = "normal_stress_step", "critical_normal_stress_step"
@@ -215,27 +214,3 @@ def test_coulomb_stresses_add_up():
 
 
 # ---- bad input, and what users call -------------------------------------------------------------
-
-
-def test_public_call():
-    """The value the scene holds for the step is ignored; a stated load point velocity is not."""
-    scene = Scene(**IMPOSED, alpha=0.3, stiffness_ratio=1.2, normal_stress_step=0.4)
-    dataset = rsfstudy.critical_step(scene, of=STEP, direction="down")
-    assert dataset[VALUE].attrs["scale"] == "sigma_*"
-    assert dataset.attrs["status"] == "ok"
-    still = scene.with_(normal_stress_step=0.0)
-    assert float(dataset[VALUE]) == found(still)[0]
-    moving = found(still.with_(load_velocity_ratio=1.0))[0]
-    assert float(dataset[VALUE]) < moving < 0.0
-
-
-def test_the_survey_ends_where_steady_sliding_does():
-    """A fall of sigma_3 beyond which a load point that moves finds no steady sliding."""
-    stiff = {"stiffness_ratio": 1.3, "radiation_damping": 1e-6, "load_velocity_ratio": 1.0}
-    scene = Scene(law="slowness", alpha=0.56, phi=50.0, **stiff)
-    steps = KINDS[STEP](scene, -1)
-    last = steps.scene_at(steps.largest)
-    assert steady.steady_sliding(last, 0.0) is not None
-    beyond = steps.scene_at(1.001 * steps.largest)
-    assert steady.steady_sliding(beyond, 0.0) is None
-    assert not steps.jumps_to_norm

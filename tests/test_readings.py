@@ -186,20 +186,6 @@ def test_a_displacement_is_no_part_of_a_hold(displaced):
     assert read(Healing(phases=2), scene.with_(loading=protocol(earlier)))["healing"] > 0.0
 
 
-def test_a_peak_after_the_next_step_is_none_of_the_hold():
-    """The load point moves on too briefly for friction to peak before it steps up."""
-    rows = [
-        {"velocity": 0.0, "duration": 100.0},
-        {"velocity": 1.0, "distance": 0.5},
-        {"velocity": 10.0},
-    ]
-    scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
-    outcome = Healing(phases=2)(scene, Accuracy())
-    assert (outcome.status, outcome.message[:7]) == (Status.NOT_APPLICABLE, "no peak")
-    alone = read(Healing(phases=2), Scene(law="slowness", **PLAIN, hold_time=100.0))
-    assert outcome.values["relaxation"] == pytest.approx(alone["relaxation"], rel=1e-12)
-
-
 def test_friction_that_still_changes_has_not_settled():
     """However few steps the integrator took."""
     scene = Scene(law="slip", **PLAIN, velocity_steps=1, velocity_ratio=1.5)

@@ -16,10 +16,9 @@ from running import FAULTY, called, claimed, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli import terminal
 from rsfstudy.cli.console import console
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, RunError
-from rsfstudy.files import contents, restore, store
+from rsfstudy.errors import DataError, InvalidValue, RunError
+from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
 from rsfstudy.status import Status
@@ -66,16 +65,6 @@ KINDS = {
     "spans of time": lambda shape: np.full(shape, np.timedelta64(10**9, "ns")),
 }
 _JSON = ("declaration", "provenance")
-
-
-def places(value, at=()):
-    """Where something stands in plain data."""
-    if at:
-        yield at
-    if isinstance(value, dict | list):
-        parts = value.items() if isinstance(value, dict) else enumerate(value)
-        for key, part in parts:
-            yield from places(part, (*at, key))
 
 
 def attributes(dataset):
@@ -126,32 +115,6 @@ def sealed(dataset, path: Path) -> str:
         warnings.simplefilter("ignore")  # of xarray, on what it writes
         store.write(dataset, path)
     return str(path)
-
-
-def used(dataset):
-    """What commands do with results, short of drawing and computing."""
-    with contextlib.suppress(RsfStudyError):
-        contents.check(dataset)
-        terminal.results(dataset, "tiny.nc")
-        terminal.checked(dataset)
-        restore.study_of(dataset)
-
-
-def test_whatever_is_missing(tiny, capsys):
-    """Each attribute of the file and each part of what their JSON says; each that describes
-    variables, from all of them; and each variable.
-    """
-    for at in places(attributes(tiny)):
-        if len(at) > 1 and at[0] == "":
-            used(store.clean_attributes(with_other_attributes(tiny, at, removed)))
-    for description in {name for values in tiny.variables.values() for name in values.attrs}:
-        other = tiny.copy(deep=True)
-        for values in other.variables.values():
-            values.attrs.pop(description, None)
-        used(store.clean_attributes(other))
-    for name in tiny.variables:
-        used(store.clean_attributes(tiny.drop_vars(name)))
-    assert "reproduced" in capsys.readouterr().out
 
 
 def refused(file, complaint) -> None:
