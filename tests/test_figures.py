@@ -329,14 +329,6 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     assert (tmp_path / "mine.svg").exists()
 
 
-def test_run_takes_a_format_and_a_style(tmp_path, monkeypatch):
-    words = ["rate_step_boundary", "--serial", "--set", "b_over_a=2,3", "--output", tmp_path]
-    ran = call("run", *words, "--figure", "pdf", "--style", "grayscale")
-    assert ran.returncode == 0, ran.stderr
-    assert (tmp_path / "rate_step_boundary.pdf").read_bytes().startswith(b"%PDF")
-    assert not (tmp_path / "rate_step_boundary.png").exists()
-
-
 # ---- words and numbers --------------------------------------------------------------------------
 
 

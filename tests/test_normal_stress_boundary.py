@@ -150,14 +150,6 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     assert abs(value - forward) <= error + its_error
 
 
-def test_a_fluid_is_surveyed():
-    """Two more unknowns: by motions, and more stable the more pores open."""
-    fault = Scene(**IMPOSED, a=0.01, b_over_a=1.5, stiffness_ratio=0.6, alpha=0.2)
-    drained = found(fault, accuracy=Accuracy(1e-3))[0]
-    dilatant = fault.with_(fluid="dilatant", dilatancy=0.002, drainage=1.0)
-    assert found(dilatant.with_(stiffness=fault.stiffness), accuracy=Accuracy(1e-3))[0] < drained
-
-
 @pytest.mark.parametrize(
     ("fields", "published"),
     [

@@ -10,7 +10,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path, up_to
+from rsfstudy.motion.recording import READ, Recording
 from rsfstudy.status import Status
 
 #: What values may be off by, in the accuracy asked for, times what weighs as much as 1 in ln V.
@@ -75,21 +75,3 @@ def test_the_extremes_of_a_cycle_are_points_of_its_orbit(law, fields):
     # the spring has all that the load point moved and the slider did not
     moved = scene.load_velocity * found["time"] - found["slip"]
     assert stress - stress[0] == pytest.approx(scene.stiffness * moved, abs=1e-9 * scene.a)
-
-
-def test_a_polynomial_goes_through_the_rows_of_a_step():
-    """Exactly, for one of its degree; and what is cut off within a step goes on to the cut."""
-    part = np.arange(13) / 6.0
-    table = np.zeros((13, len(READ) + 4))
-    table[:, 0], table[:, 2] = part, part**5 - part
-    table[1:, len(READ) + 1] = [*range(1, 7), *range(1, 7)]
-    last = np.zeros(len(READ) + 4)
-    last[0], last[2] = 1.3, 1.3**5 - 1.3
-    cut = up_to(table, last)
-    assert cut[:, 0] == pytest.approx([*part[:7], *(1.0 + 0.05 * np.arange(1, 7))], abs=1e-12)
-    assert cut[:, 2] == pytest.approx(cut[:, 0] ** 5 - cut[:, 0], abs=1e-12)
-    path = along_path(cut, 21, OBSERVED)
-    lowest = 5.0**-0.25
-    assert path["time"][path["log10_slip_rate"].argmin()] == pytest.approx(lowest, abs=1e-7)
-    assert path["log10_slip_rate"] == pytest.approx(path["time"] ** 5 - path["time"], abs=1e-12)
-    assert (path["time"][0], path["time"][-1]) == (0.0, 1.3)

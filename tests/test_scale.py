@@ -16,7 +16,6 @@ from rsfstudy import plots
 from rsfstudy.compute import plan
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import pieces
-from rsfstudy.slider.scene import Scene
 
 
 @functools.cache
@@ -29,22 +28,6 @@ def in_memory() -> xr.Dataset:
 def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
     """Peak memory of a process that runs 15,000 cells, beyond that of one that has run 100."""
     assert apart(15_000, 0, format)["bytes"] < 1000
-
-
-def test_a_plan_holds_no_scenes(monkeypatch):
-    """Each scene is made once to be checked and once to be computed."""
-    made = []
-    check = Scene.__init__
-
-    def counted(self, *parts, **fields):
-        made.append(1)
-        check(self, *parts, **fields)
-
-    study = declared(cells=1000)
-    monkeypatch.setattr(Scene, "__init__", counted)
-    run(study)
-    # and along each axis: for coordinates, in the rehearsal and at the end
-    assert len(made) <= 2 * study.size + 2 * sum(study.shape) + 10
 
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):

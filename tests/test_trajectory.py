@@ -10,7 +10,6 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import Incomplete, NoAnswer
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.recording import REGIME, STATES, strictly_later
 
 
 def test_steady_sliding_stays_steady():
@@ -52,23 +51,6 @@ def test_time_is_an_index_though_stress_jumps():
     assert (np.diff(in_si.time) > 0.0).all()
     nearest = in_si.sel(time=2.0 / scene.reference_rate, method="nearest")
     assert float(nearest.shear_stress) == pytest.approx(7e6 * before)
-
-
-def test_rows_of_one_time_are_told_apart_and_those_that_say_nothing_left_out():
-    """Of two rows that differ in the regime alone the later one stays; times are close to those
-    recorded, and differ in any units.
-    """
-    table = np.zeros((6, STATES + 1))
-    table[:, 0] = [0.0, 0.0, 1e9, 1e9, 1e9, 1e9]
-    table[:, 1] = [0.0, 1.0, 2.0, 2.0, 3.0, 4.0]
-    table[:, REGIME] = [0, 0, 1, 2, 2, 2]
-    kept = strictly_later(table)
-    assert kept[:, 1].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert kept[2, REGIME] == 2
-    np.testing.assert_allclose(kept[:, 0], [0.0, 0.0, 1e9, 1e9, 1e9], rtol=1e-14, atol=1e-280)
-    for units in (1.0, 1.1, 1 / 3, 8.547e7, 1e-9):
-        assert (np.diff(kept[:, 0] * units) > 0.0).all()
-    assert strictly_later(table[:0]).shape == table[:0].shape
 
 
 def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
