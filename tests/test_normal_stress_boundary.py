@@ -203,6 +203,3 @@ def test_coulomb_stresses_add_up():
     assert pulled.status is Status.OK
     left = pulled.values["critical_displacement"] * scene.stiffness
     assert left == pytest.approx(0.5 * scene.mu_star * abs(fallen), rel=1e-4)
-
-
-# ---- bad input, and what users call -------------------------------------------------------------

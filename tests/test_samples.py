@@ -375,6 +375,3 @@ def test_samples_are_drawn_as_histograms_and_scatters(tmp_path):
     other = plots.figure(found, variable="steady_friction")
     assert other.axes[0].get_xlabel() != drawn.axes[0].get_xlabel()
     plots.save(found, tmp_path / "samples.svg")
-
-
-# ---- the command line ---------------------------------------------------------------------------

@@ -1,5 +1,6 @@
-"""Scenes, studies and verdicts as tables of a notebook."""
+"""Scenes, studies and verdicts as tables of a notebook; numbers of a file in the terminal."""
 
+import math
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -7,16 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import run
+from running import call, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
-from rsfstudy.files import numbers
+from rsfstudy.files import numbers, store
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.quantity import symbol, table
+from rsfstudy.status import Status
 
 
 def rows(html):
@@ -111,3 +114,55 @@ def test_the_accessor_shows_numbers_and_verdicts():
         assert words in shown
     for part in (motion.isel(time=0), motion.isel(time=slice(0)), motion[["slip"]]):
         assert "load_velocity_ratio = 2" in part.rsf._repr_html_()
+
+
+# ---- numbers of a file ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def map_of_stiffness():
+    study = study_of(
+        "stiffness",
+        LinearStability(),
+        Axis("law", ["slip", "slowness"]),
+        Axis("b_over_a", np.linspace(1.5, 6.0, 101)),
+    )
+    return run(study)
+
+
+def told_of(dataset, tmp_path, monkeypatch) -> str:
+    monkeypatch.setenv("COLUMNS", "120")
+    store.write(dataset, tmp_path / "it.nc")
+    return call("show", tmp_path / "it.nc").stdout
+
+
+def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
+    said = told_of(map_of_stiffness, tmp_path, monkeypatch)
+    assert "critical stiffness of steady sliding, in sigma_*/D_c (24 of 202 cells)" in said
+    lines = [line.split() for line in said.splitlines()]
+    laws = ("slip", "slowness")
+    rows = [line for line in lines if len(line) > 2 and line[0] in laws and line[1][0].isdigit()]
+    assert len(rows) == 24
+    assert [rows[0][1], rows[11][1]] == ["1.5", "6"]  # both ends
+    for law, ratio, value, *_error in rows:
+        near = map_of_stiffness.sel(law=law).sel(b_over_a=float(ratio), method="nearest")
+        assert float(value) == pytest.approx(float(near.critical_stiffness), rel=1e-7)
+
+
+def test_a_small_one_is_whole_and_names_how_cells_ended(map_of_stiffness, tmp_path, monkeypatch):
+    few = map_of_stiffness.isel(b_over_a=[0, 50]).copy(deep=True)
+    assert "cells)" not in told_of(few, tmp_path, monkeypatch)
+    few["status"][0, 1], few["critical_stiffness"][0, 1] = int(Status.NO_STEADY_STATE), np.nan
+    rows = [line.split() for line in told_of(few, tmp_path, monkeypatch).splitlines()]
+    (row,) = [row for row in rows if row[:2] == ["slip", "3.75"]]
+    assert (row[2], row[-1]) == ("-", "no_steady_state")
+
+
+@pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
+def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
+    at = numbers.sample(sizes, 24)
+    assert math.prod(map(len, at.values())) <= 24
+    for name, size in sizes.items():
+        assert at[name][0] == 0
+        assert len(at[name]) == 1 or at[name][-1] == size - 1
+    assert len(numbers.sample({"x": 5}, 24)["x"]) == 5
