@@ -146,12 +146,6 @@ def formulas_are_set_once():
         yield
 
 
-@pytest.fixture
-def variable() -> Scene:
-    """Slip law with all effects of variable normal stress."""
-    return Scene(normal_stress="variable", alpha=0.56, phi=60.0)
-
-
 @pytest.fixture(scope="session")
 def cluster(tmp_path_factory):
     """A Dask client of two worker processes."""

@@ -228,21 +228,3 @@ def test_the_slurm_script_runs_a_study(tmp_path):
     assert results["law"].values.tolist() == ["slip"]
     accuracy = results.rsf.study.accuracy
     assert (accuracy.rtol, accuracy.engine) == (1e-5, "compiled")
-
-
-def test_the_kubernetes_file_joins_its_parts():
-    """Its commands are those by which the cluster above is started."""
-    service = PARTS["Service", "rsfstudy-scheduler"]["spec"]
-    labels, scheduler = container("rsfstudy-scheduler")
-    workers, worker = container("rsfstudy-workers")
-    assert service["selector"] == labels
-    port = service["ports"][0]["targetPort"]
-    assert {"containerPort": port} in scheduler["ports"]
-    assert str(port) in scheduler["args"]
-    assert f"tcp://rsfstudy-scheduler:{service['ports'][0]['port']}" in worker["args"]
-    policy = PARTS["NetworkPolicy", "rsfstudy"]["spec"]
-    (allowed,) = policy["podSelector"]["matchExpressions"]
-    assert allowed == {
-        "key": "app", "operator": "In", "values": [labels["app"], workers["app"]]
-    }  # fmt: skip
-    assert policy["ingress"] == [{"from": [{"podSelector": policy["podSelector"]}]}]

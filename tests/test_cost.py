@@ -77,12 +77,3 @@ def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
         )
     (tmp_path / FILE).touch()  # its cells would all be computed anew
     assert cost.faster(Plan(MANY), tmp_path) == ""
-
-
-def test_show_and_run_say_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(cost, "_WORTH", 0.0)
-    few = ("rate_step_boundary", "--set", "b_over_a=2", "--output", tmp_path)
-    said = "--engine compiled is about 10 times faster here"
-    assert said in " ".join(call("show", *few).stdout.split())
-    assert f"note: {said}" in " ".join(call("run", *few, "--serial").stderr.split())
-    assert said not in " ".join(call("show", *few).stdout.split())

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty import declared
-from running import FAULTY, HANGS, QUIET, call, run, run_with_failures, study_of
+from running import FAULTY, HANGS, QUIET, call, run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -282,26 +282,11 @@ def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
 
 def test_the_run_passes_it_on(tmp_path):
     """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
-    study = study_of(
-        "budgeted",
-        CriticalStep(of="displacement_step"),
-        Axis("b_over_a", [2.0, 2.5, 3.0, 3.5, 4.0]),
-        base=Scene(normal_stress="constant"),
-        reductions=[LinearFit(name="slope", of="critical_displacement", on="a_over_b_minus_a")],
-    )
-    failing = CriticalStep.find
-
-    def find(self, scene, accuracy, meter):
-        if scene.b_over_a == 3.0:
-            raise ZeroDivisionError
-        return failing(self, scene, accuracy, meter)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CriticalStep, "find", find)
-        assert np.isnan(run_with_failures(study, output=tmp_path).slope)
-        told = run_with_failures(study, output=tmp_path, despite_failures=True)
-    assert np.isfinite(told.slope)
-    assert rsfstudy.open("budgeted", tmp_path).attrs["reduced_despite"]
+    study = replace(declared("raises", at=(3.0,), cells=6), reductions=FIT)
+    assert np.isnan(run_with_failures(study, output=tmp_path).slope)
+    told = run_with_failures(study, output=tmp_path, despite_failures=True)
+    assert float(told.slope) == pytest.approx(1.0, rel=1e-14)
+    assert rsfstudy.open("faulty", tmp_path).attrs["reduced_despite"]
 
 
 def test_workers_that_never_come(monkeypatch):

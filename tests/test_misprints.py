@@ -58,17 +58,3 @@ def test_eq_11():
     assert quoted is not None
     numbers = [float(n) for n in re.findall(r"\d\.\d", quoted[1])]
     np.testing.assert_allclose(100.0 * short[1:], numbers, atol=0.051)
-
-
-def test_the_axis_of_figure_5():
-    dataset = rsfstudy.run(
-        "rate_step_boundary",
-        case=["constant normal stress", "alpha = 0.56"],
-        b_over_a=[1.25, 2.0, 5.0],
-        workers=0,
-        output=None,
-        progress=False,
-    )
-    low, one, high = dataset.lowering.sel(case="alpha = 0.56").values  # b/a: 1.25, 2, 5
-    assert (high, one) == (pytest.approx(0.063, abs=5e-4), pytest.approx(0.170, abs=5e-4))
-    assert low == pytest.approx(0.25, abs=0.01)

@@ -3,7 +3,6 @@
 import numpy as np
 import test_figures as checks
 import xarray as xr
-from matplotlib.figure import Figure
 from running import named_results, run
 
 import rsfstudy
@@ -11,7 +10,6 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text
-from rsfstudy.plots.maps import contours
 
 
 def test_the_picture_of_a_motion_is_printable():
@@ -78,24 +76,3 @@ def test_errors_too_small_to_show_are_left_out():
     assert _text.with_error(1.33333334, 8e-9, 4) == "$1.3333$"
     assert _text.with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
     assert _text.with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"
-
-
-def labelled(at, *coordinates: np.ndarray) -> list[str]:
-    """Labels of the lines at 1, 2 and 3 of values over x and y."""
-    axes = Figure().subplots()
-    axes.set(xlim=coordinates[0][[0, -1]], ylim=coordinates[1][[0, -1]])
-    values = at(*np.meshgrid(*coordinates))
-    points = dict(zip(("x", "y"), coordinates, strict=True))
-    contours(axes, xr.DataArray(values, points, ("y", "x")), [1.0, 2.0, 3.0])
-    return sorted(text.get_text() for text in axes.texts)
-
-
-def test_each_level_is_labelled_once_and_only_where_there_is_room():
-    plane = np.linspace(0.0, 4.0, 30), np.linspace(0.0, 4.0, 30)
-    assert labelled(lambda x, y: x, *plane) == ["1", "2", "3"]
-    # at x = 1, 1.01 and 1.02: a label of one would hide the others
-    assert labelled(lambda x, y: 1.0 + 100.0 * (x - 1.0), *plane) == []
-    # two lines of each level, at either side of y = 2
-    assert labelled(lambda x, y: np.abs(y - 2.0) * 2.0, *plane) == ["1", "2", "3"]
-    # a single cell
-    assert labelled(lambda x, y: 4.0 * (np.hypot(x - 2.0, y - 2.0) < 0.1), *plane) == []

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
-from test_readings import PLAIN
 
-from rsfstudy import Scene, measures, named_studies, protocol, simulate, vocabulary
+from rsfstudy import Scene, measures, named_studies, vocabulary
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.elasticities import Elasticities
@@ -52,28 +51,6 @@ def test_a_peak_stands_above_what_follows_by_more_than_its_error(fields, relaxat
     outcome = Healing(phases=2)(scene, Accuracy(10.0**-digits, engine=COMPILED))
     assert (outcome.status, outcome.message[:7]) == (Status.NOT_APPLICABLE, "no peak")
     assert outcome.values["relaxation"] == pytest.approx(relaxation, rel=10.0**-digits)
-
-
-@pytest.mark.parametrize(("distance", "is_steady"), [(1.0, False), (30.0, True)])
-def test_a_hold_that_does_not_begin_in_steady_sliding_says_so(distance, is_steady):
-    """After a step to 2 V_*, from which friction has evolved over 1 D_c, or 30."""
-    rows = [
-        {"velocity": 2.0, "distance": distance},
-        {"velocity": 0.0, "duration": 50.0},
-        {"velocity": 2.0},
-    ]
-    scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
-    outcome = Healing(phases=2)(scene, Accuracy(1e-5, engine=COMPILED))
-    motion = simulate(scene, duration=distance / 2.0, rtol=1e-8)
-    theta = float(motion.state_variable[-1])
-    rate = float(motion.log10_slip_rate[-1]) * math.log(10.0)
-    assert outcome.status is Status.OK
-    assert (outcome.message == "") is is_steady
-    if not is_steady:
-        # ln V from that of the load point, or the state from -b ln V, over b
-        expected = max(abs(rate - math.log(2.0)), abs(theta / scene.b + rate))
-        told = float(outcome.message.split("but ")[1].split()[0])
-        assert told == pytest.approx(expected, rel=0.05)  # it is told with two digits
 
 
 def drawn(number: int) -> Scene:

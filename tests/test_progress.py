@@ -34,14 +34,6 @@ def clock(monkeypatch):
     return goes
 
 
-def test_a_log_file_gets_a_line_for_each_tenth(monkeypatch, clock):
-    clock(1.0)
-    lines = told(io.StringIO(), monkeypatch, list(range(1001))).splitlines()
-    assert lines == [
-        f"holds: {count:,} of 1,000 cells after {count + 1} s" for count in range(100, 1001, 100)
-    ]
-
-
 @pytest.mark.parametrize(("by", "lines"), [(0.005, 1), (0.11, 10), (5.0, 10)])
 def test_lines_are_few(by, lines, monkeypatch, clock):
     """A run of 10 s, or less, has its last one; a long one has no more than ten."""

@@ -23,7 +23,6 @@ from running import (
     run,
     run_with_failures,
     same_numbers,
-    until,
     until_kept,
 )
 
@@ -165,18 +164,6 @@ def test_a_signal_ends_a_motion_with_one_line(tmp_path):
     code, _out, said = ended(process)
     assert (code, said) == (128 + signal.SIGTERM, "error: ended by SIGTERM\n")
     assert not list(tmp_path.iterdir())
-
-
-def test_ctrl_c_while_the_workers_start(tmp_path):
-    """They never see it, and the run ends in order once they are there."""
-    words = ("run", FAULTY, "--workers", "1", "--output", tmp_path)
-    process = command(*words, FAULT="hangs")
-    until(lambda: any("spawn_main" in words for words in children(process)), process)
-    os.killpg(process.pid, signal.SIGINT)
-    code, _out, said = ended(process)
-    assert code == 1
-    assert "0 of 4 cells are finished and kept in" in said
-    assert len(said.splitlines()) == 1, said
 
 
 def test_workers_that_cannot_start(tmp_path):

@@ -34,9 +34,9 @@ def test_every_synonym_leads_to_a_field_or_law_that_is_there():
     assert set(synonyms._LAWS.values()) <= set(laws.PARTS)
 
 
-def test_a_scene_cannot_be_changed(variable):
+def test_a_scene_cannot_be_changed():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        variable.a = 0.01
+        Scene().a = 0.01
 
 
 def test_table_1_is_the_default():

@@ -1,7 +1,6 @@
 """Shear stress that lowers the state variable (Nagata et al. 2012), on top of any law."""
 
 import math
-from dataclasses import dataclass
 
 import pytest
 from conftest import cot_phi
@@ -17,7 +16,6 @@ from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import relation_of
-from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -53,29 +51,6 @@ def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
     shift, small = relation_of(scene)(g)[2], cot_phi(scene) * g
     series = g * (1.0 - small / 2.0 + small**2 / 3.0)
     assert shift == pytest.approx(series, rel=1e-15 + abs(small) ** 3)
-
-
-def worn(friction, ratio, change, p):
-    return 0.25 * friction, 0.25
-
-
-@dataclass(frozen=True, kw_only=True)
-class Worn(SlipLaw):
-    """A law of a user's own with an effect of stress of its own."""
-
-    name = "worn"
-    state_effect = staticmethod(worn)
-
-
-@given(SHEAR)
-def test_three_effects_of_stress_add_up(g):
-    shifts = [
-        relation_of(Scene(law=law, alpha=alpha, stress_dependence=c))(g)[2:]
-        for law, alpha, c in ((Worn, 0.5, 2.0), (Worn, 0.0, 0.0), ("slip", 0.5, 0.0),
-                              ("slip", 0.0, 2.0))
-    ]  # fmt: skip
-    for all_, *each in zip(*shifts, strict=True):
-        assert all_ == pytest.approx(sum(each), rel=1e-14, abs=1e-15)
 
 
 # ---- steady sliding and its stability ------------------------------------------------------------

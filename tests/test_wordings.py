@@ -131,6 +131,15 @@ def claim(**fields) -> Claim:
     return Claim(**{**parts, "published": 1.0, "tolerance": 0.1, "reason": "", **fields})
 
 
+def fitted(**options) -> xr.Dataset:
+    """A fit of 40 rows around one step."""
+    time = np.arange(40.0)
+    moved = np.where(time < 20.0, time, 10.0 * time - 180.0)
+    friction = 0.6 + np.where(time < 20.0, 0.0, 0.01 * np.exp(20.0 - time))
+    record = rsfstudy.read_record({"time": time, "displacement": moved, "friction": friction})
+    return rsfstudy.fit(record, **{"stiffness": 3e-3, "laws": ["slip"]} | options)
+
+
 def own(**declared) -> Measure:
     """A measure of a user's own, that declares something else."""
     usual = {"name": "own", "headline": "total", "variables": {"total": ()}, "typical_work": 1}
@@ -163,7 +172,7 @@ def known() -> dict[str, Any]:
         | {kind.__name__: kind for kind in kinds if kind.__module__.startswith("rsfstudy.")}
         | {"inf": math.inf, "nan": math.nan, "np": np, "pd": pd, "norm": norm, "xr": xr}
         | {"Accuracy": Accuracy, "Output": Output}
-        | {"study": study, "claim": claim, "csv": csv, "RIG": RIG, "in_si": in_si}
+        | {"study": study, "claim": claim, "csv": csv, "fitted": fitted, "RIG": RIG, "in_si": in_si}
         | {"own": own, "measuring": measuring, "Elasticities": Elasticities}
         | {"SimpleNamespace": SimpleNamespace}
         | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
