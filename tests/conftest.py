@@ -41,7 +41,7 @@ sys.dont_write_bytecode = False
 DEAR = (
     "test_studies", "test_resume", "test_doors", "test_faults", "test_clusters", "test_strangers",
     "test_report", "test_compiled", "test_scale", "test_figures", "test_fits_together",
-    "test_notebook", "test_every_law", "test_cli", "test_readme", "test_extensions", "test_site",
+    "test_notebook", "test_statuses", "test_cli", "test_readme", "test_extensions", "test_site",
     "test_two_states", "test_critical_step", "test_fit_command", "test_tables",
 )  # fmt: skip
 

@@ -2,21 +2,18 @@
 never a half-written output.
 """
 
-import os
 import string
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from faulty import declared
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from running import FAULTY, SMALL, call, called, run
 
 import rsfstudy
-from rsfstudy import Scene, plots
+from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.registry import FIELDS
@@ -163,15 +160,3 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
     assert "no figure:" in ran.stderr
     assert "faulty.png" not in ran.stdout
     assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"
-
-
-def test_a_figure_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
-    results = run(declared())
-    plots.save(results, tmp_path / "faulty.png")
-    old = (tmp_path / "faulty.png").read_bytes()
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_bytes", lambda *_args: os.truncate(tmp_path, 0))
-        with pytest.raises(OSError, match="Is a directory"):
-            plots.save(results, tmp_path / "faulty.png")
-    assert (tmp_path / "faulty.png").read_bytes() == old
-    assert os.listdir(tmp_path) == ["faulty.png"]

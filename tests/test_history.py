@@ -3,9 +3,7 @@ they are wrong.
 """
 
 import copy
-import cProfile
 import pickle
-import pstats
 from pathlib import Path
 
 import numpy as np
@@ -99,20 +97,13 @@ def test_a_step_of_normal_stress_at_the_first_sample_is_one():
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_sample_costs_one_step_and_no_python(engine):
-    """Thirteen right-hand sides a sample where the motion needs next to none; and, compiled, not
-    one more call of Python.
-    """
-    work, calls = [], []
-    for samples in (200, 400, 800):  # the first brings in what is imported late
+def test_a_sample_costs_one_step(engine):
+    """Thirteen right-hand sides a sample where the motion needs next to none."""
+    work = []
+    for samples in (400, 800):
         scene = Scene(**PLAIN, loading=history(wave(samples, period=40.0)))
-        with cProfile.Profile() as profile:
-            motion = simulate(scene, times=[20.0], engine=engine)
-        calls.append(pstats.Stats(profile).total_calls)
-        work.append(motion.attrs["rhs_evaluations"])
-    assert work[2] - work[1] < 15 * 400
-    if engine == COMPILED:
-        assert calls[2] == pytest.approx(calls[1], rel=0.02)
+        work.append(simulate(scene, times=[20.0], engine=engine).attrs["rhs_evaluations"])
+    assert work[1] - work[0] < 15 * 400
 
 
 def test_units_of_a_rig(tmp_path):

@@ -208,18 +208,9 @@ def test_b_of_zero_is_refused_where_stress_acts_on_the_state_by_alpha_over_b():
     assert Scene(b_over_a=0.0, alpha=0.0, stiffness=0.02).critical_stiffness == 0.0
 
 
-def test_what_has_no_meaning_at_b_of_zero_or_next_to_it_is_refused_or_answered_by_status():
-    """A stated state without effect, exponents beyond the range of numbers, and readings of an
-    evolution that is none.
-    """
+def test_what_has_no_meaning_at_b_of_zero_or_next_to_it_is_answered_by_status():
+    """Readings of an evolution that is none."""
     plain = {"law": "slowness", "normal_stress": "constant", "stiffness": 0.02}
-    for fields, name in (
-        ({"b_over_a": 0.0, "initial_state": 0.005}, "initial_state"),
-        ({"b_over_a": 1e-140}, "b_over_a"),
-        ({"b_over_a": -5e-324}, "b_over_a"),
-    ):
-        with pytest.raises(InvalidValue, match=f"^{name} = "):
-            Scene(**plain, **fields)
     accuracy = Accuracy(rtol=1e-6, engine="compiled")
     step = Scene(**plain, b_over_a=0.0, load_velocity_ratio=2.0)
     imposed = step.with_(normal_stress="imposed", alpha=0.0, load_velocity_ratio=1.0)

@@ -34,15 +34,6 @@ from rsfstudy.status import Status
             },
             -0.0091962403,
         ),
-        # two runs of which agree, at 1e-4, where there is none
-        (
-            {
-                "law": "slowness", "a": 0.020354240240353517, "b_over_a": 1.25098184688506,
-                "mu_star": 0.7730538549139478, "stiffness_ratio": 21.483804355418357,
-                "hold_time": 2.2445006131031437, "load_velocity_ratio": 0.10814267861994192,
-            },
-            -0.0415820242,
-        ),
     ],
 )  # fmt: skip
 def test_a_peak_stands_above_what_follows_by_more_than_its_error(fields, relaxation, digits):

@@ -1,17 +1,122 @@
-"""What is recorded between steps is as accurate as their ends, and so are orbits along a phase."""
+"""What is recorded of a motion: at times asked for, those times exactly, and what a motion that
+ends there does; between steps, as accurately as at their ends, and so along a phase.
+"""
+
+from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
-from rsfstudy import Scene, simulate
+from rsfstudy import Scene, protocol, simulate
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import READ, Recording
+from rsfstudy.motion.recording import READ, STATES, Recording
 from rsfstudy.status import Status
+
+RTOL = 1e-6
+#: A load point that starts, rests, is displaced as it goes on, and changes its velocity.
+PROTOCOL = protocol(
+    [
+        {"velocity": 2.0, "duration": 3.0},
+        {"velocity": 0.0, "duration": 5.0},
+        {"velocity": 1.0, "step": -0.4, "duration": 4.0},
+        {"velocity": 1.3},
+    ]
+)
+SCENES = {
+    "one segment": Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5),
+    # where stability limits steps
+    "stiff": Scene(stiffness_ratio=30.0, load_velocity_ratio=3.0),
+    "protocol": Scene(loading=PROTOCOL, stiffness_ratio=2.0),
+    "protocol with mass": Scene(loading=PROTOCOL, stiffness_ratio=1.6, inertia=True),
+    "ramp": Scene(law="slowness", normal_stress="imposed", alpha=0.3, stiffness_ratio=3.0,
+                  normal_stress_ramp=0.1, ramp_duration=4.0),
+    "dilatant": Scene(fluid="dilatant", loading=PROTOCOL, stiffness_ratio=2.0),
+}  # fmt: skip
+#: From the beginning on; two within a step, the end of one segment and the beginning of another,
+#: and the time at which the motion ends.
+TIMES = np.array([0.0, 1e-9, 0.7, 0.7000001, 3.0, 3.5, 8.0, 8.0 + 1e-9, 10.0, 12.0, 13.7, 15.0])
+
+
+def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.inf):
+    """What is recorded, and the events of the motion until it is, or ends."""
+    recording, events = Recording(at=times), list[Event]()
+    meter, accuracy = Meter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
+    motion = follow(scene, accuracy, meter, clock=True, until=until, recording=recording)
+    for event in motion:
+        events.append(event)
+        if event.kind is Kind.SAMPLED and math.isinf(until):
+            break
+    return recording.seen(scene), events
+
+
+def row_of(scene: Scene, event: Event) -> list[float]:
+    """What is recorded of an event, from slip on."""
+    point = event.point
+    stresses = (
+        scene.mu_star + point.spring_stress,
+        scene.mu_star + point.friction,
+        point.normal_stress,
+    )
+    log_slip_rate = point.log_slip_rate / math.log(10.0)
+    return [event.slip, log_slip_rate, *stresses, point.state, point.reading]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", SCENES)
+def test_values_are_those_of_motions_that_end_there(name, engine):
+    """Times to the bit. Both runs are right to the tolerance, one by dense output: 30 of it."""
+    scene = SCENES[name]
+    table, events = recorded(scene, engine, TIMES, until=15.0)
+    assert table[:, 0].tolist() == TIMES.tolist()
+    assert [event.kind for event in events].count(Kind.SAMPLED) == 1
+    assert [event.kind for event in events[-2:]] == [Kind.SAMPLED, Kind.END]
+    for time, row in zip(TIMES[1:], table[1:], strict=True):
+        meter, accuracy = Meter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
+        *_, end = follow(scene, accuracy, meter, clock=True, until=time)
+        assert (end.kind, end.time) == (Kind.END, time)
+        states = list(end.point.psis[: len(row) - STATES])
+        expected = [*row_of(scene, end), *states]
+        # relative to changes of one in ln V, and of a in stress and states; slip by that of stress
+        scales = [1.0 + scene.a / scene.stiffness, 1.0, *[scene.a] * (len(expected) - 2)]
+        apart = np.abs([*row[1 : len(READ)], *row[STATES:]] - np.array(expected)) / scales
+        assert apart.max() < 30.0 * RTOL, (time, apart)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engine):
+    """Where the spring jumps with the load point; and what is asked for there once more is told as
+    often.
+    """
+    scene = SCENES["protocol"]
+    table, events = recorded(scene, engine, np.array([8.0, 8.0, 8.0 + 1e-12, 8.5]))
+    (begun,) = (event for event in events if event.kind is Kind.SEGMENT and event.time == 8.0)
+    spring_stress = table[:, READ.index("shear_stress")] - scene.mu_star
+    jump = -0.4 * scene.stiffness
+    assert (
+        spring_stress[0]
+        == spring_stress[1]
+        == pytest.approx(begun.point.spring_stress - jump, rel=1e-12)
+    )
+    assert spring_stress[2] == pytest.approx(begun.point.spring_stress, abs=1e-9 * scene.a)
+    assert events[-1].kind is Kind.SAMPLED
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_lies_beyond_the_end_is_not_recorded(engine):
+    table, events = recorded(SCENES["one segment"], engine, np.array([1.0, 2.0, 3.0]), until=2.0)
+    assert table[:, 0].tolist() == [1.0, 2.0]
+    assert [event.kind for event in events] == [Kind.START, Kind.END]
+
+
+# ---- between the steps ---------------------------------------------------------------------------
 
 #: What values may be off by, in the accuracy asked for, times what weighs as much as 1 in ln V.
 ALLOWED = 30.0

@@ -353,7 +353,7 @@ def test_sobol_indices_are_refused():
 # ---- figures ------------------------------------------------------------------------------------
 
 
-def test_samples_are_drawn_as_histograms_and_scatters(tmp_path):
+def test_samples_are_drawn_as_histograms_and_scatters():
     """A square of what was measured and of the fields, with few ticks however many samples: never a
     name for each.
     """
@@ -372,6 +372,3 @@ def test_samples_are_drawn_as_histograms_and_scatters(tmp_path):
             line = axes.lines[-1]
             np.testing.assert_array_equal(line.get_xdata(), found[x].values.ravel()[-256:])
             np.testing.assert_array_equal(line.get_ydata(), found[y].values.ravel()[-256:])
-    other = plots.figure(found, variable="steady_friction")
-    assert other.axes[0].get_xlabel() != drawn.axes[0].get_xlabel()
-    plots.save(found, tmp_path / "samples.svg")

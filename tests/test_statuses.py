@@ -1,4 +1,4 @@
-"""Answers without a number, and what could not be found out: each measure names them."""
+"""Every measure answers for every law; and names what has no number, or could not be found out."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.slider import laws
 from rsfstudy.status import Status
 
 UP, DOWN = CriticalStep(), CriticalStep(direction="down")
@@ -117,3 +119,48 @@ def test_what_has_no_number_is_named(measure, fields, status, message):
     assert outcome.message
     assert message in outcome.message
     assert not np.isfinite(outcome.values.get(measure.headline, math.nan)).any()
+
+
+# ---- every law -----------------------------------------------------------------------------------
+
+#: What is asked of a slider, and of which one.
+QUESTIONS = {
+    "rate step": (CriticalStep(), {"stiffness_ratio": 1.25}),
+    "displacement step": (CriticalStep(of="displacement_step"), {"stiffness_ratio": 1.25}),
+    "cycle": (LimitCycle(phases=2), {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}),
+    "response": (StepResponse(peaks=3), {"stiffness_ratio": 1.1, "load_velocity_ratio": 1.5}),
+    "rigid": (RigidResponse(), {"load_velocity_ratio": 10.0}),
+    "stability": (LinearStability(), {"load_velocity_ratio": 2.0}),
+}
+SLIDERS = [
+    {"normal_stress": "constant"},
+    {"normal_stress": "variable", "stress_dependence": 1.0, "radiation_damping": 1e-9},
+    {"normal_stress": "variable", "inertia": True},
+]
+#: Each law; and those of two states where one strengthens.
+LAWS = [{"law": law} for law in sorted(laws.PARTS)]
+LAWS += [
+    {"law": law, "a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
+    for law in ("two_slip_states", "two_slowness_states")
+]
+#: Without mass or damping, cycles of most laws run away in a rupture.
+CYCLES_END = (Status.OK, Status.SLIP_RATE_UNBOUNDED)
+#: Each question of each law; every two of question, law and slider meet.
+ASKED = [
+    (question, law, SLIDERS[(row + column) % len(SLIDERS)])
+    for row, question in enumerate(QUESTIONS)
+    for column, law in enumerate(LAWS)
+]
+
+
+@pytest.mark.parametrize(("question", "law", "slider"), ASKED, ids=str)
+def test_every_measure_answers_for_every_law(question, law, slider):
+    measure, fields = QUESTIONS[question]
+    scene = Scene(**law, **slider, **fields)
+    # events of several states take their time
+    engine = COMPILED if question == "cycle" and scene.states > 1 else SCIPY
+    found = measure(scene, Accuracy(1e-4, engine=engine))
+    quasi_static = slider is SLIDERS[0]
+    assert found.status in (CYCLES_END if question == "cycle" and quasi_static else CYCLES_END[:1])
+    if found.status is Status.OK:
+        assert math.isfinite(found.values[measure.headline])

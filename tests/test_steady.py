@@ -11,10 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.critical_step import KINDS, CriticalStep
 from rsfstudy.measures.linear_stability import growth, jacobian
-from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
 from rsfstudy.slider import closed_forms, laws, stability, steady
 from rsfstudy.slider.equations import by_displacement, normal_stress_at
 from rsfstudy.slider.laws.composite import lambert_w
@@ -180,19 +177,3 @@ def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
         assert steady.steady_sliding(scene, slowest + 1e-6) is not None
         assert steady.steady_sliding(scene, slowest - 1e-6) is None
         assert steady.slowest_steady(scene.with_(**CONSTANT)) == -math.inf
-
-
-def test_steps_up_to_a_rate_at_which_sliding_is_less_stable():
-    """Composite law: k_cr rises to 1.8 of that at V_* as V comes to V_c. Above both of its ends and
-    below its top, stiffness is critical to steps in between, as following motions from small steps
-    to large ones finds too.
-    """
-    scene = Scene(law="composite", b_over_a=1.2, stiffness_ratio=1.2, **CONSTANT)
-    tops = [stability.critical_stiffness(scene, x) for x in (0.0, math.log(100.0), math.log(1e5))]
-    assert tops[0] < scene.stiffness < tops[1]
-    assert tops[2] < scene.stiffness
-    measure, accuracy = CriticalStep(), Accuracy(1e-5)
-    found = measure(scene, accuracy).values["critical_velocity_ratio"]
-    steps_ = KINDS["load_velocity_ratio"](scene, 1)
-    surveyed = measure._surveyed(steps_, accuracy, Meter(10**6)).values["critical_velocity_ratio"]
-    assert found == pytest.approx(surveyed, rel=3e-5)
