@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import FAULTY, SMALL, call, called, run
+from running import SMALL, called, run
 
 import rsfstudy
 from rsfstudy import Scene
@@ -151,12 +151,3 @@ def test_an_output_that_cannot_be_written(output, monkeypatch):
     monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)
-
-
-def test_a_figure_that_cannot_be_drawn_leaves_the_results(tmp_path):
-    (tmp_path / "faulty.png").mkdir()
-    ran = call("run", FAULTY, "--serial", "--output", tmp_path)
-    assert ran.returncode == 1
-    assert "no figure:" in ran.stderr
-    assert "faulty.png" not in ran.stdout
-    assert rsfstudy.open("faulty", tmp_path).attrs["completeness"] == "complete"

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from rsfstudy.named_studies.rigid_response import Spread
-from running import named_results
 
 from rsfstudy.reduce import (
     Boundary,
@@ -180,24 +179,3 @@ def test_a_boundary_leaves_out_what_is_nearer_to_the_level_than_its_error():
     assert [float(v[0]) for v in (sharp.r_stable, sharp.r_unstable)] == [0.5, 1.0]
     assert [float(v[0]) for v in (blurred.r_stable, blurred.r_unstable)] == [0.5, 2.0]
     assert float(blurred.r_error[0]) == 0.75
-
-
-# ---- in files and in the terminal ---------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def boundary(tmp_path_factory):
-    return named_results("laws_zeta", tmp_path_factory)
-
-
-def test_zeta_is_within_its_numerical_error_of_the_closed_form(boundary):
-    """Where the standard error alone is several times too small."""
-    dataset, _path = boundary
-    zeta = dataset.sel(normal_stress="constant", law_exponent=0.25)
-    off = abs(float(zeta.zeta) - 4.0 / 3.0)
-    assert float(zeta.zeta_stderr) < 1e-8
-    # the largest cell is known to 1e-7 of itself: to 3e-7, over its a/(b-a) of 1
-    assert off <= float(zeta.zeta_error) < 3e-7
-    assert set(dataset.zeta.attrs["ancillary_variables"].split()) == {
-        f"zeta_{end}" for end in ("error", "stderr", "misfit", "points")
-    }

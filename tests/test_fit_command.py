@@ -17,7 +17,6 @@ from running import call
 import rsfstudy
 from rsfstudy.api import fit_results
 from rsfstudy.api.fit_results import with_error
-from rsfstudy.errors import DataError
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
 #: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
@@ -211,8 +210,3 @@ def test_the_page_says_how_good_its_fit_is(tmp_path, monkeypatch):
     off = float(wrong.slip_distance) - TRUE["slip_distance"]
     assert 7.0 < off / float(wrong.slip_distance_stderr) < 9.0
     assert float(wrong.criterion - right.criterion) == pytest.approx(48.6, abs=0.5)
-
-
-def test_what_is_no_fit_says_so():
-    with pytest.raises(DataError, match="no fit"):
-        rsfstudy.simulate(rsfstudy.Scene(hold_time=1.0), duration=1.0).rsf.table()

@@ -51,20 +51,6 @@ def test_an_extreme_law():
     assert start == pytest.approx(math.asinh(2.0 * q), abs=(error + 1e-7 * abs(value)) / scene.a)
 
 
-def test_the_closed_form_takes_the_first_of_several_roots():
-    """Falls so large that critical stiffness falls below that of the spring are stable again by
-    the slowness law, where no norm is in the way; some stiffnesses leave none.
-    """
-    numbers = (0.76, 0.0145, 2.0, 0.0, 1.0)
-    first = closed_forms.normal_stress_step(*numbers, 0.9)
-    assert -0.06 < first < -0.05
-    last = 1.0 / 1.1105
-    assert closed_forms.after_fall(*numbers[:4], 1.0 / last) < closed_forms.threshold(
-        1.0, 0.9 / last
-    )
-    assert math.isnan(closed_forms.normal_stress_step(*numbers, 1.0))
-
-
 # ---- all triggers at once -----------------------------------------------------------------------
 
 
@@ -166,13 +152,6 @@ def test_rises_under_a_load_point_that_moves(fields, published):
     assert value == pytest.approx(published, abs=error + 1e-8)
     held = RISE(scene.with_(load_velocity_ratio=0.0, alpha=0.0), Accuracy(1e-4))
     assert held.status is Status.STABLE_FOR_ALL_STEPS
-
-
-def test_a_rise_may_take_more_from_the_state_than_it_gives_to_friction():
-    """alpha ln s beyond mu_* (1 - 1/s): slip rate jumps up, to the norm where s is 3.5."""
-    value, _error, outcome = found(Scene(**IMPOSED, alpha=0.56, stiffness_ratio=3.0), RISE)
-    assert 2.0 < value < 3.0
-    assert outcome.values["slip_rate_after_step"] > 1.0
 
 
 # ---- what is said of steady sliding after the step ----------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 
-from rsfstudy import Scene, protocol, simulate
+from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.slider.stability import response_to_normal_stress
@@ -125,14 +125,6 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
         assert found["direct_change"] == pytest.approx(-0.3 * math.log1p(step), rel=1e-12)
     assert departures[1] < 0.1 * departures[0] * 1.3
     assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
-
-
-def test_a_protocol_that_steps_too_soon_is_not_read():
-    rows = [{"velocity": 1.0, "normal_stress": 1.1, "duration": 5.0}, {"velocity": 1.0}]
-    scene = Scene(**IMPOSED, stiffness_ratio=20.0, loading=protocol(rows))
-    outcome = NormalStressTransient()(scene, Accuracy(1e-4))
-    assert outcome.status is Status.NOT_APPLICABLE
-    assert read(NormalStressTransient(record=4.0), scene, 1e-4)["apparent_alpha"] > 0.0
 
 
 #: Strong oscillations near critical stiffness, which the slider answers every other time alike.

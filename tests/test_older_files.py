@@ -57,15 +57,6 @@ def test_they_are_computed_again_from_themselves(older):
     assert "python" in table.attrs["differs"]  # which fingerprints did not name
 
 
-def test_what_was_edited_is_told_all_the_same(older, tmp_path):
-    """Though it carries the digests of its variables, which nothing reads any more."""
-    edited = xr.load_dataset(older / "tiny.nc")
-    edited["critical_stiffness"] += 1e-12
-    edited.to_netcdf(tmp_path / "tiny.nc")
-    with pytest.warns(UserWarning, match="tiny.nc has no digest: another program saved it"):
-        rsfstudy.open(tmp_path / "tiny.nc")
-
-
 def test_files_name_their_layout(tmp_path):
     rsfstudy.run("linear_stability", output=tmp_path, workers=0, progress=False, b_over_a=[2.0])
     words = ["simulate", "--set", "load_velocity_ratio=2", "--duration", "0.1", "--output"]

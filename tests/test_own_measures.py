@@ -156,14 +156,3 @@ def test_work_that_is_no_count(count, tmp_path):
     found = rsfstudy.open("own", tmp_path)
     assert found["status"].values.tolist() == [Status.CELL_RAISED] * 2
     assert "must be a whole number from 0 to 2**63 - 1" in found["message"].values[0]
-
-
-def test_an_endless_message_is_cut(tmp_path):
-    class Talking(Own):
-        def find(self, scene, accuracy, meter):
-            return Outcome(Status.OK, {"total": 1.0}, "begin " + "a" * 10**6 + " end")
-
-    (message, _other) = run(study(Talking())).message.values
-    assert message.startswith("begin a")
-    assert message.endswith("a end")
-    assert len(message) < 2100

@@ -147,21 +147,6 @@ def test_what_never_repeats_itself_says_so(engine):
     assert found.values["floquet_multiplier"] == pytest.approx(-1.6183, abs=1e-3)
 
 
-def test_motions_that_still_grow_are_not_said_to_have_no_period():
-    """A thousandth below critical stiffness they take hundreds of events."""
-    found = Bifurcation(transient=16, events=16)(slow(0.999, displacement_step=0.1), Accuracy(1e-6))
-    assert found.status is Status.WORK_BUDGET_SPENT
-    assert "no cycle repeats yet" in found.message
-    assert found.message.endswith("--set transient=32 (transient=) waits for more")
-
-
-def test_a_start_that_no_stress_holds_leads_nowhere():
-    """Spring stress so low that the fault opens."""
-    scene = Scene(law="two_slip_states", load_velocity_ratio=1.0)
-    lost = np.array([-3.0, 0.0, 0.0])
-    assert ReturnMap(scene, Accuracy(), Meter(1000)).events(lost, 1) == []
-
-
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     """Which way a departure begins is forgotten: by derivatives of each event, along more of them.
 

@@ -39,11 +39,8 @@ def test_the_readme_is_read_in_a_few_minutes():
     assert [sentence for sentence in said if len(sentence.split()) > 25] == []
 
 
-def test_links_lead_somewhere():
-    """And the README to each of its pages."""
-    for file in FILES:
-        links = re.findall(r"\]\((?!https?:)([^)#]+)", file.read_text())
-        assert all((file.parent / link).exists() for link in links), file
+def test_the_readme_leads_to_each_of_its_pages():
+    """Whether links lead somewhere is asked of the site."""
     named = re.findall(r"\]\((studies/pages/[^)#]+)", FILES[0].read_text())
     assert {ROOT / name for name in named} == set(FILES[1:])
 

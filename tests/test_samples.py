@@ -139,13 +139,6 @@ def test_the_rows_of_a_table_are_cases(table):
     assert restore.study_of(found).axes[0].rows == Axis("case", TABLE).rows
 
 
-def test_draws_of_other_quantities_set_fields():
-    axis = Axis.cases(
-        {"a": [0.01], "b": [0.03]}, fields={"a": "a", "b_over_a": lambda d: d["b"] / d["a"]}
-    )
-    assert axis.rows == ({"a": 0.01, "b_over_a": 3.0},)
-
-
 def _with_units(tmp_path):
     """One table, stated in each of the ways there are."""
     (tmp_path / "cases.csv").write_text("a (1), slip_distance (um)\n.01, 5\n.012, 10\n")

@@ -187,20 +187,6 @@ def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, 
             again()
 
 
-def test_a_variable_without_a_name_is_shown(tiny, tmp_path):
-    mine = tiny.copy(deep=True)
-    mine["log"] = np.log(mine["critical_stiffness"]).drop_attrs()
-    code, said = called(["show", sealed(mine, tmp_path / "tiny.nc")])
-    assert "log (case, load_velocity_ratio)" in said
-    assert code == 1  # one cell is marked as failed
-
-
-def test_a_cell_of_a_store_by_its_label(tmp_path):
-    run(TINY, output=tmp_path, format="zarr")
-    scene, _outcome = rsfstudy.cell(tmp_path / "tiny.zarr", PLACE)
-    assert (scene.alpha, scene.load_velocity_ratio) == (0.3, 2.0)
-
-
 # ---- paths that are no results ------------------------------------------------------------------
 
 
