@@ -83,6 +83,35 @@ def test_a_measure_of_a_script_reaches_the_workers(tmp_path):
     assert ran.stdout == "[[2. 3.]]\n"
 
 
+UNGUARDED = f"""
+import rsfstudy
+{OWN}
+def main():
+    print(rsfstudy.run(study, workers=1, output=None, progress=False).total.values)
+
+"""
+
+
+@pytest.mark.parametrize("call", ["main()", "for _ in range(1):\n    main()"])
+def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_path):
+    """Before any of them is started."""
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED + call)
+    words = [sys.executable, str(script)]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    line = len(script.read_text().splitlines())
+    assert ran.returncode == 1
+    assert f"worker processes import script.py, and line {line} would run in each" in ran.stderr
+    assert 'below `if __name__ == "__main__":`' in ran.stderr
+    assert ran.stderr.count("Traceback") == 1
+
+
+def test_code_that_workers_do_not_import_needs_no_guard():
+    words = [sys.executable, "-c", UNGUARDED + "main()"]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    assert (ran.returncode, ran.stdout.splitlines()[-1:]) == (0, [" [4. 9.]]"]), ran.stderr
+
+
 def test_accuracy_reaches_the_cells():
     loose, tight = run(rtol=1e-4), run(rtol=1e-9)
     assert (loose.rhs_evaluations < tight.rhs_evaluations).all()
@@ -95,8 +124,7 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
     monkeypatch.setattr(
         workers, "local_cluster", lambda n, file: (started.append(file), start(n, file))[1]
     )
-    with workers.SharedProcesses(1, tmp_path / "workers.log") as shared:
-        where = workers.Workers(1, shared=shared)
+    with workers.Workers(1, log=tmp_path / "workers.log") as where:
 
         def ran(name, fault=""):
             study = replace(declared(fault, (3.0,) if fault else ()), name=name)

@@ -11,7 +11,7 @@ from running import cell_key
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute import cells
-from rsfstudy.compute.plan import Batch, Plan
+from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
@@ -166,7 +166,7 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     monkeypatch.setattr(cells, "_HAND_OVER", np.inf)
     monkeypatch.setattr(task.layout, "finished", lambda *finished: finished)
     monkeypatch.setattr(cells, "computed", lambda _task, cell: (cell, 0.0))
-    found = pickle.loads(cells.on_worker(b"", cells.packed(Batch(plan, numbers))))
+    found = pickle.loads(cells.on_worker(b"", cells.packed(plan, numbers)))
     for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
         scene, changes = study.cell(place)
         assert plan.keys[place].tobytes() == key

@@ -137,8 +137,8 @@ def run(
         despite_failures=despite_failures,
         command=command,
     )
-    where = Workers(workers, client, time_limit)
-    results = prepared(declared, keeping, where, progress)()
+    with Workers(workers, client, time_limit) as where:
+        results = prepared(declared, keeping, where, progress)()
     if failed := runner.failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         text = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
@@ -177,7 +177,7 @@ def prepared(
     )
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent
-    ready = runner.Run(study, keeping, task, workers.threads())
+    ready = runner.Run(study, keeping, task, workers.threads)
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
@@ -318,8 +318,8 @@ def rerun(
         despite_failures="reduced_despite" in theirs.attrs,
         command=f"rsfstudy.rerun {file}",
     )
-    where = Workers(workers, client, time_limit)
-    ours = prepared(declared, keeping, where, progress)()
+    with Workers(workers, client, time_limit) as where:
+        ours = prepared(declared, keeping, where, progress)()
     return compared(theirs, ours)
 
 

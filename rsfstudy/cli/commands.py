@@ -25,7 +25,7 @@ from rsfstudy.cli.options import Given
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
 from rsfstudy.compute.runner import Keeping
-from rsfstudy.compute.workers import SharedProcesses, Workers
+from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue, names, rigs
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
@@ -63,10 +63,8 @@ def run(given: Given) -> int:
         despite_failures=given.despite_failures,
         command=given.command,
     )
-    with _workers(given) as where, contextlib.ExitStack() as stack:
-        if given.every and where.processes and where.client is None:
-            shared = SharedProcesses(where.processes, given.output / "workers.log")
-            where = replace(where, shared=stack.enter_context(shared))
+    log = given.output / "workers.log" if given.every else None
+    with _workers(given, log) as where:
         ready = [(s, runs.prepared(s, keeping, where, not given.quiet)) for s in studies]
         advice = not (given.every or given.quiet)
         for study in studies:
@@ -253,13 +251,15 @@ def _declared(name: str, given: Given) -> Study:
 
 
 @contextlib.contextmanager
-def _workers(given: Given) -> Iterator[Workers]:
-    """Where cells are computed."""
+def _workers(given: Given, log: Path | None = None) -> Iterator[Workers]:
+    """Where cells are computed; `log` is where worker processes write errors."""
     if given.serial and given.scheduler:
         raise click.UsageError("--serial and --scheduler exclude each other")
     nowhere = contextlib.nullcontext()
     with nowhere if given.scheduler is None else existing_cluster(given.scheduler) as client:
-        yield Workers(0 if given.serial else given.workers, client, given.time_limit)
+        processes = 0 if given.serial else given.workers
+        with Workers(processes, client, given.time_limit, log) as workers:
+            yield workers
 
 
 # ---- figures --------------------------------------------------------------------------------

@@ -37,7 +37,7 @@ def in_words(plan: Plan, output: Path) -> str:
     if took is None or not _alike(plan, took) or not took.seconds:
         return f"{text}at a guess {clock(guess)} on one core, but ten times as long is possible"
     cells = len(plan.different)
-    known = [took.seconds[key] for key in plan.named(plan.different) if key in took.seconds]
+    known = [took.seconds[key] for key in plan.keys[plan.different].tolist() if key in took.seconds]
     if len(known) == cells:
         return text + f"took {clock(math.fsum(known))} on one core here last ({kept})"
     missing = (cells - len(known)) * float(np.mean(list(took.seconds.values())))

@@ -13,11 +13,12 @@ import time
 import traceback
 import uuid
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import cloudpickle
+import numpy as np
 
 from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare.cell import Cell, Changes
@@ -34,7 +35,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 if TYPE_CHECKING:
-    from rsfstudy.compute.plan import Batch
+    from rsfstudy.compute.plan import Batches, Plan
 
 #: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
 WAITING = 10.0
@@ -91,17 +92,17 @@ class Task:
 
 
 #: Takes a task and batches, and yields the finished cells, in any order.
-Mapper = Callable[[Task, Iterable["Batch"]], Generator[FinishedCells]]
+Mapper = Callable[[Task, "Batches"], Generator[FinishedCells]]
 
 
-def serial(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
+def serial(task: Task, batches: Batches) -> Generator[FinishedCells]:
     """Compute in this process, one cell after the other. Finished cells are handed over in groups,
     because recording each on its own may cost more than computing it: each group is as large as all
     before it, unless it takes too long.
     """
     finished: FinishedCells = []
     handed_over, since = 0, time.monotonic()
-    for key, changes in (cell for batch in batches for cell in batch.cells()):
+    for key, changes in (cell for some in batches for cell in batches.plan.cells(some)):
         cell = changes.of(task.base)
         outcome, seconds = computed(task, cell, let_through=(KeyboardInterrupt,))
         finished.append(task.layout.finished(key, outcome, seconds))
@@ -172,13 +173,13 @@ def _received(sent: bytes) -> Task:
     return task
 
 
-def packed(batch: Batch) -> bytes:
-    """A batch in as few bytes as possible, because Dask's scheduler keeps what it has passed on.
-    Parts of the user's own are sent by their names; a worker has them from the task.
+def packed(plan: Plan, numbers: np.ndarray) -> bytes:
+    """Cells of a plan in as few bytes as possible, because Dask's scheduler keeps what it has
+    passed on. Parts of the user's own are sent by their names; a worker has them from the task.
     """
     cells = [
         (key, {n: getattr(v, "name", v) for n, v in of_scene.items()}, of_measure)
-        for key, (of_scene, of_measure) in batch.cells()
+        for key, (of_scene, of_measure) in plan.cells(numbers)
     ]
     return zlib.compress(pickle.dumps(cells), level=1)
 

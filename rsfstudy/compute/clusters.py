@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 import contextlib
+import linecache
 import logging
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
@@ -13,12 +16,39 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rsfstudy.errors import RunError, brief
+from rsfstudy.errors import InvalidValue, RunError, brief
 
 #: Time in s to wait for a process of this machine that does not answer.
 _HANGS = 600
 #: What ends a run in order, where it is handled.
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def check_guard(workers: int) -> None:
+    """Refuse a script that worker processes, which import it, would run as well: one whose line
+    that leads here stands below no condition.
+
+    Raises
+    ------
+    InvalidValue
+        Where it is such a script.
+    """
+    main = sys.modules["__main__"]
+    frame: FrameType | None = sys._getframe()
+    while frame and not (frame.f_globals is vars(main) and frame.f_code.co_name == "<module>"):
+        frame = frame.f_back
+    file = getattr(main, "__file__", None)
+    if frame is None or file is None or Path(file).name == "__main__.py":
+        return  # a notebook, python -c and a package's __main__ are not imported
+    line, tree = frame.f_lineno, ast.parse("".join(linecache.getlines(frame.f_code.co_filename)))
+    conditions = (n for n in ast.walk(tree) if isinstance(n, ast.If | ast.IfExp | ast.BoolOp))
+    if not tree.body or any(n.lineno <= line <= (n.end_lineno or line) for n in conditions):
+        return
+    rule = f"worker processes import {Path(file).name}, and line {line} would run in each again"
+    remedy = (
+        'Put what runs below `if __name__ == "__main__":`, or compute in this process: workers=0.'
+    )
+    raise InvalidValue("workers", workers, rule, remedy=remedy)
 
 
 @contextlib.contextmanager

@@ -81,10 +81,10 @@ class Plan:
         self.examples = list(examples.values())
         self.different = np.sort(np.unique(self.keys, return_index=True)[1])
 
-    def named(self, numbers: np.ndarray) -> list[bytes]:
-        """Names of some cells."""
-        names, width = self.keys[numbers].tobytes(), _KEY.itemsize
-        return [names[at : at + width] for at in range(0, len(names), width)]
+    def cells(self, numbers: np.ndarray) -> Iterator[tuple[bytes, Changes]]:
+        """Some cells by their keys, each as what it changes of the study's scene and measure."""
+        keys: list[bytes] = self.keys[numbers].tolist()
+        return zip(keys, map(self.study.changes, numbers.tolist()), strict=True)
 
 
 def _counted(study: Study, number: int, first: InvalidValue) -> InvalidValue:
@@ -110,43 +110,9 @@ def _counted(study: Study, number: int, first: InvalidValue) -> InvalidValue:
     return first
 
 
-class Batch:
-    """Some cells of a plan, to be computed together.
-
-    Parameters
-    ----------
-    plan : Plan
-    numbers : ndarray of int
-        Which.
-    """
-
-    def __init__(self, plan: Plan, numbers: np.ndarray) -> None:
-        self._plan, self._numbers = plan, numbers
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def after(self, count: int) -> Batch:
-        """All but the first."""
-        return Batch(self._plan, self._numbers[count:])
-
-    def singly(self) -> list[Batch]:
-        """Each cell alone."""
-        return [Batch(self._plan, self._numbers[i : i + 1]) for i in range(len(self))]
-
-    @property
-    def keys(self) -> list[bytes]:
-        """Names of the cells."""
-        return self._plan.named(self._numbers)
-
-    def cells(self) -> Iterator[tuple[bytes, Changes]]:
-        """The cells by their names, each as what it changes of the study's scene and measure."""
-        return zip(self.keys, map(self._plan.study.changes, self._numbers.tolist()), strict=True)
-
-
-class Batches(Iterator[Batch]):
-    """Cells in batches that last a fraction of a second each, as far as the cells finished so far
-    can tell; each batch is made when it is asked for.
+class Batches(Iterator[np.ndarray]):
+    """Numbers of cells in batches that last a fraction of a second each, as far as the cells
+    finished so far can tell; each batch is made when it is asked for.
 
     Clocks decide which cells travel together, and nothing else.
 
@@ -160,17 +126,17 @@ class Batches(Iterator[Batch]):
     """
 
     def __init__(self, plan: Plan, cells: np.ndarray, workers: int) -> None:
-        self._plan, self._cells, self._next = plan, cells, 0
+        self.plan, self._cells, self._next = plan, cells, 0
         # several batches for each worker, so that all end at about the same time
         self._most = min(LARGEST_BATCH, math.ceil(len(cells) / (4 * workers)))
         self._timed, self._seconds = 0, 0.0
 
-    def __next__(self) -> Batch:
+    def __next__(self) -> np.ndarray:
         numbers = self._cells[self._next : self._next + self.size()]
         if not len(numbers):
             raise StopIteration
         self._next += len(numbers)
-        return Batch(self._plan, numbers)
+        return numbers
 
     def size(self) -> int:
         """Cells in the next batch: one, until some are finished."""

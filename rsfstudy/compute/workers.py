@@ -8,6 +8,7 @@ its own is blamed.
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import os
 import pickle
@@ -15,9 +16,10 @@ import time
 import warnings
 from collections.abc import Generator, Iterable
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rsfstudy.compute.cells import (
     WAITING,
@@ -29,8 +31,8 @@ from rsfstudy.compute.cells import (
     sendable,
     serial,
 )
-from rsfstudy.compute.clusters import local_cluster
-from rsfstudy.compute.plan import Batch
+from rsfstudy.compute.clusters import check_guard, local_cluster
+from rsfstudy.compute.plan import Batches
 from rsfstudy.defaults import TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Outcome
@@ -46,11 +48,13 @@ TELL, PATIENCE = 30.0, 600.0
 _LOOK = 2.0
 #: How often a cell may kill its worker before it is recorded as the culprit.
 _TRIES = 2
+_LOST = "the Dask scheduler is lost"
 
 
-@dataclass(frozen=True)
-class Workers:
-    """A place where cells are computed.
+class Workers(contextlib.ExitStack):
+    """A place where cells are computed, for one run after the other. Worker processes of this
+    machine are started when the first cell is needed, which takes seconds, and end where the
+    context does.
 
     Parameters
     ----------
@@ -60,45 +64,69 @@ class Workers:
         A Dask cluster to use instead.
     time_limit : float
         CPU time in s that a cell may take on a worker.
-    shared : SharedProcesses, optional
-        Worker processes that other runs use too.
+    log : Path, optional
+        Where processes of this machine write errors, whatever the run.
+
+    Raises
+    ------
+    InvalidValue
+        For what is none of these, and where worker processes would run the user's script again.
     """
 
-    processes: int = 2
-    client: Any = None
-    time_limit: float = TIME_LIMIT
-    shared: SharedProcesses | None = None
-
-    def __post_init__(self) -> None:
-        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
-        if not whole or self.processes < 0:
-            raise InvalidValue("workers", self.processes, "must be a whole number, 0 or more")
-        most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
-        if self.client is None and self.processes > most:
-            rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
-            remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
-            raise InvalidValue("workers", self.processes, rule, remedy=remedy)
-        if self.client is not None and not hasattr(self.client, "submit"):
-            raise InvalidValue("client", self.client, "must be a distributed.Client")
-        limit: object = self.time_limit
+    def __init__(
+        self,
+        processes: int = 2,
+        client: Any = None,
+        time_limit: float = TIME_LIMIT,
+        log: Path | None = None,
+    ) -> None:
+        super().__init__()
+        if not isinstance(processes, int) or isinstance(processes, bool) or processes < 0:
+            raise InvalidValue("workers", processes, "must be a whole number, 0 or more")
+        if client is None and processes > 0:
+            most = max(_ANYWHERE, _A_CORE * (os.cpu_count() or 1))
+            if processes > most:
+                rule = f"must be at most {most} here: {_A_CORE} for each core, or {_ANYWHERE}"
+                remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
+                raise InvalidValue("workers", processes, rule, remedy=remedy)
+            check_guard(processes)
+        if client is not None and not hasattr(client, "submit"):
+            raise InvalidValue("client", client, "must be a distributed.Client")
+        limit: object = time_limit
         if not isinstance(limit, int | float) or not 0.0 < limit <= _LONGEST:
             rule = f"must be a number greater than 0, up to {_LONGEST:g} s"
             raise InvalidValue("time_limit", limit, rule)
+        self.processes, self.client, self.time_limit, self._log = processes, client, time_limit, log
+        self._started: Mapper | None = None
 
+    @property
     def threads(self) -> int:
         """Number of cells that are computed at the same time."""
-        at_a_time = self.processes if self.client is None else threads(self.client)
-        return max(1, at_a_time)
+        return max(1, self.processes if self.client is None else threads(self.client))
 
     def mapper(self, log: Path | None = None) -> Mapper:
         """Mapper that computes batches of cells there; `log` is where processes of this machine
-        write errors.
+        write errors, unless all runs have one file.
         """
         if self.client is not None:
             return on_client(self.client)
-        if self.shared is not None:
-            return self.shared.mapper
-        return on_local_cluster(self.processes, log) if self.processes > 0 else serial
+        return functools.partial(self._on_processes, self._log or log) if self.processes else serial
+
+    def _on_processes(
+        self, log: Path | None, task: Task, batches: Batches
+    ) -> Generator[FinishedCells]:
+        from rsfstudy.compute import worker_log
+
+        try:
+            if self._started is None:
+                file = self.enter_context(worker_log.kept(log))
+                client = self.enter_context(local_cluster(self.processes, file))
+                self._started = on_client(client, str(file))
+            yield from self._started(task, batches)
+        except RunError:
+            self.close()
+            self._started = None  # whoever comes next starts others
+            raise
 
 
 def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
@@ -111,28 +139,48 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
         Where workers write errors, for messages.
     """
 
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
-        sent, new = sendable(task), iter(batches)
-        left: list[Batch] = []  # of batches that a worker returned before their end
-        running: dict[Any, Batch] = {}
-        suspects: list[Batch] = []
+    def mapper(task: Task, batches: Batches) -> Generator[FinishedCells]:
+        sent, plan = sendable(task), batches.plan
+        left: list[np.ndarray] = []  # of batches that a worker returned before their end
+        running: dict[Any, np.ndarray] = {}
+        suspects: list[np.ndarray] = []
+
+        def submit(cells: np.ndarray) -> Any:
+            future = client.submit(on_worker, sent, packed(plan, cells), pure=False)
+            running[future] = cells
+            return future
+
+        def alone(cell: np.ndarray) -> FinishedCells:
+            """Compute a suspect alone; if its worker dies again, the cell is recorded as lost."""
+            (key,) = plan.keys[cell].tolist()
+            for _ in range(_TRIES):
+                _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
+                began = time.monotonic()
+                _finished(client, [future := submit(cell)])
+                del running[future]
+                if (finished := _result(future)) is not None:
+                    return finished
+                if (seconds := time.monotonic() - began) > task.time_limit:
+                    return [task.layout.finished(key, _slow(task), seconds)]
+            return [task.layout.finished(key, _deadly(), math.nan)]
+
         try:
             while True:
                 # no more than keeps the workers busy: the rest would fill the scheduler's memory
                 for _ in range(0 if suspects else 4 + 2 * threads(client) - len(running)):
-                    some = left.pop() if left else next(new, None)
+                    some = left.pop() if left else next(batches, None)
                     if some is None:
                         break
-                    running[client.submit(on_worker, sent, packed(some), pure=False)] = some
+                    submit(some)
                 if running:
                     for future in _finished(client, running):
-                        batch = running.pop(future)
+                        cells = running.pop(future)
                         finished = _result(future)
                         if finished is None:
-                            suspects += batch.singly()
+                            suspects += np.split(cells, len(cells))
                         else:
-                            if len(finished) < len(batch):
-                                left.append(batch.after(len(finished)))
+                            if len(finished) < len(cells):
+                                left.append(cells[len(finished) :])
                             yield finished
                 elif suspects:
                     warnings.warn(
@@ -140,8 +188,7 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
                         f"one at a time (see {log})",
                         stacklevel=2,
                     )
-                    for cell in suspects:
-                        yield _alone(client, task, cell)
+                    yield from map(alone, suspects)
                     suspects = []
                 else:
                     return
@@ -151,16 +198,34 @@ def on_client(client: Any, log: str = "the log of that worker") -> Mapper:
     return mapper
 
 
+def _slow(task: Task) -> Outcome:
+    """The outcome of a cell that took too long."""
+    text = (
+        f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long on the "
+        "clock; the worker's log shows where it was, and --time-limit (time_limit=) allows more"
+    )
+    return Outcome(Status.TIME_LIMIT_SPENT, message=text)
+
+
+def _deadly() -> Outcome:
+    """The outcome of a cell that killed its worker."""
+    text = (
+        f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
+        "than a worker may use"
+    )
+    return Outcome(Status.WORKER_LOST, message=text)
+
+
 def threads(client: Any) -> int:
     """Number of cells that the workers of a client compute at the same time."""
     if client.status == "connecting":  # again
-        raise RunError("the Dask scheduler is lost")
+        raise RunError(_LOST)
     if client.status != "running":
         raise RunError(f"the Dask client is {client.status}: connect one to a cluster")
     try:
         return sum(client.nthreads().values())
     except (OSError, TimeoutError) as error:
-        raise RunError("the Dask scheduler is lost") from error
+        raise RunError(_LOST) from error
 
 
 def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
@@ -194,7 +259,7 @@ def _finished(client: Any, running: Iterable[Any]) -> Iterable[Any]:
                     f"the Dask cluster has had no worker for {PATIENCE:g} s: start some"
                 ) from None
         except CancelledError as error:
-            raise RunError("the Dask scheduler is lost") from error
+            raise RunError(_LOST) from error
 
 
 def _result(future: Any) -> FinishedCells | None:
@@ -214,86 +279,10 @@ def _result(future: Any) -> FinishedCells | None:
     except RunError:
         raise
     except CancelledError as error:
-        raise RunError("the Dask scheduler is lost") from error
+        raise RunError(_LOST) from error
     except Exception as error:
         raise RunError(
             f"the Dask cluster gave up ({type(error).__name__}: {error}). "
             "Its workers need the same rsfstudy"
         ) from error
     return finished
-
-
-def _alone(client: Any, task: Task, batch: Batch) -> FinishedCells:
-    """Compute a suspect cell alone; if its worker dies again, the cell is recorded as lost."""
-    (key,) = batch.keys
-    for _ in range(_TRIES):
-        _finished(client, [client.submit(abs, 0, pure=False)])  # a worker is there
-        began = time.monotonic()
-        future = client.submit(on_worker, sendable(task), packed(batch), pure=False)
-        try:
-            _finished(client, [future])
-            finished = _result(future)
-        finally:
-            client.cancel([future])
-        if finished is not None:
-            return finished
-        seconds = time.monotonic() - began
-        if seconds > task.time_limit:
-            text = (
-                f"no answer within {task.time_limit:g} s of CPU time, or {WAITING:g} times as long "
-                "on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
-                "allows more"
-            )
-            outcome = Outcome(Status.TIME_LIMIT_SPENT, message=text)
-            return [task.layout.finished(key, outcome, seconds)]
-    text = (
-        f"its worker died {_TRIES} times while it computed nothing else: a crash, or more memory "
-        "than a worker may use"
-    )
-    return [task.layout.finished(key, Outcome(Status.WORKER_LOST, message=text), math.nan)]
-
-
-def on_local_cluster(processes: int, log: Path | None) -> Mapper:
-    """Compute on worker processes of this machine, started when the first cell is needed."""
-
-    def mapper(task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
-        with SharedProcesses(processes, log) as started:
-            yield from started.mapper(task, batches)
-
-    return mapper
-
-
-class SharedProcesses(contextlib.ExitStack):
-    """Worker processes of this machine for one run after the other: to start them takes seconds.
-    They are started when the first cell is needed, and end where the context does.
-
-    Parameters
-    ----------
-    processes : int
-        How many.
-    log : Path or None
-        Where they write errors; a temporary file where no name is given.
-    """
-
-    def __init__(self, processes: int, log: Path | None) -> None:
-        super().__init__()
-        self._processes, self._log = processes, log
-        self._started: Mapper | None = None
-
-    def mapper(self, task: Task, batches: Iterable[Batch]) -> Generator[FinishedCells]:
-        """Compute batches of cells there; see `cells.Mapper`."""
-        if self._started is None:
-            self._started = self._start()
-        try:
-            yield from self._started(task, batches)
-        except RunError:
-            self.close()
-            self._started = None  # whoever comes next starts others
-            raise
-
-    def _start(self) -> Mapper:
-        from rsfstudy.compute import worker_log
-
-        file = self.enter_context(worker_log.kept(self._log))
-        client = self.enter_context(local_cluster(self._processes, file))
-        return on_client(client, str(file))
