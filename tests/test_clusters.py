@@ -168,7 +168,7 @@ def test_a_scheduler_lost_in_mid_run(separate, held):
 
 def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
     other = {**provenance.code(), "scipy": "0.1"}
-    monkeypatch.setattr(provenance, "code", lambda _engine: other)
+    monkeypatch.setattr(provenance, "code", lambda *_used: other)
     with pytest.raises(RunError, match=r"a worker has scipy .*, this run 0\.1"):
         run(client=cluster)
 

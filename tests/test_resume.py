@@ -283,7 +283,7 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
 
     run(output=tmp_path)
     other = {**provenance.code(), name: "other"}
-    monkeypatch.setattr(provenance, "code", lambda *_engine: other)
+    monkeypatch.setattr(provenance, "code", lambda *_used: other)
     with pytest.raises(DataError, match=f"{name}: .* there, other now"):
         run(output=tmp_path)
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.api import exchange
 from rsfstudy.api.progress import compile_with_notice, shown
-from rsfstudy.compute import code_digest, provenance, runner
+from rsfstudy.compute import provenance, runner
 from rsfstudy.compute.cells import Task, sendable, serial
 from rsfstudy.compute.runner import Keeping
 from rsfstudy.compute.workers import Workers
@@ -170,10 +170,9 @@ def prepared(
         study.measure,
         study.accuracy,
         workers.time_limit,
-        code=provenance.code(study.accuracy.engine),
         parts=tuple(study.own_parts.values()),
         steppers=own_stepper(study.accuracy.engine),
-        own_code=code_digest.of_classes(*study.own_classes),
+        code=provenance.code(study.accuracy.engine, study.own_classes),
     )
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent

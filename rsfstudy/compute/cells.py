@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import cloudpickle
 import numpy as np
 
-from rsfstudy.compute import code_digest, provenance
+from rsfstudy.compute import provenance
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.names import PACKAGE
 from rsfstudy.defaults import TIME_LIMIT
@@ -64,13 +64,10 @@ class Task:
     accuracy : Accuracy
     time_limit : float
         CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
-    code : mapping
-        Versions of all that decides a number, which every worker must have.
     parts, steppers : tuple of type
         Parts of the slider, and a stepper, that are the user's own.
-    own_code : str
-        Digest of the code of the measure, the parts and the stepper, where they are a user's own:
-        the same.
+    code : mapping
+        Versions, and digests of code, that decide a number: every worker must have the same.
     home : str
         The process that made the task.
     """
@@ -79,10 +76,9 @@ class Task:
     measure: Measure
     accuracy: Accuracy
     time_limit: float = TIME_LIMIT
-    code: Mapping[str, str] = field(default_factory=lambda: provenance.code())
     parts: tuple[registry.Own, ...] = ()
     steppers: tuple[type, ...] = ()
-    own_code: str = "none"
+    code: Mapping[str, str] = field(default_factory=dict)
     home: str = _HERE
 
     @functools.cached_property
@@ -123,20 +119,16 @@ def sendable(task: Task) -> bytes:
         Where the measure, a part of the slider or a stepper cannot be serialized.
     """
     cloudpickle.register_pickle_by_value(importlib.import_module(PACKAGE))
-    for part in task.parts:
-        _dumped(part, "part", part.name)
-    for stepper in task.steppers:
-        _dumped(stepper, "engine", task.accuracy.engine)
-    return _dumped(task, "measure", task.measure.name)
-
-
-def _dumped(value: object, what: str, name: str) -> bytes:
-    try:
-        return bytes(cloudpickle.dumps(value))
-    except Exception as error:
-        rule = f"cannot be sent to a worker ({error})"
-        remedy = "Compute in this process: --serial (workers=0)."
-        raise InvalidValue(what, name, rule, remedy=remedy) from error
+    each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.parts]
+    each += [("engine", task.accuracy.engine, stepper) for stepper in task.steppers]
+    for what, name, value in (*each, ("measure", task.measure.name, task)):
+        try:
+            sent = cloudpickle.dumps(value)
+        except Exception as error:
+            rule = f"cannot be sent to a worker ({error})"
+            remedy = "Compute in this process: --serial (workers=0)."
+            raise InvalidValue(what, name, rule, remedy=remedy) from error
+    return bytes(sent)
 
 
 @functools.lru_cache(maxsize=4)
@@ -155,21 +147,14 @@ def _received(sent: bytes) -> Task:
             f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
             "the workers the files it needs, or put them beside the study file"
         ) from error
-    ours = provenance.code(task.accuracy.engine)
+    used = *task.measure.classes, *task.parts, *task.steppers
+    ours = provenance.code(task.accuracy.engine, used)
     for name, wanted in task.code.items():
         if ours.get(name) != wanted:
             raise RunError(
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
-                "mix. Give the workers the same versions"
+                "mix. Give the workers the same versions and files, and start them again"
             )
-    used = *task.measure.classes, *task.parts, *task.steppers
-    if code_digest.of_classes(*used) != task.own_code:
-        names = " or ".join(one.__name__ if isinstance(one, type) else one.name for one in used)
-        raise RunError(
-            f"a worker has another {names}, or other code it draws on, than "
-            "this run: their numbers would mix. Give the workers the same files, and start them "
-            "again"
-        )
     return task
 
 

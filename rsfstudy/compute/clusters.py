@@ -120,31 +120,26 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         ),
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
-        with _interrupts_held():  # before workers start, because it unblocks signals
-            resource_tracker.ensure_running()
-        started = stack.enter_context(contextlib.ExitStack())
-        started.enter_context(_interrupts_held())
-        try:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.ERROR,
-                plugins=(worker_log.WritesTo(log.resolve()),),
-            )
-        except Exception as error:
-            why = str(error).rstrip(".")
-            raise RunError(
-                f"a worker process could not be started ({why}). Worker processes import the "
-                'script that starts them: call what runs below `if __name__ == "__main__":`, or '
-                "compute in this process, --serial (workers=0)"
-            ) from error
-        stack.enter_context(cluster)
-        started.close()
-        client = stack.enter_context(Client(cluster))
-        yield client
+        resource_tracker.ensure_running()  # before workers start, because it unblocks signals
+        with _interrupts_held():
+            try:
+                cluster = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
+                    scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.ERROR,
+                    plugins=(worker_log.WritesTo(log.resolve()),),
+                )
+            except Exception as error:
+                raise RunError(
+                    f"a worker process could not be started ({str(error).rstrip('.')}). Worker "
+                    "processes import the script that starts them: call what runs below "
+                    '`if __name__ == "__main__":`, or compute in this process, --serial (workers=0)'
+                ) from error
+            stack.enter_context(cluster)
+        yield stack.enter_context(Client(cluster))
 
 
 async def _greeting(address: str) -> None:

@@ -56,13 +56,12 @@ def of_sources(sources: Mapping[str, bytes]) -> str:
     return _digest(_Walk().parts((*sources, *compiled), ()))
 
 
-def with_measure(physics: str, measure: type) -> str:
-    """Digest of the physics and a measure: that of the physics alone, unless the measure stands in
+def with_measures(physics: str, measures: Iterable[type]) -> str:
+    """Digest of the physics and measures: that of the physics alone, unless one of them stands in
     the file of a named study.
     """
-    if not _is_of_a_study(measure.__module__):
-        return physics
-    return _digest((physics, *_Walk().parts(measure, ())))
+    theirs = tuple(measure for measure in measures if _is_of_a_study(measure.__module__))
+    return _digest((physics, *_Walk().parts(theirs, ()))) if theirs else physics
 
 
 def of_classes(*used: object) -> str:

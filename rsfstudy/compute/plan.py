@@ -6,6 +6,7 @@ import functools
 import hashlib
 import math
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -93,20 +94,20 @@ def _counted(study: Study, number: int, first: InvalidValue) -> InvalidValue:
     """
     if number == study.size:
         return first
-    place = np.unravel_index(number, study.shape)
+    place: list[Any] = [*np.unravel_index(number, study.shape)]
     for varied, axis in enumerate(study.axes):
         if not axis.is_numbered:
             continue
-        along = (np.arange(len(axis)) if at == varied else n for at, n in enumerate(place))
-        names = []
-        for cell in np.ravel_multi_index(np.broadcast_arrays(*along), study.shape):
+        place[varied], names = np.arange(len(axis)), Counter[str]()
+        for cell in np.ravel_multi_index(np.broadcast_arrays(*place), study.shape).tolist():
             try:
-                study.cell(int(cell))
+                study.cell(cell)
             except InvalidValue as error:
-                names.append(error.name)
-        by = ", ".join(f"{n} in {names.count(n)}" for n in sorted(set(names)))
-        told = f"{len(names)} of {len(axis)} points of the axis {axis.dimension}"
-        return first.at(f"{told} ({len(names) / len(axis):.2g}) make no meaningful scene, by {by}")
+                names[error.name] += 1
+        by = ", ".join(f"{name} in {count}" for name, count in sorted(names.items()))
+        told = f"{names.total()} of {len(axis)} points of the axis {axis.dimension}"
+        share = f"{names.total() / len(axis):.2g}"
+        return first.at(f"{told} ({share}) make no meaningful scene, by {by}")
     return first
 
 

@@ -9,6 +9,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -37,11 +38,18 @@ def sources(package: Path) -> dict[str, bytes]:
 _SOURCES = sources(_PACKAGE)
 
 
-@functools.cache
-def code(engine: str = SCIPY) -> dict[str, str]:
-    """Versions of everything that decides the numbers of a cell in every study, by an engine."""
+def code(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[str, str]:
+    """Versions, and digests of code, that decide the numbers of a cell.
+
+    Parameters
+    ----------
+    engine : str
+    used : iterable of type
+        The classes of the measure, and parts and a stepper of the user's own.
+    """
     return {
-        "physics": code_digest.of_sources(_SOURCES),
+        "physics": _physics(),
+        "own_code": code_digest.of_classes(*used),
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # whose code is digested
         "numpy": version("numpy"),
         "scipy": version("scipy"),
@@ -49,21 +57,24 @@ def code(engine: str = SCIPY) -> dict[str, str]:
     }
 
 
+@functools.cache
+def _physics() -> str:
+    return code_digest.of_sources(_SOURCES)
+
+
 def fingerprint(study: Study) -> dict[str, Any]:
     """All that decides the numbers of a cell, except its scene and its measure's plain fields."""
-    plain, shared = study.measure.plain_fields, code(study.accuracy.engine)
+    plain, accuracy = study.measure.plain_fields, study.accuracy
+    shared = code(accuracy.engine, study.own_classes)
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
-        "own_code": code_digest.of_classes(*study.own_classes),
-        "rtol": study.accuracy.rtol,
-        "budget": study.accuracy.budget,
-        "methods": [list(pair) for pair in study.accuracy.methods],
-        "engine": study.accuracy.engine,
+        "rtol": accuracy.rtol,
+        "budget": accuracy.budget,
+        "methods": [list(pair) for pair in accuracy.methods],
+        "engine": accuracy.engine,
         **shared,
-        "physics": functools.reduce(
-            code_digest.with_measure, study.measure.classes, shared["physics"]
-        ),
+        "physics": code_digest.with_measures(shared["physics"], study.measure.classes),
     }
 
 
