@@ -40,7 +40,7 @@ def place(tmp_path_factory):
 def test_a_motion_names_version_commit_date_and_command(place):
     with xr.open_dataset(place / "rig.nc") as motion:
         source, history = motion.attrs["source"], motion.attrs["history"]
-    assert re.match(rf"rsfstudy {re.escape(provenance._version('rsfstudy'))}, commit \w+", source)
+    assert re.match(rf"rsfstudy {re.escape(provenance.version('rsfstudy'))}, commit \w+", source)
     assert re.match(r"\d{4}-\d\d-\d\dT\S+ .*simulate .*load_velocity_ratio=10", history)
     with xr.open_dataset(place / "cycle.nc") as cycle:
         assert cycle.attrs["history"].endswith(" rsfstudy.limit_cycle")

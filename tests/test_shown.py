@@ -15,7 +15,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
-from rsfstudy.files import numbers, store
+from rsfstudy.files import lattice, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.quantity import symbol, table
@@ -105,7 +105,7 @@ def test_the_accessor_shows_numbers_and_verdicts():
     done = run(catalogue.load("linear_stability").with_(b_over_a=2.0), rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
     assert ["id", "claim", "published", "ours", "tolerance, and why", "verdict"] in shown
-    values = {f"{value:.8g}" for value in done[numbers.headline(done)].values.flat}
+    values = {f"{value:.8g}" for value in done[restore.headline(done)].values.flat}
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1)
@@ -160,9 +160,9 @@ def test_a_small_one_is_whole_and_names_how_cells_ended(map_of_stiffness, tmp_pa
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
-    at = numbers.sample(sizes, 24)
+    at = lattice.sample(sizes, 24)
     assert math.prod(map(len, at.values())) <= 24
     for name, size in sizes.items():
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
-    assert len(numbers.sample({"x": 5}, 24)["x"]) == 5
+    assert len(lattice.sample({"x": 5}, 24)["x"]) == 5

@@ -14,7 +14,7 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
-from rsfstudy.files import contents, numbers
+from rsfstudy.files import contents, lattice, restore
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -112,7 +112,7 @@ def headline(dataset: xr.Dataset) -> Table:
     """The headline along the axes, with its error estimate and how each cell ended; no row where
     there is none.
     """
-    name = numbers.headline(dataset)
+    name = restore.headline(dataset)
     if name is None:
         return Table([])
     dataset = in_units_of_rig(dataset)
@@ -120,7 +120,7 @@ def headline(dataset: xr.Dataset) -> Table:
     dims, columns = dataset["status"].dims, Columns({name: (name, number)})
     if f"{name}_error" in dataset:
         columns["error"] = f"{name}_error", partial(number, form=".1e")
-    at = numbers.sample({str(d): dataset.sizes[d] for d in dims}, MOST_CELLS)
+    at = lattice.sample({str(d): dataset.sizes[d] for d in dims}, MOST_CELLS)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
         columns["status"] = "status", LABELS.__getitem__
@@ -133,7 +133,7 @@ def headline(dataset: xr.Dataset) -> Table:
 def in_short(dataset: xr.Dataset) -> list[str]:
     """The headline and the slopes in a line each, and how cells ended in another."""
     lines, converted = [], in_units_of_rig(dataset)
-    if (name := numbers.headline(dataset)) is not None:
+    if (name := restore.headline(dataset)) is not None:
         values = converted[name if name in converted else renamed(name)]
         told, units = np.unique(values.values[np.isfinite(values.values)]), units_of(values)
         ends = " to ".join(map(short, dict.fromkeys((*told[:1], *told[-1:]))))

@@ -4,6 +4,7 @@ and how: machine, time, command.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import platform
@@ -11,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,7 @@ def provenance(study: Study, command: str) -> dict[str, Any]:
         "declared_in": study.declared_in,
         "versions": {
             "python": platform.python_version(),
-            **{name: _version(name) for name in _DEPENDENCIES},
+            **{name: version(name) for name in _DEPENDENCIES},
         },
         "fingerprint": fingerprint(study),
         "git": git_state(_PACKAGE.parent),
@@ -117,18 +118,11 @@ def attributes(command: str) -> dict[str, str]:
 
 @functools.cache
 def _source() -> str:
-    version, commit = _version("rsfstudy"), git_state(_PACKAGE.parent)
-    return f"rsfstudy {version}, commit {commit}, numerical model of a spring-slider"
+    commit = git_state(_PACKAGE.parent)
+    return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 
 
 _DEPENDENCIES = ("rsfstudy", "numpy", "scipy", "xarray", "dask", "distributed", "netCDF4")
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def git_state(root: Path) -> str:
@@ -145,18 +139,11 @@ def git_state(root: Path) -> str:
             timeout=300,
         ).stdout.strip()
 
-    try:
-        if Path(ask("rev-parse", "--show-toplevel")) != root.resolve():
-            return _built_from()
-        # what runs leave in the checkout changes nothing
-        changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
-        state = "with uncommitted changes" if changed else "clean"
-        return f"{ask('rev-parse', 'HEAD')} {state}"
-    except (OSError, subprocess.SubprocessError):
-        return _built_from()
-
-
-def _built_from() -> str:
-    """The commit that a wheel names, as `stamp` writes it."""
-    stamp = _PACKAGE / "commit.txt"
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        if Path(ask("rev-parse", "--show-toplevel")) == root.resolve():
+            # what runs leave in the checkout changes nothing
+            changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
+            state = "with uncommitted changes" if changed else "clean"
+            return f"{ask('rev-parse', 'HEAD')} {state}"
+    stamp = _PACKAGE / "commit.txt"  # as `stamp` writes it into a wheel
     return stamp.read_text().strip() if stamp.exists() else "none"

@@ -77,10 +77,10 @@ class Run:
     ----------
     study : Study
     keeping : Keeping
+    keeping : Keeping
+    task : Task
     workers : int
         How many cells are computed at a time, to size the tasks.
-    time_limit : float, optional
-        Time in s a cell may take on a worker.
 
     Raises
     ------
@@ -176,7 +176,12 @@ class Run:
                 done += len(finished)
                 progress(done, total)
                 if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
-                    raise _hopeless(done, *row[1:3])
+                    _key, status, message, *_ = row
+                    raise RunError(
+                        f"the first {done} cells all failed, the last with {Status[status].label}"
+                        f"{': ' * bool(message)}{message}. "
+                        "Mend that, or go on all the same with --keep-going (keep_going=True)"
+                    )
 
     def _tell_lost(self, finished: FinishedCells) -> None:
         """Warn of cells that ended their worker."""
@@ -242,14 +247,6 @@ class Run:
             return f"{text}; nothing was to be kept (no output directory)."
         where = self.path(".cells.sqlite")
         return f"{text} and kept in {where}; the same command goes on from there."
-
-
-def _hopeless(cells: int, status: str, message: str) -> RunError:
-    return RunError(
-        f"the first {cells} cells all failed, the last with {Status[status].label}"
-        f"{': ' * bool(message)}{message}. "
-        "Mend that, or go on all the same with --keep-going (keep_going=True)"
-    )
 
 
 def counts(dataset: xr.Dataset) -> Mapping[str, int]:

@@ -5,7 +5,6 @@ their lattices, with their declarations and what made them; and a cell by its pl
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +16,7 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
 from rsfstudy.files.journal import differences
-from rsfstudy.files.numbers import headline
+from rsfstudy.files.restore import headline
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import MEASURED_TIMES
 from rsfstudy.wording import listed
@@ -45,26 +44,22 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """
     both = _finished(theirs) & _finished(ours)
     rows = []
-    for name, a in theirs.data_vars.items():
+    for name, values in theirs.data_vars.items():
         if name in MEASURED_TIMES:
             continue
-        known = np.broadcast_to(True, a.shape)
-        if set(both.dims) <= set(a.dims):
-            known = np.asarray(both.broadcast_like(a).transpose(*a.dims))
-        elif not bool(both.all()):
-            continue  # a reduction that draws on cells missing in one of them
-        e = f"{name}_error"
-        beside = [d[e].values for d in (theirs, ours) if e in d and d[e].dims == a.dims]
-        errors = [values[known] for values in beside if values.shape == known.shape]
-        rows.append(_agreement(name, theirs, ours, known, errors))
+        if set(both.dims) <= set(values.dims):
+            known = both.broadcast_like(values).transpose(*values.dims).values
+            rows.append(_agreement(name, theirs, ours, known))
+        elif bool(both.all()):  # else it may be reduced from cells missing in one of them
+            rows.append(_agreement(name, theirs, ours))
     return _table(rows, *(provenance(dataset)["fingerprint"] for dataset in (theirs, ours)))
 
 
 def of_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """How two motions of one scene agree, as `compared` tells it of studies."""
-    names = [name for name, values in theirs.variables.items() if values.dims]
+    rows = [_agreement(n, theirs, ours) for n, values in theirs.variables.items() if values.dims]
     made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (theirs, ours))
-    return _table([_agreement(name, theirs, ours, ..., []) for name in names], *made)
+    return _table(rows, *made)
 
 
 def _table(
@@ -80,30 +75,28 @@ def _finished(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _agreement(
-    name: Hashable,
-    theirs: xr.Dataset,
-    ours: xr.Dataset,
-    known: Any,
-    errors: Sequence[np.ndarray],
+    name: Hashable, theirs: xr.Dataset, ours: xr.Dataset, known: Any = ...
 ) -> dict[str, Any]:
-    """Agreement of a variable where it is known to both; its error estimates are none, or one for
-    each. Variables agree nowhere that differ in shape, or of which one alone holds real numbers.
+    """Agreement of a variable where it is known to both. Variables agree nowhere that differ in
+    shape, or of which one alone holds real numbers.
     """
     a, b = theirs[name], ours.get(name)
+    found: dict[str, Any] = {"variable": name, "values": a.size, "identical": 0}
     if b is None or a.shape != b.shape or (a.dtype.kind == "f") != (b.dtype.kind == "f"):
-        return {"variable": name, "values": a.size, "identical": 0}
+        return found
     x, y = a.values[known], b.values[known]
     if a.dtype.kind != "f":
-        same, largest = np.asarray(x == y), np.nan
-    else:
-        same = (x == y) | (np.isnan(x) & np.isnan(y))
-        largest = float(np.max(gap)) if (gap := np.abs(x - y)[~same]).size else 0.0
-    beyond = np.nan
-    if len(errors) == 2:
+        return found | {"values": x.size, "identical": int(np.sum(x == y))}
+    gap = np.abs(x - y)
+    same = (x == y) | (np.isnan(x) & np.isnan(y))
+    found |= {"values": x.size, "identical": int(same.sum())}
+    found["largest_difference"] = float(np.max(gap[~same], initial=0.0))
+    errors = [d[f"{name}_error"] for d in (theirs, ours) if f"{name}_error" in d]
+    if [error.shape for error in errors] == [a.shape, a.shape]:
+        allowed = errors[0].values[known] + errors[1].values[known]
         # a number that one of them lacks, or whose error is unknown, is beyond any estimate
-        beyond = int((~same & ~(np.abs(x - y) <= errors[0] + errors[1])).sum())
-    found = (name, same.size, int(same.sum()), largest, beyond)
-    return dict(zip(_COLUMNS, found, strict=True))
+        found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
+    return found
 
 
 # ---- side by side -------------------------------------------------------------------------------
@@ -183,7 +176,7 @@ def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
         origin=differences(*(_origin(dataset) for dataset in both)),
         points=points,
         cells=(int(known.sum()), alone[0], alone[1]),
-        statuses=_statuses(shared, known.values),
+        statuses=_statuses(shared, known),
         numbers=_numbers(shared),
         left_out=left_out,
     )
@@ -245,17 +238,13 @@ def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
     return frame
 
 
-def _statuses(shared: Sequence[xr.Dataset], known: np.ndarray) -> pd.DataFrame:
+def _statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
-    first, second = (one["status"].values for one in shared)
-    places = np.nonzero(known & (first != second))
-    dims = map(str, shared[0]["status"].dims)
-    columns: dict[str, Any] = {
-        d: shared[0][d].values[at] for d, at in zip(dims, places, strict=True)
-    }
-    for name, ended in (("first", first), ("second", second)):
-        columns[name] = [LABELS[code] for code in ended[places].tolist()]
-    return pd.DataFrame(columns)
+    first, second = (one["status"] for one in shared)
+    both = xr.Dataset({"first": first, "second": second, "known": known}).reset_coords(drop=True)
+    frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
+    ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
+    return ended.replace({"first": LABELS, "second": LABELS}).reset_index(drop=True)
 
 
 def _flat(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -324,10 +313,7 @@ def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
             number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
         except (TypeError, ValueError):
             return None
-        if not math.isfinite(number):
-            return None
-        gaps = np.abs(values - number)
-        nearest = int(np.argmin(gaps))
-        return nearest if gaps[nearest] <= 1e-5 * abs(number) else None
+        nearest = int(np.argmin(np.abs(values - number)))
+        return nearest if np.isclose(values[nearest], number, rtol=1e-5, atol=0.0) else None
     places = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
     return int(places[0]) if places.size else None

@@ -12,7 +12,6 @@ import json
 import math
 import sqlite3
 import struct
-import textwrap
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -172,7 +171,7 @@ class Journal:
                     self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
                 return
             told = "; ".join(
-                f"{name}: {_brief(there)} there, {_brief(now)} now"
+                f"{name}: {brief(there, 70)} there, {brief(now, 70)} now"
                 for name, (there, now) in differ.items()
             )
         except (TypeError, ValueError):
@@ -235,25 +234,17 @@ class Journal:
 
     def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[list[int], list[Any]]]:
         """The cells that are known, a group at a time: places of their keys, and their rows."""
-        names, width = np.ascontiguousarray(keys).tobytes(), keys.dtype.itemsize
         for start in range(0, len(keys), _AT_A_TIME):
-            ends = range(start, min(start + _AT_A_TIME, len(keys)))
-            wanted = [names[cell * width : (cell + 1) * width] for cell in ends]
+            wanted: list[bytes] = keys[start : start + _AT_A_TIME].tolist()
             marks = ", ".join("?" * len(wanted))
+            ask = f"SELECT key, {what} FROM cells WHERE key IN ({marks})"
             try:
-                rows = {
-                    key: row
-                    for key, *row in self._db.execute(
-                        f"SELECT key, {what} FROM cells WHERE key IN ({marks})", wanted
-                    )
-                }
+                rows = {key: row for key, *row in self._db.execute(ask, wanted)}
             except sqlite3.Error as error:
                 raise DataError(f"{self._path} is damaged: {error}. {_REMEDY}") from error
-            known = [
-                (cell, rows[key]) for cell, key in zip(ends, wanted, strict=True) if key in rows
-            ]
+            known = [number for number, key in enumerate(wanted) if key in rows]
             if known:
-                yield [cell for cell, _row in known], [row for _cell, row in known]
+                yield [start + number for number in known], [rows[wanted[n]] for n in known]
 
 
 def _fill(columns: Columns, places: list[int], rows: list[Any]) -> None:
@@ -334,11 +325,6 @@ def _checksum(
     # repr keeps texts apart, whatever they hold
     text = f"{key!r} {status!r} {message!r} {work} {known!r} "
     return zlib.crc32(numbers, zlib.crc32(text.encode()))
-
-
-def _brief(value: object) -> str:
-    """A value of a fingerprint, shortened for a message."""
-    return textwrap.shorten(str(value), 70, placeholder="...")
 
 
 def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

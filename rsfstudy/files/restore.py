@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from types import ModuleType
@@ -21,7 +21,7 @@ from rsfstudy.declare import catalogue
 from rsfstudy.declare.figure import figure_name
 from rsfstudy.declare.names import names
 from rsfstudy.declare.study import Study
-from rsfstudy.errors import InvalidValue, brief
+from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.files import contents, loadings
 from rsfstudy.files.contents import (
     Declaration,
@@ -37,6 +37,7 @@ from rsfstudy.reduce import Reduction
 from rsfstudy.rig import reductions as _of_rigs  # noqa: F401  # to be found by its name
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.registry import SLOTS, Own, by_class
+from rsfstudy.vocabulary import coverage
 
 _NAME_IT = "Name the file that declares it: --study FILE (study=)."
 
@@ -214,17 +215,33 @@ def _kind(what: str, base: Any, package: ModuleType, name: str) -> Any:
 
 
 def _kinds(base: Any) -> dict[str, Any]:
-    """The classes of rsfstudy that are derived from `base`, by their names in declarations."""
-    return {
-        vars(kind).get("name") or vars(kind)["kind"]: kind
-        for kind in _members(base)
-        if kind.__module__.partition(".")[0] == __name__.partition(".")[0]
-    }
-
-
-def _members(base: Any) -> Iterator[Any]:
-    """The concrete classes derived from `base`: those with a name in declarations."""
+    """The concrete classes of rsfstudy that are derived from `base`, by their names in
+    declarations.
+    """
+    found: dict[str, Any] = {}
     for kind in base.__subclasses__():
-        yield from _members(kind)
-        if "name" in vars(kind) or "kind" in vars(kind):
-            yield kind
+        found |= _kinds(kind)
+        name = vars(kind).get("name") or vars(kind).get("kind")
+        if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
+            found[name] = kind
+    return found
+
+
+def headline(dataset: xr.Dataset) -> str | None:
+    """The number a dataset is about: what its measure says, or the first that was measured in each
+    cell, where the measure is a user's own; None where no cell has a plain number.
+    """
+    cells = set(dataset["status"].dims)
+    plain = [
+        str(name)
+        for name, values in dataset.data_vars.items()
+        if set(values.dims) == cells
+        and values.dtype.kind == "f"
+        and coverage(str(name)) == "modelResult"
+    ]
+    try:
+        described = contents.declaration(dataset).measure
+        stated = measure(described, "declaration.measure").headline
+    except (DataError, InvalidValue):
+        stated = ""
+    return stated if stated in plain else next(iter(plain), None)

@@ -167,9 +167,7 @@ def read_any(path: Path) -> xr.Dataset:
             dataset = xr.load_dataset(path, engine="netcdf4")
     except DataError:
         raise
-    except (
-        Exception
-    ) as error:  # HDF5, Zarr, netCDF4 and xarray raise almost anything on damaged data
+    except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
     if contents.is_of_a_scene(dataset):
         return dataset  # which users write by xarray, without a digest
