@@ -162,10 +162,18 @@ def check(dataset: xr.Dataset) -> None:
     for variable in _OF_EVERY_LATTICE:
         if variable not in dataset.data_vars:
             raise refused(variable, "is missing")
-    for name in map(str, dataset.variables):
-        if name in QUANTITIES or name in dataset.coords:  # a notebook may have added others
-            _check_kind(name, dataset.variables[name])
-    _check_lattice(dataset)
+        if dataset[variable].dims != dataset["status"].dims:
+            dims = dataset[variable].dims
+            raise refused(variable, f"lies along {dims}, and status along {dataset['status'].dims}")
+    for key, values in dataset.variables.items():
+        if key in QUANTITIES or key in dataset.coords:  # a notebook may have added others
+            _check_kind(str(key), values)
+    for name in map(str, dataset["status"].dims):
+        if name not in dataset.coords or dataset[name].dims != (name,):
+            raise refused(name, "is no coordinate along the dimension of its name")
+    unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
+    if unknown.size:
+        raise refused("status", f"is {unknown[0]} in a cell, which is the code of none")
 
 
 def is_of_a_scene(dataset: xr.Dataset) -> bool:
@@ -289,20 +297,6 @@ def _check_kind(name: str, values: xr.Variable) -> None:
         raise refused(name, f"holds {values.dtype}, and must hold {wanted}")
     if kind == "O" and not all(isinstance(text, str) for text in values.values.flat):
         raise refused(name, f"holds objects, and must hold {wanted}")
-
-
-def _check_lattice(dataset: xr.Dataset) -> None:
-    """Refuse cells without coordinates, and status codes that are unknown."""
-    dims = dataset["status"].dims
-    for name in _OF_EVERY_LATTICE:
-        if dataset[name].dims != dims:
-            raise refused(name, f"lies along {dataset[name].dims}, and status along {dims}")
-    for name in map(str, dims):
-        if name not in dataset.coords or dataset[name].dims != (name,):
-            raise refused(name, "is no coordinate along the dimension of its name")
-    unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
-    if unknown.size:
-        raise refused("status", f"is {unknown[0]} in a cell, which is the code of none")
 
 
 # ---- plain data, checked against annotations -----------------------------------------------------

@@ -55,23 +55,19 @@ def study_of(results: xr.Dataset, file: str | Path | None = None) -> Study:
         if declared_points != points:
             rule = f"has {declared_points} points in the declaration, and {points} in the file"
             raise refused(axis["dimension"], rule)
-    if file is None:
-        about = contents.provenance(results)
-        if has_own_code(results):
-            rule = "is a user's own, and code is never taken from a results file"
-            remedy = _NAME_IT
-            if about["declared_in"]:
-                remedy += f" It was {brief(about['declared_in'])}."
-            of_user = contents.own_part(declared, loadings.held(results))
-            name, value = of_user or ("measure", declared.measure["name"])
-            raise InvalidValue(name, value, rule, remedy=remedy)
-        study = from_declaration(declared, loadings.held(results))
-    else:
-        named = catalogue.load(str(file))
-        if named.name != declared.name:
-            rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
-            raise InvalidValue("study", str(file), rule)
-        study = from_declaration(declared, loadings.held(results), named)
+    held = loadings.held(results)
+    if file is None and has_own_code(results):
+        rule = "is a user's own, and code is never taken from a results file"
+        remedy, named_in = _NAME_IT, contents.provenance(results)["declared_in"]
+        if named_in:
+            remedy += f" It was {brief(named_in)}."
+        name, value = contents.own_part(declared, held) or ("measure", declared.measure["name"])
+        raise InvalidValue(name, value, rule, remedy=remedy)
+    named = None if file is None else catalogue.load(str(file))
+    if named and named.name != declared.name:
+        rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+        raise InvalidValue("study", str(file), rule)
+    study = from_declaration(declared, held, named)
     _check_lattice(study, results)
     return study
 
