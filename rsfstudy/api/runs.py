@@ -176,7 +176,7 @@ def prepared(
     )
     if workers.mapper() is not serial:
         sendable(task)  # raises before any work if it cannot be sent
-    ready = runner.Run(study, keeping, task, workers.threads)
+    ready = runner.Run(study, keeping, task, workers.threads())
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:

@@ -99,7 +99,6 @@ class Workers(contextlib.ExitStack):
         self.processes, self.client, self.time_limit, self._log = processes, client, time_limit, log
         self._started: Mapper | None = None
 
-    @property
     def threads(self) -> int:
         """Number of cells that are computed at the same time."""
         return max(1, self.processes if self.client is None else threads(self.client))
