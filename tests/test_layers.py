@@ -32,7 +32,7 @@ FLOORS = (
 )
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"compute/clusters", "files/store", "files/pieces"},
+    "dask": {"compute/clusters", "files/store", "files/zarr_store"},
     "distributed": {"compute/clusters", "compute/workers", "compute/worker_log"},
     "llvmlite": {"motion/compiled/building", "motion/compiled/calls"},
     "matplotlib": {"plots"},

@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy import plots
 from rsfstudy.compute import plan
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import pieces
+from rsfstudy.files import zarr_store
 
 
 @functools.cache
@@ -74,7 +74,7 @@ def test_the_first_cells_are_a_sample_of_all(count):
 @pytest.mark.parametrize("numbers", [3, 10**6])
 def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch):
     """In pieces of one row, and in one; nothing but the store is left."""
-    monkeypatch.setattr(pieces, "_NUMBERS", numbers)
+    monkeypatch.setattr(zarr_store, "_NUMBERS", numbers)
     in_pieces = run(SMALL, output=tmp_path, format="zarr")
     same_numbers(in_pieces.load().map(plain), in_memory())
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.zarr"]
@@ -91,7 +91,7 @@ def plain(values: xr.DataArray) -> xr.DataArray:
 
 
 def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
-    monkeypatch.setattr(pieces, "_NUMBERS", 100)
+    monkeypatch.setattr(zarr_store, "_NUMBERS", 100)
     options = {"workers": 0, "progress": False, "output": tmp_path, "b_over_a": [2.0, 3.0, 5.0]}
     store = rsfstudy.run("rate_step_boundary", format="zarr", **options)
     file = rsfstudy.run("rate_step_boundary", **options)
@@ -109,8 +109,8 @@ def test_a_store_that_is_there_is_not_replaced(tmp_path):
 
 def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
     """Interrupted between two pieces: nothing stays but the journal, and the command goes on."""
-    monkeypatch.setattr(pieces, "_NUMBERS", 3)
-    original, written = pieces.variables, []
+    monkeypatch.setattr(zarr_store, "_NUMBERS", 3)
+    original, written = zarr_store.variables, []
 
     def interrupted(*words):
         written.append(1)
@@ -119,7 +119,7 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
         return original(*words)
 
     with monkeypatch.context() as patch:
-        patch.setattr(pieces, "variables", interrupted)
+        patch.setattr(zarr_store, "variables", interrupted)
         with pytest.raises(rsfstudy.errors.RunError, match="6 of 6 cells are finished"):
             run(SMALL, output=tmp_path, format="zarr")
     assert os.listdir(tmp_path) == ["small.cells.sqlite"]
@@ -160,6 +160,6 @@ def test_a_chunk_that_is_lost_is_noticed(tmp_path):
 
 
 def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(pieces.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(zarr_store.importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(InvalidValue, match=r"pip install 'rsfstudy\[zarr\]'"):
         run(SMALL, output=tmp_path, format="zarr")

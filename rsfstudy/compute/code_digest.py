@@ -21,7 +21,7 @@ import sys
 import sysconfig
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,7 @@ class _Walk:
         if not _is_followed(function.__module__):
             return
         yield from self._code(function.__code__)
-        cells = [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
+        cells = [cell.cell_contents for cell in function.__closure__ or () if cell != CellType()]
         names = tuple(_names(function.__code__))
         yield from self.parts((function.__defaults__, function.__kwdefaults__, *cells), names)
         for name in names:
@@ -162,7 +162,10 @@ class _Walk:
     def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
         if _is_followed(type(value).__module__):
             kept = {
-                n: v for n, v in getattr(value, "__dict__", {}).items() if not _is_made(value, n)
+                name: part
+                for name, part in getattr(value, "__dict__", {}).items()
+                # what a property has once made of the others
+                if not isinstance(getattr(type(value), name, None), functools.cached_property)
             }
             yield from self.parts(kept, names)
             return
@@ -170,11 +173,6 @@ class _Walk:
             yield pickle.dumps(value, protocol=4).hex()
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
-
-
-def _is_made(value: Any, name: str) -> bool:
-    """True if an attribute keeps what a property has once made of the others."""
-    return isinstance(getattr(type(value), name, None), functools.cached_property)
 
 
 def _is_documented(code: CodeType) -> bool:
@@ -198,14 +196,6 @@ def _names(code: CodeType) -> Iterator[str]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _names(constant)
-
-
-def _is_filled(cell: Any) -> bool:
-    try:
-        cell.cell_contents  # noqa: B018
-    except ValueError:
-        return False
-    return True
 
 
 def _is_followed(name: str | None) -> bool:

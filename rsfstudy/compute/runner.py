@@ -19,7 +19,7 @@ from rsfstudy.compute.plan import Batches, Plan, scattered
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FORMATS
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
-from rsfstudy.files import pieces, store
+from rsfstudy.files import store, zarr_store
 from rsfstudy.files.journal import Columns, Journal
 from rsfstudy.files.lattice import assemble
 from rsfstudy.reduce import reduced
@@ -65,7 +65,7 @@ class Keeping:
         if self.format not in FORMATS:
             raise InvalidValue("format", self.format, "is unknown", choices=FORMATS)
         if self.format == "zarr":
-            pieces.check_installed()
+            zarr_store.check_installed()
             if self.output is None:
                 raise InvalidValue("output", None, "must name a directory for a Zarr store")
 
@@ -142,7 +142,7 @@ class Run:
         """
         keeping = self.keeping
         if keeping.format == "zarr":
-            pieces.check_free(self.path(".zarr"))
+            zarr_store.check_free(self.path(".zarr"))
         path = None if keeping.output is None else self.path(".cells.sqlite")
         fingerprint, layout = self.about["fingerprint"], self.task.layout
         with Journal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
@@ -199,7 +199,7 @@ class Run:
     def _finished(self, journal: Journal) -> xr.Dataset:
         zarr = self.keeping.format == "zarr"
         try:
-            results = self._in_pieces(journal) if zarr else self._reduced(self.lattice(journal))
+            results = self._in_slabs(journal) if zarr else self._reduced(self.lattice(journal))
         except RsfStudyError:
             raise
         except Exception as error:  # of a reduction
@@ -219,11 +219,11 @@ class Run:
         despite = self.keeping.despite_failures
         return reduced(lattice, tuple(self.study.reductions), despite_failures=despite)
 
-    def _in_pieces(self, journal: Journal) -> xr.Dataset:
-        def read(start: int, stop: int) -> Columns:
-            return journal.read(self.plan.keys[start:stop])
+    def _in_slabs(self, journal: Journal) -> xr.Dataset:
+        def read(some: slice) -> Columns:
+            return journal.read(self.plan.keys[some])
 
-        return pieces.write(self.study, read, self.about, self._reduced, self.path(".zarr"))
+        return zarr_store.write(self.study, read, self.about, self._reduced, self.path(".zarr"))
 
     def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
         """Write what is finished, and give the error for a run that ended early."""

@@ -36,7 +36,7 @@ CREATE TABLE IF NOT EXISTS cells (
     checksum INTEGER);
 """
 #: What a journal has no need of, and might act when it is written to.
-_OTHERS = """
+_FOREIGN = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
@@ -136,16 +136,16 @@ class Journal:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 if fresh:
-                    _forget(path)
-            self._db = _alone(path or ":memory:")
+                    _remove(path)
+            self._db = _open_exclusively(path or ":memory:")
             with self._db:
                 self._db.executescript(_TABLES)
-                others = self._db.execute(_OTHERS).fetchall()
+                others = self._db.execute(_FOREIGN).fetchall()
                 row = self._db.execute("SELECT json FROM fingerprint").fetchone()
                 if row is None:
                     self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
         except (OSError, sqlite3.Error) as error:
-            if _is_taken(error):
+            if _is_locked(error):
                 raise DataError(
                     f"another run uses {self._path}: let it end, or choose another --output "
                     "(output=)."
@@ -287,7 +287,7 @@ def timed(path: Path) -> Timed | None:
         return None
 
 
-def _alone(path: Path | str) -> sqlite3.Connection:
+def _open_exclusively(path: Path | str) -> sqlite3.Connection:
     """Open a database for this process alone, until it is closed or the process ends."""
     db = sqlite3.connect(path, timeout=_WAIT)
     try:
@@ -300,19 +300,19 @@ def _alone(path: Path | str) -> sqlite3.Connection:
     return db
 
 
-def _is_taken(error: Exception) -> bool:
+def _is_locked(error: Exception) -> bool:
     return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
 
 
-def _forget(path: Path) -> None:
+def _remove(path: Path) -> None:
     """Remove a journal, unless another run uses it, and the rollback file that an interrupted write
     left beside it.
     """
     if path.exists():
         try:
-            _alone(path).close()
+            _open_exclusively(path).close()
         except sqlite3.Error as error:
-            if _is_taken(error):
+            if _is_locked(error):
                 raise
     for file in (path, path.with_name(f"{path.name}-journal")):
         file.unlink(missing_ok=True)

@@ -27,8 +27,8 @@ _NUMBERS = 4_000_000
 #: How stores are written; consolidated metadata have no specification in Zarr's format 3.
 _STORE: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
-#: What is known of the cells from one number to another, in row-major order.
-Read = Callable[[int, int], Columns]
+#: What is known of some cells, in row-major order.
+Read = Callable[[slice], Columns]
 Reduce = Callable[[xr.Dataset], xr.Dataset]
 
 
@@ -98,7 +98,7 @@ def _write_lattice(study: Study, read: Read, path: Path) -> int:
     how: dict[str, Any] = {"mode": "w-", "encoding": encoding}
     for start in range(0, length, rows):
         some = slice(start, min(start + rows, length))
-        columns = read(some.start * row, some.stop * row)
+        columns = read(slice(some.start * row, some.stop * row))
         slab = variables(study, columns, (some.stop - start, *within))
         coords.isel({first: some}).assign(slab).to_zarr(path, **how, **_STORE)
         how = {"append_dim": first}
