@@ -128,8 +128,7 @@ class Journal:
         *,
         fresh: bool = False,
     ) -> None:
-        self._path = path or Path("memory")
-        self._layout = layout
+        self._path, self._layout = path or Path("memory"), layout
         ours = {**fingerprint, "journal": _FORMAT}
         wanted = json.dumps(ours, sort_keys=True)
         try:
@@ -145,17 +144,14 @@ class Journal:
                 if row is None:
                     self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
         except (OSError, sqlite3.Error) as error:
+            told = f"cannot use {self._path}: {error}. {_REMEDY}"
             if _is_locked(error):
-                raise DataError(
-                    f"another run uses {self._path}: let it end, or choose another --output "
-                    "(output=)."
-                ) from error
-            raise DataError(f"cannot use {self._path}: {error}. {_REMEDY}") from error
+                told = f"another run uses {self._path}: let it end, or choose another --output."
+            raise DataError(told) from error
         if others:
             self._db.close()
-            raise DataError(
-                f"{self._path} holds {brief(others[0][0])}, which is not ours. {_REMEDY}"
-            )
+            found = brief(others[0][0])
+            raise DataError(f"{self._path} holds {found}, which is not ours. {_REMEDY}")
         if row is not None and row[0] != wanted:
             self._accept(row[0], ours)
 
