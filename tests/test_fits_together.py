@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import warnings
 
@@ -116,6 +117,39 @@ def test_two_states_come_back_in_their_order(guess: float) -> None:
     for name in free:
         assert abs(off(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
     assert fit.slip_distance_high < fit.slip_distance_2_low
+
+
+def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
+    """Each by the parameters that it has, as if it were alone; those of others are NaN."""
+    one, options = record(count=150), OPTIONS | {"noise": "white"}
+    own = {"slip": {"b"}, "two_slip_states": {"b1", "b2", "slip_distance_2"}}
+    fits = rsfstudy.fit(one, laws=list(own), **options)
+    effects = set().union(*own.values())
+    for law, names in own.items():
+        fit, alone = fits.sel(law=law), rsfstudy.fit(one, laws=[law], **options).squeeze()
+        assert {n for n in effects if np.isfinite(fit[n])} == names
+        parameters = alone.parameter.values
+        assert {*parameters} & effects == names
+        among = fit.sel(parameter=parameters, other_parameter=parameters)
+        np.testing.assert_array_equal(among.covariance, alone.covariance)
+        assert np.isnan(fit.correlation).sum() == 8**2 - len(parameters) ** 2
+        for name in (*parameters, "criterion", "a_minus_b_stderr"):
+            assert float(fit[name]) == float(alone[name]), name
+        assert fit.rsf.scene == alone.rsf.scene
+        assert {*fit.rsf.draw(2).data_vars} == {*parameters}
+
+
+@pytest.mark.parametrize(
+    ("free", "error"),
+    [
+        (("a", "b"), "names no evolution effect of law='two_slip_states'"),
+        (("a", "law_exponent"), "is no parameter with law='slip' or law='two_slip_states'"),
+        (("slip_distance_2",), "names no parameter of law='slip'"),
+    ],
+)
+def test_parameters_fit_a_law_and_each_law_has_some(free: tuple[str, ...], error: str) -> None:
+    with pytest.raises(InvalidValue, match=re.escape(error)):
+        rsfstudy.fit(record(count=50), laws=["slip", "two_slip_states"], free=free, **OPTIONS)
 
 
 def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:

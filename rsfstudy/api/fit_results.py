@@ -125,10 +125,11 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     one = _only(dataset)
     if not isinstance(n, int) or n < 1:
         raise InvalidValue("n", n, "must be a whole number, 1 or more")
-    names = [str(name) for name in one["parameter"].values]
+    has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
+    names = [str(name) for name in one["parameter"].values[has]]
     at = np.array([one[name].item() for name in names])
-    covariance = one["covariance"].values
-    if not np.isfinite(covariance).all():
+    covariance = one["covariance"].values[np.ix_(has, has)]
+    if not (has.any() and np.isfinite(covariance).all()):
         raise InvalidValue("dataset", status(one), "has no covariance to draw from")
     logs = np.array([name in LOGARITHMIC for name in names])
     scales = np.where(logs, at, 1.0)
@@ -158,7 +159,7 @@ def scene(dataset: xr.Dataset) -> Scene:
     )
     values = parameters_of(first, *distances)
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
-    values |= of_window(found, 1)
+    values |= {n: value for n, value in of_window(found, 1).items() if n in values}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
     return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
 
@@ -281,13 +282,17 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
     law, message = one["law"].item(), str(one["message"].item())
     if message:
         yield f"{law}: {status(one).replace('_', ' ')}: {message}"
-    spreads = {n: one[f"{n}_windows"] for n in shown(one) if f"{n}_windows" in one}
+    spreads = {n: one[f"{n}_windows"].item() for n in shown(one) if f"{n}_windows" in one}
     if spreads:
-        each = ", ".join(f"{SHORT[plain(n)][0]} {v.item():.2g}" for n, v in spreads.items())
+        told = {n: v for n, v in spreads.items() if not math.isnan(v)}
+        each = ", ".join(f"{SHORT[plain(n)][0]} {v:.2g}" for n, v in told.items())
         yield f"{law}: among windows parameters differ by {each}"
     if "posterior" in one and math.isfinite(one["autocorrelation_time"].item()):
         drawn = one["posterior"].quantile([0.025, 0.975], "draw")
-        ends = {n: drawn.sel(parameter=n).values for n in map(str, one["parameter"].values)}
+        ends = {
+            str(p.values): drawn.sel(parameter=p).values
+            for p in drawn.dropna("parameter").parameter
+        }
         short = shown(one)
         each = ", ".join(
             f"{short[n][0]} {low:.4g} to {high:.4g}" for n, (low, high) in ends.items()

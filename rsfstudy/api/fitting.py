@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
@@ -25,8 +26,11 @@ from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene
 
-#: What is looked for unless something else is asked for.
-FREE = ("a", "b", "slip_distance", "mu_star", "trend1")
+#: What is looked for unless something else is asked for, of those that any of the laws has.
+FREE = ("a", "b", "b1", "b2", "slip_distance", "slip_distance_2", "mu_star", "trend1")
+#: Those of which a law has its own, and what is said of them.
+_EFFECTS = ("b", "b1", "b2")
+_STATES = "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
 #: Shortest of several windows, as a part of what follows a step.
@@ -42,7 +46,7 @@ def fit(
     rig: Laboratory | None = None,
     *,
     laws: Sequence[str] = ("slip", "slowness"),
-    free: Sequence[str] = FREE,
+    free: Sequence[str] | None = None,
     steps: Sequence[int] = (),
     together: bool = False,
     before: Any = 0.0,
@@ -70,10 +74,11 @@ def fit(
         Its stiffness is that of the machine, its slip distance the first guess.
     laws : sequence of str
         State evolution laws, a fit by each.
-    free : sequence of str
+    free : sequence of str, optional
         What to look for: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` of laws with two
-        states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent``,
-        ``step_time``, and ``trend1``, ``trend2`` and so on.
+        states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent`` (of
+        "family"), ``step_time``, and ``trend1``, ``trend2`` and so on. Each law is fitted with
+        those that it has. By default a, all b and slip distances, ``mu_star`` and ``trend1``.
     steps : sequence of int
         Numbers of the steps to fit, from 1; all of them, if none is given. ``record.steps()``
         lists them.
@@ -127,8 +132,9 @@ def fit(
     Raises
     ------
     InvalidValue
-        For parameters that a law does not have, no stiffness, records without steps, steps outside
-        of the record, a load point that moves back, and alpha at constant normal stress.
+        For parameters that no law has, a law of which none is named, no stiffness, records without
+        steps, steps outside of the record, a load point that moves back, and alpha at constant
+        normal stress.
 
     Warns
     -----
@@ -153,15 +159,15 @@ def fit(
         for number in numbers:
             _check_step(one, number)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
-    if "alpha" in free:
+    if "alpha" in (free or ()):
         _check_stressed(records, loading)
         scene = {"normal_stress": "imposed", **scene}
-    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
-    _check_free(free, laws, first)
+    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free or (), records[0]) * guess)
+    sought = _of_laws(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
     measure = Fit(
         records=records,
-        free=tuple(free),
+        free=sought,
         slip_distance_guess=guess,
         slip_distance_2_guess=10.0 * guess,
         step=numbers[0],
@@ -287,21 +293,22 @@ def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: floa
     return Scene(**fields)
 
 
-def _check_free(free: Sequence[str], laws: Sequence[str], scene: Scene) -> None:
-    """Refuse parameters that a law does not have."""
-    for law in laws:
-        states = (scene if law == scene.law else scene.with_(law=law)).parts.law.states
-        wrong = {"b1", "b2", "slip_distance_2"} if states == 1 else {"b"}
-        if law != "family":
-            wrong.add("law_exponent")
-        if scene.parts.normal_stress.name == "constant":
-            wrong.add("alpha")
-        for name in free:
-            if name in wrong:
-                remedy = "Fit laws of one and of two states one after the other."
-                remedy += " Two states have b1, b2, slip_distance and slip_distance_2."
-                rule = f"is no parameter with law={law!r}"
-                raise InvalidValue("free", name, rule, remedy=remedy if name[0] in "bs" else "")
+def _of_laws(stated: Sequence[str] | None, laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
+    """What is looked for: those stated, of which each law has some, and each some law."""
+    free = tuple(FREE if stated is None else stated)
+    check_free(free)
+    own = {law: of_law(scene.with_(law=law), free) for law in laws}
+    shared = tuple(name for name in free if any(name in names for names in own.values()))
+    for name in free if stated is not None else ():
+        if name not in shared:
+            rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
+            remedy = _STATES if name in (*_EFFECTS, "slip_distance_2") else ""
+            raise InvalidValue("free", name, rule, remedy=remedy)
+    for law, names in own.items():
+        if not names or ({*_EFFECTS} & {*free} and not {*_EFFECTS} & {*names}):
+            rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
+            raise InvalidValue("free", free, rule, remedy=_STATES)
+    return shared
 
 
 def _micrometres(name: str, value: Any) -> float:

@@ -90,9 +90,9 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
 @_listed("--law", "laws", default="slip,slowness", words="State evolution laws, a fit by each.")
 @_listed(
     "--free",
-    default="a,b,slip_distance,mu_star,trend1",
-    words="Parameters to look for; also stiffness, step_time, trend2, alpha; of two states b1, b2 "
-    "and slip_distance_2 in place of b; of law=family law_exponent.",
+    words="Parameters to look for, of which each law is fitted with those that it has; also "
+    "stiffness, step_time, trend2, alpha; of law=family law_exponent.  [default: a, b (b1 and b2 "
+    "of two states), slip_distance (slip_distance_2), mu_star, trend1]",
 )
 @_listed("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
 @click.option(

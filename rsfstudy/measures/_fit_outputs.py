@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from rsfstudy.analysis.fitting.joint import plain
-from rsfstudy.analysis.fitting.model import PARAMETERS
+from rsfstudy.analysis.fitting.model import OF_SOME_LAWS, PARAMETERS
 from rsfstudy.analysis.fitting.record import COLUMNS
 from rsfstudy.quantity import Output
 
@@ -69,6 +69,7 @@ def outputs_of(parameters: Sequence[str], drawn: bool) -> tuple[Output, ...]:
 
 def _of_parameter(name: str) -> Iterator[Output]:
     about = PARAMETERS[plain(name)]
-    yield Output(name, about.symbol, about.units, about.long_name, error=True)
+    optional = plain(name) in OF_SOME_LAWS
+    yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)
     for suffix, words in _BESIDE.items():
         yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")

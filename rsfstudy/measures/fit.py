@@ -13,7 +13,14 @@ import numpy as np
 from rsfstudy.analysis.fitting import posterior
 from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, Model, check_free, check_positive
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC,
+    OF_SOME_LAWS,
+    Model,
+    check_free,
+    check_positive,
+    of_law,
+)
 from rsfstudy.analysis.fitting.noise import check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
@@ -164,8 +171,8 @@ class Fit(Measure):
 
     @property
     def headline(self) -> str:
-        """The first parameter."""
-        return self.parameters[0]
+        """The first parameter that every law has."""
+        return next((n for n in self.parameters if n not in OF_SOME_LAWS), self.parameters[0])
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -227,6 +234,7 @@ class Fit(Measure):
             + _SMALL * values[f"{name}_stderr"]
             + sizes.get(plain(name), 0.0)
             for name in self.parameters
+            if name in values
         }
 
     def describe(self) -> dict[str, Any]:
@@ -249,7 +257,12 @@ class Fit(Measure):
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The parameters that leave the least, with their errors and intervals."""
+        """The parameters that leave the least, with their errors and intervals; those that the law
+        does not have are left out.
+        """
+        own = of_law(scene, self.free)
+        if own != self.free:
+            return self._widened(replace(self, free=own).find(scene, accuracy, meter))
         smooth = replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
@@ -280,6 +293,16 @@ class Fit(Measure):
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         return Outcome(Status.OK, values, self._remark(found, place["load_point_noise"]))
+
+    def _widened(self, outcome: Outcome) -> Outcome:
+        """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
+        values = dict(outcome.values)
+        has = np.array([name in values for name in self.parameters])
+        before = np.cumsum(has)[~has]
+        for name, axes in (("covariance", (0, 1)), ("correlation", (0, 1)), ("posterior", (1,))):
+            for axis in axes if name in values else ():
+                values[name] = np.insert(values[name], before, math.nan, axis=axis)
+        return replace(outcome, values=values)
 
     def _remark(self, found: Fitted, noise: float) -> str:
         """Remark on what noise of a recorded load point does to the slip distance, or none."""

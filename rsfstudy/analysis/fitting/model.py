@@ -58,6 +58,8 @@ INSTEAD = {
     **dict.fromkeys(("eps", "epsilon"), "law_exponent, with law='family'"),
     **dict.fromkeys(("t0", "step"), "step_time"),
 }
+#: Those that some laws have and others have not.
+OF_SOME_LAWS = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
 #: Those whose logarithm is looked for.
 LOGARITHMIC = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
 #: Step over the size of a parameter, and order of central differences. Friction repeats to 1e-11:
@@ -86,6 +88,14 @@ def check_free(free: Sequence[str]) -> None:
         if name not in PARAMETERS:
             remedy = f"Write {INSTEAD[name]}." if name in INSTEAD else ""
             raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS, remedy=remedy)
+
+
+def of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
+    """Those of some parameters that a scene has: one state has b, two have b1, b2 and a second
+    slip distance, and a family of laws has an exponent.
+    """
+    own = parameters_of(scene, 1.0, 1.0)
+    return tuple(name for name in free if name in own or name.startswith(("trend", "step_time")))
 
 
 def check_positive(of: object, *names: str) -> None:
