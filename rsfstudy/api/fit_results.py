@@ -14,7 +14,7 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.analysis.fitting.joint import of_window, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, fields_of, parameters_of
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, parameters_of
 from rsfstudy.api.tables import Table
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
@@ -22,26 +22,18 @@ from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS, Status
 
-#: What laboratories call parameters, and their units.
-SHORT = {
-    "a": ("a", ""),
-    "b": ("b", ""),
-    "b1": ("b1", ""),
-    "b2": ("b2", ""),
-    "a_minus_b": ("a_minus_b", ""),
-    "slip_distance": ("Dc", "um"),
-    "slip_distance_2": ("Dc2", "um"),
-    "mu_star": ("mu_0", ""),
-    "stiffness": ("k", "1/um"),
-    "alpha": ("alpha", ""),
-    "law_exponent": ("law_exponent", ""),
-    "step_time": ("step_time", "s"),
-    "trend1": ("trend", "1/um"),
-    **{f"trend{n}": (f"trend{n}", f"1/um^{n}") for n in range(2, 6)},
+#: What laboratories call parameters, where not as they are called here.
+_CALLED = {
+    "slip_distance": "Dc",
+    "slip_distance_2": "Dc2",
+    "mu_star": "mu_0",
+    "stiffness": "k",
+    "trend1": "trend",
 }
-
 #: Most fits beside each other.
 _BESIDE = 3
+#: What is told of a fit in short.
+_IN_SHORT = ("a", "b", "b1", "b2", "Dc")
 #: How fits end that have numbers.
 _ANSWERS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 #: Error over the number beyond which neither is printed.
@@ -81,14 +73,12 @@ def place(one: xr.Dataset) -> dict[str, Any]:
     return {n: value if n == "record" else int(value) for n, value in found.items()}
 
 
-def shown(one: xr.Dataset) -> dict[str, tuple[str, str]]:
-    """Numbers that tables show, in their order: what laboratories call each, and its units."""
-    names = [*map(str, one["parameter"].values), "a_minus_b"]
-    found = {}
-    for short in SHORT:
+def shown(one: xr.Dataset) -> dict[str, str]:
+    """What laboratories call the numbers that tables show, in their order."""
+    names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
+    for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if plain(n) == short):
-            called, units = SHORT[short]
-            found[name] = called + name.removeprefix(short), units
+            found[name] = _CALLED.get(short, short) + name.removeprefix(short)
     return found
 
 
@@ -101,7 +91,7 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     rows = []
     for one in cells(dataset):
         row: dict[str, Any] = dict(place(one))
-        for name, (short, _units) in shown(one).items():
+        for name, short in shown(one).items():
             row[short] = one[name].item()
             row[f"{short}_std"] = one[f"{name}_stderr"].item()
             if f"{name}_windows" in one:
@@ -212,10 +202,7 @@ def told(dataset: xr.Dataset) -> Iterator[Table | str]:
 
 def _row(one: xr.Dataset) -> dict[str, str]:
     """A fit in short."""
-    short = {called: name for name, (called, _units) in shown(one).items()}
-    few: dict[str, str] = {
-        n: with_error(one, short[n]) for n in ("a", "b", "b1", "b2", "Dc") if n in short
-    }
+    few = {n: with_error(one, name) for name, n in shown(one).items() if n in _IN_SHORT}
     at = {n: str(value) for n, value in place(one).items()}
     return {**at, "law": str(one["law"].item()), **few, "status": status(one)}
 
@@ -230,10 +217,7 @@ def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
 
 def _column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
-    found = {
-        f"{short} ({units})" if units else short: with_error(one, name)
-        for name, (short, units) in shown(one).items()
-    }
+    found = {n + _units(plain(name)): with_error(one, name) for name, n in shown(one).items()}
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
     if np.isfinite(one["rows_fitted"].item()):
         order = int(one["noise_order"].item())
@@ -245,6 +229,14 @@ def _column(one: xr.Dataset) -> dict[str, str]:
             "worth": f"{one['effective_samples'].item():,.0f} independent rows",
         }
     return found | quality | {"status": status(one)}
+
+
+def _units(name: str) -> str:
+    """Units of a parameter, in brackets behind its name."""
+    units = PARAMETERS[name].units if name in PARAMETERS else "1"
+    if units.startswith("um-"):
+        units = f"1/um^{units[3:]}".removesuffix("^1")
+    return "" if units == "1" else f" ({units})"
 
 
 def _window(one: xr.Dataset) -> str:
@@ -282,20 +274,15 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
     law, message = one["law"].item(), str(one["message"].item())
     if message:
         yield f"{law}: {status(one).replace('_', ' ')}: {message}"
-    spreads = {n: one[f"{n}_windows"].item() for n in shown(one) if f"{n}_windows" in one}
-    if spreads:
-        told = {n: v for n, v in spreads.items() if not math.isnan(v)}
-        each = ", ".join(f"{SHORT[plain(n)][0]} {v:.2g}" for n, v in told.items())
+    short = shown(one)
+    spreads = ((short[n], one[f"{n}_windows"].item()) for n in short if f"{n}_windows" in one)
+    if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: among windows parameters differ by {each}"
     if "posterior" in one and math.isfinite(one["autocorrelation_time"].item()):
         drawn = one["posterior"].quantile([0.025, 0.975], "draw")
-        ends = {
-            str(p.values): drawn.sel(parameter=p).values
-            for p in drawn.dropna("parameter").parameter
-        }
-        short = shown(one)
         each = ", ".join(
-            f"{short[n][0]} {low:.4g} to {high:.4g}" for n, (low, high) in ends.items()
+            f"{short[str(of.parameter.values)]} {of.values[0]:.4g} to {of.values[1]:.4g}"
+            for of in drawn.dropna("parameter").transpose("parameter", ...)
         )
         time = f"{one['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
