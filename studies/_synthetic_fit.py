@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,11 +20,10 @@ from rsfstudy.analysis.fitting.model import (
     Values,
     check_free,
     check_positive,
-    coordinate,
     parameters_of,
 )
 from rsfstudy.analysis.fitting.noise import check_noise
-from rsfstudy.analysis.fitting.search import Fitted, Search
+from rsfstudy.analysis.fitting.search import Search
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
@@ -32,10 +32,14 @@ from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-#: Correlation of an autoregressive process of order one, and coefficients of a moving average.
-_AR1, _MA3 = 0.9, (1.0, 0.8, 0.5, 0.2)
+#: Correlation of an autoregressive process of order one, and coefficients of moving averages.
+_AR1, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
+_PROCESSES = ("ar1", *_MOVING_AVERAGES)
 #: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
 ONE, TWO = 0.6827, 0.9545
+_NUMBER = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
+#: Velocity and displacement of a piece, or time where an s follows.
+_PIECE = re.compile(rf"{_NUMBER}:{_NUMBER}(s?)\s*")
 #: Slip distance that a search begins with, over the true one.
 _OFF = 1.5
 
@@ -118,9 +122,8 @@ class SyntheticFit(Measure):
     def __post_init__(self) -> None:
         windows = self._windows()
         check_free(self.free)
-        if self.process not in ("white", "ar1", "ma3"):
-            choices = ("white", "ar1", "ma3")
-            raise InvalidValue("process", self.process, "is unknown", choices=choices)
+        if self.process not in _PROCESSES:
+            raise InvalidValue("process", self.process, "is unknown", choices=_PROCESSES)
         check_positive(self, "slip_distance", "noise_size")
         if self.rows < 10 * len(windows[0]):
             raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
@@ -144,12 +147,6 @@ class SyntheticFit(Measure):
         """The parameters; of those that each window has for itself, that of the first one."""
         return {"parameter": np.array(self.free, dtype=object)}
 
-    def _shown(self, values: np.ndarray) -> np.ndarray:
-        """Values of all parameters as they are shown."""
-        windows = len(self._windows())
-        names = [name if name in self._free else f"{name}_1" for name in self.free]
-        return values if windows == 1 else values[[self._free.index(name) for name in names]]
-
     @property
     def _free(self) -> tuple[str, ...]:
         return numbered(self.free, len(self._windows()))
@@ -166,23 +163,30 @@ class SyntheticFit(Measure):
         noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.parts])
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         model = self._joint(fitted, accuracy, meter, clean + size * noise)
-        first = self._first(fitted, true)
-        search = Search(model, first, self._free, self.noise)
-        found = search.run()
-        naive = found
+        search = Search(model, self._first(fitted, true), self._free, self.noise)
+        found = naive = search.run()
         if self.noise != "white":
             naive = Search(model, found.values, self._free, "white").run()
-        values: dict[str, Value] = {
-            **self._deviations(found, true),
-            **self._inside(found, self._squared_distances(search, found, true), ""),
-            **self._inside(naive, np.square(self._off(naive, true) / naive.spread), "naive_"),
-            "promised_spread": self._shown(self._promised(truth, true)),
-            "told": self._shown(
-                np.array([n not in found.unidentified for n in self._free], dtype=float)
-            ),
-            "criterion": found.criterion,
-            "noise_order": found.noise.order,
+        exact = search.coordinates(true)
+        profiles = [Profile(search, found, name) for name in self._free]
+        squared = [one.squared_distance(x) for one, x in zip(profiles, exact.tolist(), strict=True)]
+        naively = np.square((search.coordinates(naive.values) - exact) / naive.spread)
+        by_parameter = {
+            "estimate": search.coordinates(found.values),
+            "deviation": search.coordinates(found.values) - exact,
+            "deviation_error": np.array([found.errors[n] for n in self._free]) / found.slopes,
+            "spread": found.spread,
+            "promised_spread": self._promised(truth, true),
+            "told": np.array([float(n not in found.unidentified) for n in self._free]),
         }
+        for words, share in (("one", ONE), ("two", TWO)):
+            for prefix, of, far in (("", found, squared), ("naive_", naive, naively)):
+                inside = np.array(far) <= half_width(of, share) ** 2
+                by_parameter[f"{prefix}inside_{words}"] = inside.astype(float)
+        # of those that each window has for itself, that of the first one
+        shown = [self._free.index(n if n in self._free else f"{n}_1") for n in self.free]
+        values: dict[str, Value] = {name: each[shown] for name, each in by_parameter.items()}
+        values |= {"criterion": found.criterion, "noise_order": found.noise.order}
         return Outcome(Status.OK, values)
 
     def _windows(self) -> list[list[_Piece]]:
@@ -221,38 +225,6 @@ class SyntheticFit(Measure):
             parts.append(Model(scene, time, moved, seen, loading, smooth, meter))
         return Joint(tuple(parts))
 
-    def _off(self, found: Fitted, true: Values) -> np.ndarray:
-        """Coordinates that are found, less the true ones."""
-        pairs = ((n, found.values[n], true[n]) for n in self._free)
-        return np.array([coordinate(n, ours) - coordinate(n, exact) for n, ours, exact in pairs])
-
-    def _deviations(self, found: Fitted, true: Values) -> dict[str, np.ndarray]:
-        """Parameters, how far they are from the truth, and how far they may be."""
-        values = {
-            "estimate": np.array([coordinate(n, found.values[n]) for n in self._free]),
-            "deviation": self._off(found, true),
-            "deviation_error": np.array([found.errors[n] for n in self._free]) / found.slopes,
-            "spread": found.spread,
-        }
-        return {name: self._shown(v) for name, v in values.items()}
-
-    def _squared_distances(self, search: Search, found: Fitted, true: Values) -> np.ndarray:
-        """Squared distances of the likelihood to the truth."""
-        distances = [
-            Profile(search, found, name).squared_distance(coordinate(name, true[name]))
-            for name in self._free
-        ]
-        return np.array(distances)
-
-    def _inside(self, found: Fitted, squared: np.ndarray, prefix: str) -> dict[str, np.ndarray]:
-        """1 where the truth lies within the intervals, and 0 where it does not."""
-        return {
-            f"{prefix}inside_{words}": self._shown(squared <= half_width(found, share) ** 2).astype(
-                float
-            )
-            for words, share in (("one", ONE), ("two", TWO))
-        }
-
     def _promised(self, truth: Joint, true: Values) -> np.ndarray:
         """Standard errors by Fisher's information, the noise being known."""
         correlations = _correlations(self.process, self.rows)
@@ -268,29 +240,21 @@ class SyntheticFit(Measure):
 
 def _pieces(text: str, rows: int) -> list[_Piece]:
     """The pieces of a window."""
-    stated = [part.partition(":") for part in text.split(",")]
-    rule, remedy = "is no protocol", "Write it as in '1:30, 10:270', or '1:30, 0:100 s, 1:270'."
     found: list[tuple[float, float, float]] = []
-    for velocity, _colon, length in stated:
-        try:
-            speed, holds = float(velocity), length.strip().endswith("s")
-            size = float(length.strip().removesuffix("s"))
-        except ValueError as error:
-            raise InvalidValue("protocol", text, rule, remedy=remedy) from error
-        if not (size > 0.0 and math.isfinite(size) and 0.0 <= speed < math.inf):
-            raise InvalidValue("protocol", text, rule, remedy=remedy)
-        if (speed == 0.0) != holds:
-            remedy = "A hold states its time, as in '0:100 s', and others displacements."
-            raise InvalidValue("protocol", text, rule, remedy=remedy)
-        found.append((speed, size if holds else size / speed, size))
+    for part in text.split(","):
+        stated = _PIECE.fullmatch(part)
+        speed, size = map(float, stated.group(1, 2)) if stated else (0.0, 0.0)
+        if not stated or not size > 0.0 or (speed == 0.0) != bool(stated[3]):
+            remedy = "Write it as in '1:30, 10:270', or with a hold as in '1:30, 0:100 s, 1:270'."
+            raise InvalidValue("protocol", text, "is no protocol", remedy=remedy)
+        found.append((speed, size / (speed or 1.0), size))
     if len(found) < 2 or not found[0][0] > 0.0:
         raise InvalidValue("protocol", text, "must begin with sliding, and change then")
     moved = math.fsum(size for speed, _lasts, size in found if speed)
-    held = sum(1 for speed, _lasts, _size in found if not speed)
+    held = sum(not speed for speed, _lasts, _size in found)
     each = rows // (len(found) + 1) if held else 0
-    counts = [
-        each if not speed else int((rows - held * each) * size / moved) for speed, _l, size in found
-    ]
+    sliding = rows - held * each
+    counts = [int(sliding * size / moved) if speed else each for speed, _lasts, size in found]
     counts[-1] += rows - sum(counts)
     return [_Piece(s, lasts, n) for (s, lasts, _size), n in zip(found, counts, strict=True)]
 
@@ -318,13 +282,9 @@ def _root(process: str, rows: int) -> np.ndarray:
 
 def _correlations(process: str, rows: int) -> np.ndarray:
     """Autocorrelations of a process at each lag."""
-    found = np.zeros(rows)
     if process == "ar1":
-        found[:] = _AR1 ** np.arange(rows)
-    elif process == "ma3":
-        weights = np.array(_MA3)
-        told = np.correlate(weights, weights, "full")[len(weights) - 1 :]
-        found[: len(told)] = told / told[0]
-    else:
-        found[0] = 1.0
+        return np.asarray(_AR1 ** np.arange(rows))
+    weights = _MOVING_AVERAGES[process]
+    found, told = np.zeros(rows), np.correlate(weights, weights, "full")[len(weights) - 1 :]
+    found[: len(told)] = told / told[0]
     return found
