@@ -11,6 +11,7 @@ import xarray as xr
 
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
@@ -36,7 +37,8 @@ _GUESS = 0.05
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
-_SCENE = {"a": 0.01, "b_over_a": 1.2, "mu_star": 0.6, "normal_stress": "constant"}
+_SCENE = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
+_ONE = {"b_over_a": 1.2}
 _TWO = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
@@ -155,9 +157,6 @@ def fit(
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
     numbers = _numbers(records, steps)
-    for one in records:
-        for number in numbers:
-            _check_step(one, number)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
     if "alpha" in (free or ()):
         _check_stressed(records, loading)
@@ -206,6 +205,10 @@ def fit(
 
 
 def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
+    """Numbers of the steps to fit, from 1: those stated, or all.
+
+    Steps that lie outside of their record are refused, and a load point that does not move forward.
+    """
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -216,14 +219,14 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
         if not 1 <= number <= count:
             rule = f"is not the number of a step: the record has {count}"
             raise InvalidValue("steps", number, rule)
+        for record in records:
+            for step in record.found[number - 1 : number]:
+                _check_step(record, number, step)
     return numbers
 
 
-def _check_step(record: Record, number: int) -> None:
-    """Refuse a step that lies outside a record, or a load point that does not move forward."""
-    if number > len(record.found):
-        return
-    step, time, moved = record.found[number - 1], record.time, record.columns["displacement"]
+def _check_step(record: Record, number: int, step: Step) -> None:
+    time, moved = record.time, record.columns["displacement"]
     if not time[0] < step.begins <= step.ends < time[-1]:
         rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
         remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
@@ -258,39 +261,32 @@ def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> 
 
 def _stiffness(rig: Laboratory | None, stated: Any, free: Sequence[str], record: Record) -> float:
     """Stiffness over normal stress, in 1/um."""
-    if stated is not None:
-        found = _over_normal_stress(stated, record)
-        if not found > 0.0:
-            raise InvalidValue("stiffness", stated, "must be positive")
-        return found
-    if rig is not None and rig.stiffness is not None:
-        return float(rig.stiffness / rig.normal_stress * 1e-6)
-    if "stiffness" in free:
-        return 1e-3
-    remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', or look for it: --free (free=)."
-    raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-
-
-def _over_normal_stress(stated: Any, record: Record) -> float:
-    """A stiffness in 1/um."""
+    if stated is None:
+        if rig is not None and rig.stiffness is not None:
+            return float(rig.stiffness / rig.normal_stress * 1e-6)
+        if "stiffness" in free:
+            return 1e-3
+        remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
+        remedy += "or look for it: --free (free=)."
+        raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
     if isinstance(stated, Real):
-        return float(stated)
-    if is_friction(stated):
-        return in_si("stiffness", stated, "1/m") * 1e-6
-    stress = record.columns.get("normal_stress")
-    found = in_si("stiffness", stated, "Pa/m") * 1e-6
-    if stress is None:
-        remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
-        raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
-    return found / float(stress.mean())
+        found = float(stated)
+    elif is_friction(stated):
+        found = in_si("stiffness", stated, "1/m") * 1e-6
+    else:
+        found, stress = in_si("stiffness", stated, "Pa/m"), record.columns.get("normal_stress")
+        if stress is None:
+            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
+            raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
+        found = found * 1e-6 / float(stress.mean())
+    if not found > 0.0:
+        raise InvalidValue("stiffness", stated, "must be positive")
+    return found
 
 
 def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
-    fields = {**_SCENE, "law": laws[0], "stiffness": stiffness, **stated}
-    if str(laws[0]).startswith("two_"):
-        fields = {n: v for n, v in fields.items() if n != "b_over_a"}
-        fields = {**_TWO, **fields}
-    return Scene(**fields)
+    effects = _TWO if str(laws[0]).startswith("two_") else _ONE
+    return Scene(**{**_SCENE, **effects, "law": laws[0], "stiffness": stiffness, **stated})
 
 
 def _of_laws(stated: Sequence[str] | None, laws: Sequence[str], scene: Scene) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ MARK = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"
 
 def part(number: int, problem: dict[str, Any]) -> str:
     """What a problem is, as a part of the page."""
-    told = [f"{name} = {_plain(value)}" for name, value in problem["parameters"].items()]
     initial = problem.get("initial")
     begins = [f"{n}(0) = {_plain(value)}" for n, value in (initial or {}).items()]
     lines = [
@@ -23,12 +22,20 @@ def part(number: int, problem: dict[str, Any]) -> str:
         "",
         " ".join(problem["conventions"].split()),
         "",
-        f"- Parameters: {', '.join(told)}.",
+        *_table(problem["parameters"]),
+        "",
         f"- Beginning: {', '.join(begins) or 'steady sliding at V_*'}.",
     ]
     if "loading" in problem:
         lines.append(f"- Load point: {'; then '.join(map(_segment, problem['loading']))}.")
     return "\n".join([*lines, f"- Report: {_report(problem)}.", ""])
+
+
+def _table(parameters: dict[str, Any]) -> list[str]:
+    """Lines of a table with a column for each parameter."""
+    cells = [[f"`{name}`" for name in parameters], ["---"] * len(parameters)]
+    cells.append([_plain(value) for value in parameters.values()])
+    return [f"| {' | '.join(row)} |" for row in cells]
 
 
 def _plain(value: Any) -> str:
