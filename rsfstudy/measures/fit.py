@@ -349,7 +349,8 @@ class Fit(Measure):
             correlation = covariance / np.outer(spread, spread)
             variance_of_rate = float(signs @ covariance @ signs)
         b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
-        left = model.friction - found.curve - found.trend
+        trend = model.trend(found.values)
+        left = model.friction - found.curve - trend
         variance = float(np.var(model.friction)) or math.nan
         values |= {
             "a_minus_b": found.values["a"] - b,
@@ -366,7 +367,7 @@ class Fit(Measure):
             "correlation": correlation,
         }
         along = {
-            "fitted_friction": found.curve + found.trend,
+            "fitted_friction": found.curve + trend,
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
             "residual": left,

@@ -51,9 +51,7 @@ _LAGS = 20
 
 def check_noise(name: str) -> None:
     """Raise InvalidValue for what names no noise."""
-    order = name.removeprefix(AUTOREGRESSIVE) if isinstance(name, str) else ""
-    known = name in (WHITE, AUTOREGRESSIVE)
-    if not known and not (order.isdecimal() and name.startswith("ar") and int(order) <= HIGHEST):
+    if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, HIGHEST + 1))):
         choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{HIGHEST}")
         raise InvalidValue("noise", name, "is unknown", choices=choices)
 

@@ -57,6 +57,7 @@ _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: standard errors; most curves of a pass, and where it ends; and the fewest and most steps of
 #: Newton at the end, of which the last one moves by less than a part of standard errors.
 _PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 8)
+_TRUST_REGION = {"x_scale": "jac", "xtol": _FOUND, "gtol": 1e-12, "max_nfev": _CURVES}
 _DONE = 1e-3
 #: Fewest degrees of freedom of intervals.
 _FEWEST = 3.0
@@ -87,11 +88,8 @@ class Fitted:
         Degrees of freedom of the intervals.
     curve : ndarray
         Friction along the rows, without trend.
-    trend : ndarray
     innovations : ndarray
         Residuals freed of correlation, over their size.
-    band : ndarray
-        Standard error of the curve with trend.
     jacobian : ndarray
         Derivatives of the curve with trend by the free parameters, or their logarithms.
     criterion : float
@@ -108,9 +106,7 @@ class Fitted:
     size: float
     degrees: float
     curve: np.ndarray
-    trend: np.ndarray
     innovations: np.ndarray
-    band: np.ndarray
     jacobian: np.ndarray
     criterion: float
     unidentified: tuple[str, ...]
@@ -124,6 +120,15 @@ class Fitted:
     def spread(self) -> np.ndarray:
         """Standard errors of the coordinates of the free parameters."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def band(self) -> np.ndarray:
+        """Standard error of the curve with trend along the rows: ``sqrt(J C J')``, C being the
+        covariance of parameters.
+        """
+        variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
+        # below 0 by rounding, where a parameter is not told
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def stderr(self, name: str) -> float:
         """Standard error of a parameter."""
@@ -252,40 +257,28 @@ class Search:
         if not math.isfinite(scale):  # next to what can be followed: there is no better neighbour
             self.has_converged = True
             return x, self._jacobian(x, QUICK)
-        found = least_squares(
-            left,
-            inner,
-            slopes,
-            (self.low, self.high),
-            x_scale="jac",
-            xtol=_FOUND,
-            ftol=part,
-            gtol=1e-12,
-            max_nfev=_CURVES,
-        )
+        bounds = self.low, self.high
+        found = least_squares(left, inner, slopes, bounds, ftol=part, **_TRUST_REGION)
         self.has_converged = found.status != 0
         return found.x, derivatives["last"]
 
     def _result(self, x: np.ndarray, noise: Noise) -> Fitted:
         """All that is told of the parameters with the least left."""
-        moved = np.zeros(len(x))
         for number in range(_POLISHED[1]):
             jacobian = self._jacobian(x, FINE)
             left = self.residuals(self.values(x))
             whitened = noise.whitened(np.column_stack([jacobian, left]))
             if not np.isfinite(whitened).all():
-                text = "the best motion cannot be followed"
-                raise Halt(Status.INTEGRATION_FAILED, text)
-            moved = _linear_solution(whitened)
-            beyond = np.clip(x + moved, self.low, self.high)
+                raise Halt(Status.INTEGRATION_FAILED, "the best motion cannot be followed")
+            beyond = np.clip(x + _linear_solution(whitened), self.low, self.high)
             moved = beyond - x
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
                 x = beyond
             if number + 1 >= _POLISHED[0] and _has_converged(moved, whitened, _DONE):
                 break
         values = self.values(x)
-        curve, trend = self.model.curve(values), self.model.trend(values)
-        left = self.model.friction - curve - trend
+        curve = self.model.curve(values)
+        left = self.model.friction - curve - self.model.trend(values)
         innovations = noise.whitened(left[:, None])[:, 0]
         free_of = len(left) - len(x)
         size = math.sqrt(float(innovations @ innovations) / free_of)
@@ -297,8 +290,6 @@ class Search:
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        variances = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
-        band = np.sqrt(np.maximum(variances, 0.0))  # rounding, where a parameter is not told
         criterion = _criterion(innovations, noise, len(x))
         steps = self._criterion_without_steps(jacobian, noise) - criterion > _DECIDES
         return Fitted(
@@ -310,9 +301,7 @@ class Search:
             size=size,
             degrees=degrees,
             curve=curve,
-            trend=trend,
             innovations=innovations / size,
-            band=band,
             jacobian=jacobian,
             criterion=criterion,
             unidentified=self._unidentified(x, values, covariance, steps),
