@@ -11,14 +11,14 @@ from rsfstudy.cli import assignments, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.cli.options import Given
 from rsfstudy.errors import InvalidValue
-from rsfstudy.referee import theirs, writing
-from rsfstudy.referee.problem import Problem, read, shipped
+from rsfstudy.referee import theirs
+from rsfstudy.referee.problem import Problem, read, shipped, write
 from rsfstudy.referee.verdict import Verdict, known, verdict
 
 
 def problems(given: Given) -> int:
     """Write all problems."""
-    writing.write(given.directory)
+    write(given.directory)
     console.print(f"wrote {len(shipped())} problems into {given.directory}")
     return terminal.OK
 

@@ -1,8 +1,12 @@
-"""Problems: what a slider is, how it begins, what loads it, and what is to be told of it."""
+"""Problems: what a slider is, how it begins, what loads it, and what is to be told of it; and the
+files of problems, answers and templates that are written for other codes.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
+import shutil
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -156,61 +160,61 @@ class Problem:
         """Columns of an answer with their units."""
         return [f"{name} ({self.units[name]})" for name in self.columns]
 
-    def si(self, name: str, units: str) -> float:
-        """A parameter in SI units."""
-        return in_si(name, self.parameters[name], units)
-
     @cached_property
     def rig(self) -> Laboratory:
         """The scales of the problem, and its spring and mass."""
         return Laboratory(**{_RIG[n]: v for n, v in self.parameters.items() if n in _RIG})
 
     @cached_property
+    def si(self) -> Mapping[str, float]:
+        """Parameters that no field of a scene holds, in SI units."""
+        stated = self.parameters
+        return {n: in_si(n, stated[n], units) for n, units in _UNITS.items() if n in stated}
+
+    @property
     def b(self) -> tuple[float, ...]:
         """Evolution effect of each state."""
-        return tuple(self.si(name, "1") for name in ("b", "b_2") if name in self.parameters)
+        return tuple(self.si[name] for name in ("b", "b_2") if name in self.si)
 
     @property
     def damping(self) -> float:
         """Radiation damping in Pa s/m."""
-        known = "radiation_damping" in self.parameters
-        return self.si("radiation_damping", "Pa s/m") if known else 0.0
+        return self.si.get("radiation_damping", 0.0)
 
     @cached_property
     def scene(self) -> Scene:
         """The scene that the problem states, but for how it begins."""
-        rig, a = self.rig, self.si("a", "1")
-        rest = {n: v for n, v in self.parameters.items() if n not in {*_RIG, *_UNITS}}
-        given = {n: self.si(n, unit) for n, unit in _UNITS.items() if n in self.parameters}
-        rest |= {"law": self.law, "a": a}
+        rig, si, a = self.rig, self.si, in_si("a", self.parameters["a"], "1")
+        fields = {n: v for n, v in self.parameters.items() if n not in {*_RIG, *_UNITS}}
+        fields |= {"law": self.law, "a": a}
         if len(self.b) == 1:
-            rest["b_over_a"] = self.b[0] / a
+            fields["b_over_a"] = self.b[0] / a
         else:
-            rest |= {f"b{i}_over_a": b / a for i, b in enumerate(self.b, start=1)}
-            rest["length_ratio"] = given["D_c_2"] / rig.slip_distance
-        if "phi" in rest:
-            rest["normal_stress"] = "variable"
+            fields |= {f"b{i}_over_a": b / a for i, b in enumerate(self.b, start=1)}
+            fields["length_ratio"] = si["D_c_2"] / rig.slip_distance
+        if "phi" in fields:
+            fields["normal_stress"] = "variable"
         if self.damping:
-            rest["radiation_damping"] = self.damping * rig.reference_velocity
-        if "V_c" in given:
-            rest["cutoff_velocity_ratio"] = given["V_c"] / rig.reference_velocity
-        if "V_unstable" in given:
+            fields["radiation_damping"] = self.damping * rig.reference_velocity
+        if "V_c" in si:
+            fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
+        if "V_unstable" in si:
             period = rig.period or registry.defaults()["period"]
-            norm = given["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
-            rest["instability_norm"] = norm
+            norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
+            fields["instability_norm"] = norm
         if self.loading:
-            rest["loading"] = rig.protocol(self.loading)
-        return rig.scene(**rest)
+            fields["loading"] = rig.protocol(self.loading)
+        return rig.scene(**fields)
 
-    @cached_property
+    @property
     def theta_star(self) -> tuple[float, ...]:
         """theta in steady sliding at V_star, of each state, in s."""
+        velocity = self.rig.reference_velocity
         scale = 2.0 if self.law == "perrin_rice_zheng" else 1.0
         if self.law == "composite":
-            healing = math.exp(-self.rig.reference_velocity / self.si("V_c", "m/s"))
-            scale = math.exp(lambertw(healing).real)
-        lengths = [self.si(name, "m") for name in ("D_c", "D_c_2") if name in self.parameters]
-        return tuple(scale * length / self.rig.reference_velocity for length in lengths)
+            scale = math.exp(lambertw(math.exp(-velocity / self.si["V_c"])).real)
+        lengths = self.rig.slip_distance, self.si.get("D_c_2", math.nan)
+        return tuple(scale * length / velocity for length in lengths[: len(self.b)])
 
     @cached_property
     def log_slip_rate(self) -> float:
@@ -294,3 +298,41 @@ def read(path: Path) -> Problem:
 def shipped() -> dict[int, Path]:
     """The files of the problems, by number."""
     return {int(path.name[:2]): path for path in sorted(SHIPPED.glob("*.toml"))}
+
+
+def write(directory: Path) -> None:
+    """Write all problems into ``problems``, their answers into ``answers``, a table to be filled
+    for each into ``templates``, and ``example.py``.
+
+    Raises
+    ------
+    InvalidValue
+        Where the directory is not empty.
+    DataError
+        Where it cannot be written.
+    """
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        remedy = "Name a new one: nothing is replaced."
+        raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)
+    try:
+        places = {name: directory / name for name in ("problems", "answers", "templates")}
+        for place in places.values():
+            place.mkdir(parents=True)
+        for path in shipped().values():
+            shutil.copyfile(path, places["problems"] / path.name)
+            answer = path.with_suffix(".csv")
+            shutil.copyfile(answer, places["answers"] / answer.name)
+            _template(read(path), places["templates"] / answer.name)
+        shutil.copyfile(SHIPPED / "example.txt", directory / "example.py")
+    except OSError as error:
+        raise DataError(f"{directory}: cannot be written ({error})") from error
+
+
+def _template(problem: Problem, path: Path) -> None:
+    """The header of an answer, and which row is which."""
+    empty = [""] * len(problem.quantities)
+    rows = [f"{row:.12g}" for row in problem.rows] if problem.key else []
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(problem.header)
+        table.writerows([[row, *empty] for row in rows] or [empty])
