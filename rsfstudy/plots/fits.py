@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.text import Text
 
-from rsfstudy.analysis.fitting.joint import plain
+from rsfstudy.analysis.fitting.joint import parted
 from rsfstudy.analysis.fitting.model import PARAMETERS
 from rsfstudy.declare.figure import Panel
 from rsfstudy.plots._axes import place
@@ -168,8 +168,8 @@ def _whose(dataset: xr.Dataset) -> str:
 
 def _symbol(name: str) -> str:
     """That of a parameter, with the number of its window, where several are fitted together."""
-    symbol = PARAMETERS[plain(name)].symbol
-    number = name.removeprefix(plain(name)).strip("_")
+    plain, number = parted(name)
+    symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
 
 

@@ -32,10 +32,21 @@ def numbered(names: Sequence[str], windows: int) -> tuple[str, ...]:
     return (*(name for name in names if not is_own(name)), *each)
 
 
+def parted(name: str) -> tuple[str, int]:
+    """A parameter without the number of its window, and that number; 0 where all share it."""
+    before, _, number = name.rpartition("_")
+    return (before, int(number)) if number.isdecimal() and is_own(name) else (name, 0)
+
+
 def plain(name: str) -> str:
     """A parameter without the number of its window."""
-    before, _, number = name.rpartition("_")
-    return before if number.isdecimal() and is_own(name) else name
+    return parted(name)[0]
+
+
+def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
+    """Values for the parameters of one window, by their plain names."""
+    names = {name: parted(name) for name in values}
+    return {own: values[name] for name, (own, of) in names.items() if of in (0, number)}
 
 
 @dataclass(frozen=True)
@@ -65,8 +76,7 @@ class Joint:
 
     def latest(self, name: str) -> float:
         """Time in s by which the loading of a window may come late."""
-        number = name.rpartition("_")[2]
-        return self.parts[int(number) - 1 if number.isdecimal() else 0].latest
+        return self.parts[max(parted(name)[1] - 1, 0)].latest
 
     def check(self, values: Values) -> None:
         """Raise InvalidValue for parameters that make no scene."""
@@ -99,14 +109,3 @@ class Joint:
         """The models, each with the parameters of its window."""
         for number, part in enumerate(self.parts, start=1):
             yield part, of_window(values, number)
-
-
-def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
-    """Values for the parameters of one window, by their plain names."""
-    ending, found = f"_{number}", {}
-    for name, value in values.items():
-        if plain(name) == name:
-            found[name] = value
-        elif name.endswith(ending):
-            found[name.removesuffix(ending)] = value
-    return found
