@@ -86,7 +86,7 @@ def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     low, high = intervals.interval(search, found, "b")
     # squared distances are off by a fifth, to first order, where a parabola is nearly one
     for end, slack in ((low, 0.25), (high, 0.06)):
-        fallen = (by_hand(model, end) - by_hand(model, b)) / found.size**2
+        fallen = (by_hand(model, end) - by_hand(model, b)) / found.noise_sd**2
         assert fallen == pytest.approx(far**2, rel=slack)
     assert high - b > 1.5 * (b - low)  # no parabola
 

@@ -79,8 +79,8 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 # ---- ours ----------------------------------------------------------------------------------------
 
 
-def told_of(table: ours.Table) -> dict[str, theirs.Told]:
-    return {name: theirs.Told(values, 0.0) for name, values in table.items()}
+def told_of(table: ours.Table) -> dict[str, theirs.Reported]:
+    return {name: theirs.Reported(values, 0.0) for name, values in table.items()}
 
 
 def digits_of_ours(number: int, rtol: float, engine: str) -> Verdict:

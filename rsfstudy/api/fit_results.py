@@ -74,7 +74,7 @@ def place(one: xr.Dataset) -> dict[str, Any]:
 
 
 def shown(one: xr.Dataset) -> dict[str, str]:
-    """What laboratories call the numbers that tables show, in their order."""
+    """Names by laboratories of the numbers that tables show, in their order."""
     names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if plain(n) == short):
@@ -106,7 +106,7 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def status(one: xr.Dataset) -> str:
-    """How a fit ended."""
+    """Label of the status of a fit."""
     return LABELS[int(one["status"])]
 
 
@@ -201,7 +201,7 @@ def told(dataset: xr.Dataset) -> Iterator[Table | str]:
 
 
 def _row(one: xr.Dataset) -> dict[str, str]:
-    """A fit in short."""
+    """Row of a fit in the table of all."""
     few = {n: with_error(one, name) for name, n in shown(one).items() if n in _IN_SHORT}
     at = {n: str(value) for n, value in place(one).items()}
     return {**at, "law": str(one["law"].item()), **few, "status": status(one)}
@@ -270,7 +270,7 @@ def with_error(one: xr.Dataset, name: str) -> str:
 
 
 def _remarks(one: xr.Dataset) -> Iterator[str]:
-    """What a fit does not tell, and whether noise is left that the errors do not count."""
+    """Remarks on a fit: what it does not tell, and whether noise is left that no error counts."""
     law, message = one["law"].item(), str(one["message"].item())
     if message:
         yield f"{law}: {status(one).replace('_', ' ')}: {message}"

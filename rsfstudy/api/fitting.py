@@ -290,7 +290,7 @@ def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: floa
 
 
 def _of_laws(stated: Sequence[str] | None, laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
-    """What is looked for: those stated, of which each law has some, and each some law."""
+    """Parameters to look for: those stated, each of which some law has, or those of all laws."""
     free = tuple(FREE if stated is None else stated)
     check_free(free)
     own = {law: of_law(scene.with_(law=law), free) for law in laws}

@@ -355,10 +355,10 @@ class Fit(Measure):
         values |= {
             "a_minus_b": found.values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
-            "noise_size": found.size,
+            "noise_size": found.noise_sd,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
-            "degrees_of_freedom": found.degrees,
+            "degrees_of_freedom": found.degrees_of_freedom,
             "whiteness": whiteness(found.innovations, found.noise.order),
             "r_squared": 1.0 - float(np.var(left)) / variance,
             "rows_fitted": len(rows),

@@ -1,4 +1,4 @@
-"""What rsfstudy answers to a problem."""
+"""Answers of rsfstudy to problems."""
 
 from __future__ import annotations
 
@@ -132,15 +132,3 @@ _FINDERS: Mapping[tuple[str, ...], Callable[[Problem, Accuracy], tuple[float, ..
         "slowest_slip_rate",
     ): _cycle,
 }
-#: Of these, differences are told over the largest of the column: they begin at zero.
-FROM_ZERO = ("slip", "pore_pressure")
-
-
-def off(name: str, theirs: np.ndarray, ours: np.ndarray, digits: int) -> np.ndarray:
-    """Differences of a quantity beyond what ours are rounded by, to so many digits, relative to
-    each number.
-    """
-    size = np.abs(ours)
-    rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
-    scale = np.full(len(ours), size.max() or 1.0) if name in FROM_ZERO else size
-    return np.asarray(np.maximum(np.abs(theirs - ours) - rounded, 0.0) / scale)

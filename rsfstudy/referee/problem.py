@@ -151,7 +151,7 @@ class Problem:
 
     @property
     def rows(self) -> np.ndarray:
-        """What that column holds."""
+        """Numbers of that column: times in s, or numbers of peaks."""
         rows = self.times if self.report == "series" else range(1, max(self.count, 1) + 1)
         return np.array(rows, dtype=float)
 

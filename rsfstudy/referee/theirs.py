@@ -1,4 +1,4 @@
-"""What another code answers: a table of any names and units, read as a problem asks for it."""
+"""Answers of other codes: tables of any names and units, read as a problem asks for it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ _UNITS = dict(_INSTEAD.values())
 _LATE = 1e-9
 
 
-class Told(NamedTuple):
+class Reported(NamedTuple):
     """A quantity of another code in SI units, and one in the last place that is written."""
 
     values: np.ndarray
     last_place: float
 
 
-def read(path: Path, problem: Problem, columns: Mapping[str, str] | None = None) -> dict[str, Told]:
+def read(
+    path: Path, problem: Problem, columns: Mapping[str, str] | None = None
+) -> dict[str, Reported]:
     """The columns that a problem asks for, in SI units.
 
     Raises
@@ -43,7 +45,7 @@ def read(path: Path, problem: Problem, columns: Mapping[str, str] | None = None)
         # what waves carry away takes a slip rate
         waits = name == "friction" and problem.damping and "slip_rate" not in found
         if name not in found and other in found and not waits:
-            found[name] = Told(_instead(name, problem, found), 0.0)
+            found[name] = Reported(_instead(name, problem, found), 0.0)
     for name in reversed(problem.columns):
         if name not in found:
             remedy = f"Head it {name} ({problem.units[name]}), or say --columns '{name}=...'."
@@ -58,7 +60,7 @@ def read(path: Path, problem: Problem, columns: Mapping[str, str] | None = None)
     return {name: found[name] for name in problem.columns}
 
 
-def _instead(name: str, problem: Problem, found: Mapping[str, Told]) -> np.ndarray:
+def _instead(name: str, problem: Problem, found: Mapping[str, Reported]) -> np.ndarray:
     """A quantity by what is told instead: friction by the shear stress of the spring."""
     if name == "slip_rate":
         return np.asarray(10.0 ** found["log10_slip_rate"].values)
@@ -66,7 +68,7 @@ def _instead(name: str, problem: Problem, found: Mapping[str, Told]) -> np.ndarr
     return np.asarray((found["shear_stress"].values - radiated) / problem.rig.normal_stress)
 
 
-def _plain(key: str, column: Column, problem: Problem) -> Told:
+def _plain(key: str, column: Column, problem: Problem) -> Reported:
     """A column in SI units."""
     column.check(key, ~np.isfinite(column.values), "must be a number")
     units = problem.units.get(key) or _UNITS[key]
@@ -78,7 +80,7 @@ def _plain(key: str, column: Column, problem: Problem) -> Told:
         factor = in_si(key, 1.0 if one == "1" else one, units)
     except InvalidValue as error:
         raise error.at(column.path) from error
-    return Told(column.values * factor, factor * _last_place(column.values))
+    return Reported(column.values * factor, factor * _last_place(column.values))
 
 
 def _last_place(values: np.ndarray) -> float:

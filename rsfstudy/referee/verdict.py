@@ -1,4 +1,4 @@
-"""How far two answers agree, from where on they part, and what would explain it."""
+"""Agreement of two answers: to how many digits, from where on they part, what would explain it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.motion.meter import Halt
 from rsfstudy.referee import ours
-from rsfstudy.referee.ours import Table, off
+from rsfstudy.referee.ours import Table
 from rsfstudy.referee.problem import Problem
-from rsfstudy.referee.theirs import Told
+from rsfstudy.referee.theirs import Reported
 from rsfstudy.rig.table import read_table
 
 #: Digits that make a problem passed, unless others are asked for.
@@ -26,6 +26,8 @@ _EXPLAINS, _MORE = 3.0, 1.5
 #: Units in the last place by which what is written in decimals may differ: one of rounding in the
 #: code, and half of rounding in the file, a little more for ours.
 _ROUNDED = 1.51
+#: Of these, differences are told over the largest of the column: they begin at zero.
+_FROM_ZERO = ("slip", "pore_pressure")
 #: Conventions of radiation damping, and factors of eta.
 _DAMPING = {"twice as much (G/c_s for G/(2 c_s))": 2.0, "half as much": 0.5, "left out": 0.0}
 #: Accuracies of ours where a problem has no answer yet; what candidates need.
@@ -34,7 +36,7 @@ _TWICE, _ROUGH, _BUDGET = (1e-9, 1e-11), 1e-8, 5_000_000
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far a quantity agrees.
+    """Agreement of a quantity.
 
     Attributes
     ----------
@@ -61,7 +63,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What there is to say of an answer.
+    """Agreement of an answer, and what would explain that it fails.
 
     Attributes
     ----------
@@ -112,8 +114,10 @@ def known(problem: Problem, path: Path | None) -> tuple[Problem, Table]:
     return replace(problem, digits=max(1, math.floor(min(both)))), fine
 
 
-def verdict(problem: Problem, answer: Table, told: Mapping[str, Told], enough: float) -> Verdict:
-    """How far what another code told agrees with an answer."""
+def verdict(
+    problem: Problem, answer: Table, told: Mapping[str, Reported], enough: float
+) -> Verdict:
+    """Agreement of what another code told with an answer, and what would explain a difference."""
     values = {name: column.values for name, column in told.items()}
     places = {name: column.last_place for name, column in told.items()}
     found = Verdict(problem, _agreements(problem, values, answer, enough, places), enough)
@@ -133,7 +137,7 @@ def _agreements(
 ) -> tuple[Agreement, ...]:
     found = []
     for name in problem.quantities:
-        apart = off(name, theirs[name], answer[name], problem.digits)
+        apart = _relative_differences(name, theirs[name], answer[name], problem.digits)
         few = np.flatnonzero(apart > 10.0**-enough)
         place = (places or {}).get(name, 0.0)
         found.append(
@@ -149,6 +153,18 @@ def _agreements(
     return tuple(found)
 
 
+def _relative_differences(
+    name: str, theirs: np.ndarray, ours: np.ndarray, digits: int
+) -> np.ndarray:
+    """Differences of a quantity beyond what ours are rounded by, to so many digits, relative to
+    each number.
+    """
+    size = np.abs(ours)
+    rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
+    scale = np.full(len(ours), size.max() or 1.0) if name in _FROM_ZERO else size
+    return np.asarray(np.maximum(np.abs(theirs - ours) - rounded, 0.0) / scale)
+
+
 def _explained(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[float, str]]:
     """Digits to which what is told agrees with other conventions, and these."""
     for words, table in _read_otherwise(problem, theirs, answer):
@@ -162,7 +178,7 @@ def _explained(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple
 
 
 def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[str, Table]]:
-    """What is told, as it would read by other conventions."""
+    """Tables of what is told, read by other conventions, each with words for it."""
     shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
     if "friction" in theirs:
         for sign, place in ((1.0, "left out of"), (-1.0, "left in")):
@@ -182,7 +198,7 @@ def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[
 
 
 def _posed_otherwise(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """The problem with other conventions."""
+    """Problems with other conventions, each with words for it."""
 
     def changed(**parameters: object) -> Problem:
         return replace(problem, parameters={**problem.parameters, **parameters})

@@ -29,7 +29,7 @@ COVERS, _PARABOLIC, _FOLLOWED, _CLOSE, _MISSED = 0.95, 0.2, 6, 0.05, 0.02
 
 def half_width(found: Fitted, covers: float) -> float:
     """Distance, in standard errors, to the ends of intervals that cover so much."""
-    return float(student.isf(0.5 * (1.0 - covers), found.degrees))
+    return float(student.isf(0.5 * (1.0 - covers), found.degrees_of_freedom))
 
 
 def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
@@ -108,7 +108,7 @@ class Profile:
             self.search.model,
             self.search.values(x),
             [name for name in self.found.free if name != self.found.free[self.place]],
-            self.search.name,
+            self.search.noise_model,
         )
         rest.low, rest.high = self.search.low[others], self.search.high[others]
         x[others], _ = rest.least_squares(x[others], self.found.noise, _MISSED / len(others))
@@ -119,7 +119,7 @@ class Profile:
     def _left(self, x: np.ndarray) -> np.ndarray:
         """Residuals freed of correlation, over their size; NaN where no motion can be followed."""
         left = self.search.residuals(self.search.values(x), checked=True)
-        return self.found.noise.whitened(left[:, None])[:, 0] / self.found.size
+        return self.found.noise.whitened(left[:, None])[:, 0] / self.found.noise_sd
 
     def _growth(self, left: np.ndarray) -> float:
         return float(left @ left - np.square(self.found.innovations).sum())
@@ -130,5 +130,5 @@ class Profile:
         if not np.isfinite(left).all():
             return math.inf
         others = np.delete(self.found.jacobian, self.place, axis=1)
-        columns = self.found.noise.whitened(others) / self.found.size
+        columns = self.found.noise.whitened(others) / self.found.noise_sd
         return self._growth(left - columns @ np.linalg.lstsq(columns, left)[0])

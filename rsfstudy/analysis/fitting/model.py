@@ -91,7 +91,7 @@ def check_free(free: Sequence[str]) -> None:
 
 
 def of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
-    """Those of some parameters that a scene has: one state has b, two have b1, b2 and a second
+    """Parameters, of those named, that a scene has: one state has b, two have b1, b2 and a second
     slip distance, and a family of laws has an exponent.
     """
     own = parameters_of(scene, 1.0, 1.0)
@@ -245,6 +245,7 @@ class Model:
         return np.column_stack([self._derivative(values, name, differences) for name in free])
 
     def _derivative(self, values: Values, name: str, differences: Differences) -> np.ndarray:
+        """Derivative of friction by one parameter along the rows, shape (rows,)."""
         if name.startswith("trend"):
             return np.asarray(self.displacement ** int(name[5:]))
         if self.is_linear(name):
@@ -286,6 +287,7 @@ class Model:
         return found
 
     def _size(self, name: str, values: Values) -> float:
+        """Size of a parameter, of which the step of a difference is a part."""
         if name in LOGARITHMIC:
             return 1.0
         if name == "a":

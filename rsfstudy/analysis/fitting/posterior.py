@@ -76,7 +76,7 @@ def sample(search: Search, found: Fitted, draws: int, seed: int = 0) -> tuple[np
             return -math.inf
         if not np.isfinite(left).all():
             return -math.inf
-        return -0.5 * float(np.square(found.noise.whitened(left[:, None]) / found.size).sum())
+        return -0.5 * float(np.square(found.noise.whitened(left[:, None]) / found.noise_sd).sum())
 
     def proposed(x: np.ndarray, rng: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
         drawn = errors.rvs(len(x), rng).reshape(x.shape)

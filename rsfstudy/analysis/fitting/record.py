@@ -77,12 +77,12 @@ class Record:
 
     @property
     def time(self) -> np.ndarray:
-        """In s."""
+        """Times of the rows in s, shape (rows,)."""
         return self.columns["time"]
 
     @cached_property
     def digest(self) -> str:
-        """Tells the record."""
+        """Digest of columns and stated steps: records with one are the same."""
         told = hashlib.sha256(repr((sorted(self.columns), self.stated)).encode())
         for name in sorted(self.columns):
             told.update(np.ascontiguousarray(self.columns[name]).tobytes())

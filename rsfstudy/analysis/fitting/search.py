@@ -82,9 +82,9 @@ class Fitted:
     errors : dict
         Numerical errors of the free parameters.
     noise : Noise
-    size : float
+    noise_sd : float
         Standard deviation of the noise.
-    degrees : float
+    degrees_of_freedom : float
         Degrees of freedom of the intervals.
     curve : ndarray
         Friction along the rows, without trend.
@@ -103,8 +103,8 @@ class Fitted:
     covariance: np.ndarray
     errors: dict[str, float]
     noise: Noise
-    size: float
-    degrees: float
+    noise_sd: float
+    degrees_of_freedom: float
     curve: np.ndarray
     innovations: np.ndarray
     jacobian: np.ndarray
@@ -145,15 +145,16 @@ class Search:
         All parameters; those that are free to begin with.
     free : sequence of str
     noise : str
-        As `noise.fitted` takes it.
+        As `noise.fit_noise` takes it.
     """
 
     def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
-        self.model, self.free, self.name = model, tuple(free), noise
+        self.model, self.free, self.noise_model = model, tuple(free), noise
         self.first, self.has_converged = dict(values), True
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
+        """Ends of the coordinate of a parameter, between which it is looked for."""
         if name.startswith("slip_distance"):
             moved = self.model.displacement
             extent = float(np.ptp(moved))
@@ -197,7 +198,9 @@ class Search:
             the work budget is spent.
         """
         x, noise = self._initial(), noises.white(self.model.time)
-        for number in range(1 if self.name == noises.WHITE and len(noise.sizes) == 1 else _PASSES):
+        for number in range(
+            1 if self.noise_model == noises.WHITE and len(noise.sizes) == 1 else _PASSES
+        ):
             before = x
             x, jacobian = self.least_squares(x, noise)
             left = self.residuals(self.values(x))
@@ -205,7 +208,7 @@ class Search:
                 x - before, noise.whitened(np.column_stack([jacobian, left]))
             ):
                 break
-            noise = noises.fitted(self.name, self.model.time, left, jacobian)
+            noise = noises.fit_noise(self.noise_model, self.model.time, left, jacobian)
         found = self._result(x, noise)
         if not (self.has_converged or found.unidentified):
             text = f"the search did not end within {_CURVES} curves"
@@ -298,8 +301,8 @@ class Search:
             covariance=covariance,
             errors=dict(zip(self.free, errors.tolist(), strict=True)),
             noise=noise,
-            size=size,
-            degrees=degrees,
+            noise_sd=size,
+            degrees_of_freedom=degrees,
             curve=curve,
             innovations=innovations / size,
             jacobian=jacobian,

@@ -116,7 +116,7 @@ class _Sums:
         mt, mx = st / n, sx / n
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
-    def left(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
+    def residual_squares(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
         """Sum of squares that the line through rows i to j leaves."""
         _mt, _mx, tt, tx, xx = self.between(i, j)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
@@ -147,9 +147,9 @@ def _parted(sums: _Sums, first: int, last: int, variance: float) -> set[int]:
         at = np.arange(i + _FEWEST, j - _FEWEST + 1)
         if not len(at):
             continue
-        both = sums.left(i, at) + sums.left(at, j)
+        both = sums.residual_squares(i, at) + sums.residual_squares(at, j)
         best = int(at[np.argmin(both)])
-        if sums.left(i, j) - both.min() > _WORTH * math.log(j - i) * variance:
+        if sums.residual_squares(i, j) - both.min() > _WORTH * math.log(j - i) * variance:
             found.add(best)
             open_parts += [(i, best), (best, j)]
     return found
@@ -160,7 +160,7 @@ def _merged(sums: _Sums, knots: list[int], t: np.ndarray, variance: float) -> li
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
         speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
-        squares = sum(float(sums.left(i, j)) for i, j in pieces) / knots[-1]
+        squares = sum(float(sums.residual_squares(i, j)) for i, j in pieces) / knots[-1]
         left = math.sqrt(max(squares, variance))
         change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*knots[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
@@ -193,7 +193,7 @@ def _refined(
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
     t, x = time[i:j] - at, displacement[i:j]
     sums, places = _Sums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
-    both = sums.left(0, places) + sums.left(places, j - i)
+    both = sums.residual_squares(0, places) + sums.residual_squares(places, j - i)
     best = int(places[np.argmin(both)])
     lines = sums.line(0, best), sums.line(best, j - i)
     return at + _meeting(*lines, (t[best - 1], t[best]), variance)

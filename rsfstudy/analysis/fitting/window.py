@@ -72,6 +72,7 @@ class Window:
         return np.flatnonzero((time >= self._opens(self.step)) & (time <= self._closes()))
 
     def _closes(self) -> float:
+        """Time in s at which it ends."""
         record, step = self.record, self.step
         # a hold is fitted with the sliding that ends it
         later = [s for s in record.found if s.begins > step.ends and (step.after or s.before)]
@@ -80,16 +81,20 @@ class Window:
             last = record.time[record.time < self._opens(later[0])][-1]
         moved = record.columns["displacement"]
         at = np.interp(step.begins, record.time, moved)
+
+        def reached(distance: float) -> float:
+            """Time at which the load point has moved so far from the step, or the last one."""
+            beyond = (moved > at + distance) & (record.time > step.begins)
+            return float(record.time[np.argmax(beyond)] if beyond.any() else last)
+
         if self.after:
-            beyond = (moved > at + self.after) & (record.time > step.begins)
-            last = min(last, record.time[np.argmax(beyond)]) if beyond.any() else last
+            last = min(last, reached(self.after))
         if self.part < 1.0:
-            until = at + self.part * (np.interp(last, record.time, moved) - at)
-            beyond = (moved > until) & (record.time > step.begins)
-            last = record.time[np.argmax(beyond)]
+            last = reached(self.part * (np.interp(last, record.time, moved) - at))
         return float(last)
 
     def _opens(self, step: Step) -> float:
+        """Time in s at which the window of a step begins."""
         record = self.record
         earlier = [s.ends for s in record.found if s.ends < step.begins]
         first = max(earlier, default=record.time[0])
