@@ -188,17 +188,9 @@ class Fit(Measure):
     def _windows(self) -> tuple[Window, ...]:
         """The windows of steps that are fitted."""
         by_name = {record.name: record for record in self.records}
-        return tuple(
-            Window(
-                by_name[name],
-                number,
-                self.before,
-                self.after,
-                self.part,
-                {n for other, n in self.together if other == name},
-            )
-            for name, number in self._steps
-        )
+        others = {name: {n for other, n in self.together if other == name} for name in by_name}
+        ends = self.before, self.after, self.part
+        return tuple(Window(by_name[name], n, *ends, others[name]) for name, n in self._steps)
 
     @property
     def outputs(self) -> Sequence[Output]:
