@@ -48,7 +48,7 @@ def fit(
     rig: Laboratory | None = None,
     *,
     laws: Sequence[str] = ("slip", "slowness"),
-    free: Sequence[str] | None = None,
+    free: Sequence[str] = (),
     steps: Sequence[int] = (),
     together: bool = False,
     before: Any = 0.0,
@@ -76,11 +76,12 @@ def fit(
         Its stiffness is that of the machine, its slip distance the first guess.
     laws : sequence of str
         State evolution laws, a fit by each.
-    free : sequence of str, optional
+    free : sequence of str
         What to look for: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` of laws with two
         states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent`` (of
         "family"), ``step_time``, and ``trend1``, ``trend2`` and so on. Each law is fitted with
-        those that it has. By default a, all b and slip distances, ``mu_star`` and ``trend1``.
+        those that it has. If none is given, a, all b and slip distances, ``mu_star`` and
+        ``trend1``.
     steps : sequence of int
         Numbers of the steps to fit, from 1; all of them, if none is given. ``record.steps()``
         lists them.
@@ -158,10 +159,10 @@ def fit(
             raise InvalidValue("record", one, "is no record", remedy=remedy)
     numbers = _numbers(records, steps)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
-    if "alpha" in (free or ()):
+    if "alpha" in free:
         _check_stressed(records, loading)
         scene = {"normal_stress": "imposed", **scene}
-    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free or (), records[0]) * guess)
+    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
     sought = _of_laws(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
     measure = Fit(
@@ -289,13 +290,13 @@ def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: floa
     return Scene(**{**_SCENE, **effects, "law": laws[0], "stiffness": stiffness, **stated})
 
 
-def _of_laws(stated: Sequence[str] | None, laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
+def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
     """Parameters to look for: those stated, each of which some law has, or those of all laws."""
-    free = tuple(FREE if stated is None else stated)
+    free = tuple(stated) or FREE
     check_free(free)
     own = {law: of_law(scene.with_(law=law), free) for law in laws}
     shared = tuple(name for name in free if any(name in names for names in own.values()))
-    for name in free if stated is not None else ():
+    for name in stated:
         if name not in shared:
             rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = _STATES if name in (*_EFFECTS, "slip_distance_2") else ""

@@ -32,7 +32,7 @@ _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Most steps of a record that are listed.
 _MOST_STEPS = 24
 #: Options that `rsfstudy.fit` takes as they are.
-_TAKEN = ("stiffness", "slip_distance", "laws", "together", "before", "after", "windows",
+_TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
     "noise", "loading", "posterior", "budget", "engine")  # fmt: skip
 
 
@@ -109,7 +109,6 @@ def fit(given: Given) -> int:
         records,
         steps=[_number(text) for text in given.steps],
         command=given.command,
-        free=given.free or None,
         **{name: getattr(given, name) for name in _TAKEN},
         **assignments.fields(given.settings),
     )
