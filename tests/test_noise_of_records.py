@@ -119,7 +119,7 @@ def test_coefficients_are_recovered() -> None:
         noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=700))[300:]
         left = noise - base @ (base.T @ noise)
         plain.append(noises._partial([left], 1)[0])
-        reml.append(noises.fit_noise("ar1", time, left, jacobian).partial[0, 0])
+        reml.append(noises.fitted("ar1", time, left, jacobian).partial[0, 0])
     # of 60 draws the mean has a standard error of sqrt((1 - .81)/400/60) = .0028
     assert abs(np.mean(reml) - 0.9) < 0.009
     assert np.mean(plain) < 0.885  # what the fit takes up is missing
@@ -142,12 +142,12 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     slow = lfilter([1.0], [1.0, -0.5], rng.normal(size=600)) * math.sqrt(0.75)
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
-    found = noises.fit_noise("ar1", time, left, np.ones((1_500, 1)))
+    found = noises.fitted("ar1", time, left, np.ones((1_500, 1)))
     assert [(*run[:2], run.before) for run in found.runs] == [(0, 600, 0), (600, 1_500, 600)]
     coefficients = dict(zip([run.number for run in found.runs], (0.5, 0.95), strict=True))
     for number, exact in coefficients.items():
         assert found.partial[number, 0] == pytest.approx(exact, abs=0.12)
-    for noise in (found, noises.fit_noise("white", time, left, np.ones((1_500, 1)))):
+    for noise in (found, noises.fitted("white", time, left, np.ones((1_500, 1)))):
         # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
         sizes = noise.sizes[[run.number for run in noise.runs]]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)

@@ -162,7 +162,7 @@ def white(time: np.ndarray) -> Noise:
     return Noise(runs, np.zeros((_count(runs), 0)), np.ones(_count(runs)))
 
 
-def fit_noise(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndarray) -> Noise:
+def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndarray) -> Noise:
     """The noise that residuals of a fit tell, by REML.
 
     Parameters

@@ -145,7 +145,7 @@ class Search:
         All parameters; those that are free to begin with.
     free : sequence of str
     noise : str
-        As `noise.fit_noise` takes it.
+        As `noise.fitted` takes it.
     """
 
     def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
@@ -208,7 +208,7 @@ class Search:
                 x - before, noise.whitened(np.column_stack([jacobian, left]))
             ):
                 break
-            noise = noises.fit_noise(self.noise_model, self.model.time, left, jacobian)
+            noise = noises.fitted(self.noise_model, self.model.time, left, jacobian)
         found = self._result(x, noise)
         if not (self.has_converged or found.unidentified):
             text = f"the search did not end within {_CURVES} curves"
