@@ -1,6 +1,8 @@
 """A part is one file: what a law of another kind takes, and that everything follows from it."""
 
+import inspect
 import math
+import re
 from dataclasses import dataclass
 
 import pytest
@@ -44,6 +46,14 @@ def test_a_part_owns_its_fields():
 
 def half_as_strong(friction, ratio, change, p):
     return 0.5 * p[NORMAL_STRESS] * math.log(ratio), 0.5 * p[NORMAL_STRESS] * change / ratio
+
+
+def test_every_part_states_its_equation():
+    """In its own docstring or in those of its functions: the page of names shows them."""
+    for part in registry.OWNERS.values():
+        functions = (one.__func__ for one in vars(part).values() if isinstance(one, staticmethod))
+        stated = " ".join(inspect.getdoc(one) or "" for one in (part, *functions))
+        assert part.name == "slider" or re.search("``[^`]+=[^`]+``", stated), part
 
 
 @dataclass(frozen=True, kw_only=True)

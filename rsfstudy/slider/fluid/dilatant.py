@@ -50,7 +50,12 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 class Dilatant(Fluid):
     """Pores that open with slip rate, in a fault that exchanges fluid with what surrounds it.
 
-    Pore pressure begins at that of the surroundings, as in steady sliding.
+    Pore pressure begins at that of the surroundings, as in steady sliding, where porosity is
+    ``phi = phi_0 + eps ln(V/V_*)``.
+
+    References
+    ----------
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
 
     dilatancy: float = number(

@@ -14,8 +14,16 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 @dataclass(frozen=True, kw_only=True)
 class Oscillation(_train.Train):
-    """Imposed normal stress ``sigma_* [1 + A sin(2 pi (t - t_b)/T_o + phase)]`` from t_b on, for
-    some cycles or for ever, and load point velocity (V_* unless stated).
+    """Oscillation of imposed normal stress under a steady load point velocity V_0.
+
+    ``sigma/sigma_* = 1 + A sin(2 pi (t - t_b)/T_o + phi_o)`` for t from t_b to t_b + N_o T_o, with
+    amplitude A, period T_o, phase phi_o in degrees and N_o cycles; sigma = sigma_* before and
+    after. The defaults are t_b = 0, phi_o = 0, no end and V_0 = V_*. Of a driving stress inclined
+    to the fault it is sigma_3 that changes so.
+
+    References
+    ----------
+    Boettcher and Marone (2004), J. Geophys. Res. 109, B03406.
     """
 
     oscillation_amplitude: float = number(

@@ -13,7 +13,7 @@ from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
     """Change of P per unit slip in D_c, times a share: at a steady rate in time, by which it goes
-    to 0 from all that normal stress is yet to change by.
+    to 0 from all that normal stress is yet to change by, ``dP/dt = -Delta_sigma/t_r``.
 
     Parameters
     ----------
@@ -36,8 +36,11 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 @dataclass(frozen=True, kw_only=True)
 class Ramp(AtVelocity):
-    """Change of imposed normal stress from steady sliding on, how long it takes, and load point
-    velocity (V_* unless stated).
+    """Ramp of imposed normal stress under a steady load point velocity V_0, V_* unless stated.
+
+    ``sigma(t) = sigma_* + Delta_sigma min(t/t_r, 1)`` from steady sliding at t = 0 on, with the
+    change Delta_sigma over sigma_* and the duration t_r in D_c/V_*. Of a driving stress inclined to
+    the fault it is sigma_3 that changes so.
     """
 
     normal_stress_ramp: float = number(

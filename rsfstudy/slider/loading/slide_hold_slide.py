@@ -10,7 +10,15 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, number
 
 @dataclass(frozen=True, kw_only=True)
 class SlideHoldSlide(AtVelocity):
-    """Hold time, and load point velocity on reloading (V_* unless stated)."""
+    """Hold of the load point for a time, then reloading.
+
+    ``V_load(t) = 0`` for t from 0 to t_h, and ``V_load(t) = V_0`` for t > t_h; t_h is in D_c/V_*,
+    and V_0 is V_* unless stated.
+
+    References
+    ----------
+    Dieterich (1972), J. Geophys. Res. 77, 3690-3697.
+    """
 
     hold_time: float = number(
         0.0,

@@ -12,8 +12,11 @@ from rsfstudy.slider.parts import number
 
 @dataclass(frozen=True, kw_only=True)
 class Step(AtVelocity):
-    """Load point velocity ``V_0(t) = V_0`` for t > 0, and change of displacement and normal stress
-    in the step.
+    """Step of load point velocity, load point displacement or normal stress at t = 0.
+
+    ``V_load(t) = V_0`` and ``sigma(t) = sigma_* + Delta_sigma`` for t > 0, and the load point moves
+    by ``Delta_delta_0`` at t = 0, by which spring stress changes by k Delta_delta_0. Velocities are
+    over V_*, displacements over D_c and stresses over sigma_*.
     """
 
     load_velocity_ratio: float | None = velocity_ratio()

@@ -12,10 +12,13 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityOscillation(_train.Train):
-    """Load point velocity ``V_0 [1 + A sin(2 pi (t - t_b)/T_o + phase)]`` from t_b on.
+    """Oscillation of load point velocity about its mean V_0.
 
-    The load point is ahead of its mean motion by ``D = R [cos(phase) - cos(omega t + phase)]``,
-    with R = A V_0/omega, and so imposes shear stress K D, which its last unknown follows (see
+    ``V_load(t) = V_0 [1 + A_V sin(2 pi (t - t_b)/T_o + phi_o)]`` for t from t_b to t_b + N_o T_o,
+    with amplitude A_V over the mean, period T_o, phase phi_o in degrees and N_o cycles, and V_0
+    before and after. The load point is ahead of its mean motion by
+    ``D = R [cos(phi_o) - cos(omega (t - t_b) + phi_o)]`` with ``R = A_V V_0/omega`` and
+    ``omega = 2 pi/T_o``, and so imposes shear stress K D, which its last unknown follows (see
     `friction`).
     """
 

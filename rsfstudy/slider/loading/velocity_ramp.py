@@ -10,10 +10,12 @@ from rsfstudy.slider.parts import POSITIVE, Scene, number
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityRamp(Loading):
-    """Change of load point velocity, how long it takes, and into how many stairs it is divided.
+    """Ramp of load point velocity from V_*, divided into stairs.
 
-    In each stair the load point moves at the mean velocity of the ramp there, so that it is where
-    it should be at the end of each. What that leaves falls with the square of their number.
+    ``V_load(t) = V_* + Delta_V_0 min(t/t_r, 1)``, with the change Delta_V_0 over V_* and the
+    duration t_r in D_c/V_*. In each of n stairs the load point moves at the mean velocity of the
+    ramp there, ``V_j = V_* + Delta_V_0 (j - 1/2)/n``, so that it is where it should be at the end
+    of each. What that leaves falls with the square of their number.
     """
 
     velocity_ramp: float = number(

@@ -11,10 +11,11 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Scene, number
 
 @dataclass(frozen=True, kw_only=True)
 class VelocitySteps(Loading):
-    """Number of steps, their ratio, and the load point displacement from one to the next.
+    """Steps of load point velocity from V_* to r V_* and back in turn.
 
-    The first is from V_* to `velocity_ratio` V_*, the second back, and so on; the velocity that the
-    last leads to goes on for ever.
+    ``V_load(t) = r V_*`` after the first step and each second one from there, ``V_load(t) = V_*``
+    after the others. The load point moves by ``Delta_delta_0`` (over D_c) from one step to the
+    next; the velocity that the last leads to goes on for ever.
     """
 
     velocity_steps: float = number(

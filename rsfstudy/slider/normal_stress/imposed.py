@@ -20,8 +20,14 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Imposed(StateEffect):
-    """Normal stress that the loading imposes, ``sigma = sigma_* + Delta sigma(t)``, with an effect
-    `alpha` of it on the state.
+    """Normal stress that the loading imposes, with an effect `alpha` of it on the state.
+
+    ``sigma = sigma_* + Delta_sigma(t)`` and ``dTheta = -alpha dsigma/sigma`` beside the evolution
+    law.
+
+    References
+    ----------
+    Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940.
     """
 
     name = "imposed"

@@ -34,7 +34,16 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Variable(StateEffect):
-    """A driving stress inclined at `phi`, with an effect `alpha` of normal stress on the state."""
+    """A driving stress inclined at `phi`, with an effect `alpha` of normal stress on the state.
+
+    ``sigma = sigma_3 + tau cot(phi)``, and ``dTheta = -alpha dsigma/sigma`` beside the evolution
+    law.
+
+    References
+    ----------
+    Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940; eq. 5 of
+    doi:10.1007/s11589-014-0098-4.
+    """
 
     phi: float = number(
         60.0,
