@@ -33,7 +33,7 @@ def test_a_step_back_is_the_step_down_from_there(law):
     stepped = Scene(
         law=law, **PLAIN, velocity_steps=2, velocity_ratio=5.0, displacement_between_steps=25.0
     )
-    back = read(VelocityStep(step_number=2, phases=2), stepped)
+    back = read(VelocityStep(step_number=2, phases=50), stepped)
     down = read(
         VelocityStep(phases=2), Scene(law=law, **PLAIN, velocity_steps=1, velocity_ratio=0.2)
     )
@@ -43,6 +43,9 @@ def test_a_step_back_is_the_step_down_from_there(law):
     assert back["friction_before"] - stepped.mu_star == pytest.approx(
         (stepped.a - stepped.b) * math.log(5.0), rel=1e-7
     )
+    # the record begins with the step, where slip rate is highest
+    assert back["slip"][0] == 0.0
+    assert back["log10_slip_rate"].argmax() == 0
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -1,19 +1,24 @@
-"""Shared by the measures that keep points of a motion, or read numbers off it as an experimenter
-does.
+"""Records of motions: what the measures share that keep points of a motion, or read numbers off it
+as an experimenter does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.events import Event
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import Event, EventSpecification, Kind
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import FRICTION, LOAD_POINT
+from rsfstudy.motion.recording import PLACE, Recording
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 
@@ -43,6 +48,86 @@ def recorded(*names: str) -> tuple[Output, ...]:
     return tuple(
         Output(q.name, q.symbol, q.units, q.long_name, q.scale, dims=("phase",)) for q in abouts
     )
+
+
+class Record(NamedTuple):
+    """A motion from the beginning of a segment of loading on.
+
+    Attributes
+    ----------
+    begun : list of Event
+        Where that segment begins, and each later one.
+    peak : Event or None
+        The extreme that was asked for; None where there is none.
+    end : Event
+        The last event.
+    rows : ndarray
+        What was recorded, shape (rows, columns): see `motion.recording`.
+    """
+
+    begun: list[Event]
+    peak: Event | None
+    end: Event
+    rows: np.ndarray
+
+    @property
+    def begin(self) -> Event:
+        """Where the record begins."""
+        return self.begun[0]
+
+
+def followed(
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: Meter,
+    asked: Sequence[EventSpecification],
+    first: int,
+    within: int,
+    *,
+    until: float = math.inf,
+    halts: bool = False,
+) -> Record:
+    """Record of a motion up to its first extreme in a segment of loading, or to where the next one
+    begins without one; or as long as told.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : Meter
+    asked : sequence of EventSpecification
+        The extreme first; others may end the motion.
+    first, within : int
+        Numbers, from 0, of the segment at which the record begins, and of the one in which the
+        extreme is.
+    until : float
+        Time at which to end, in D_c/V_*.
+    halts : bool
+        Whether the motion may be unable to go on once the extreme is reached.
+
+    Raises
+    ------
+    Halt
+        Where the motion cannot go on.
+    """
+    recording, begun, peak = Recording(), list[Event](), None
+    try:
+        for event in follow(
+            scene, accuracy, meter, asked, clock=True, recording=recording, until=until
+        ):
+            if event.kind in (Kind.START, Kind.SEGMENT):
+                begun.append(event)
+            elif event.watch == asked[0] and len(begun) == within + 1 and peak is None:
+                peak = event
+            if until == math.inf and (peak is not None or len(begun) > within + 1):
+                break
+    except Halt:
+        if peak is None or not halts:
+            raise
+    rows = recording.seen(scene)
+    rows = rows[rows[:, 0] >= begun[first].time]
+    rows[0, PLACE] = 0.0  # of the step that ends there, no other rows are left
+    return Record(begun[first:], peak, event, rows)
 
 
 def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, errors_of, recorded, since
+from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, maximum, settling
+from rsfstudy.motion.events import Event, maximum, settling
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
-from rsfstudy.motion.recording import READ, Recording, along_path
+from rsfstudy.motion.recording import READ, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
@@ -56,15 +55,6 @@ _OUTPUTS = (
     ),
     *recorded("time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
 )
-
-
-class _Record(NamedTuple):
-    """Events of a hold: its beginning, reloading and the peak; and what was recorded."""
-
-    begin: Event
-    reload: Event
-    peak: Event | None
-    rows: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -115,10 +105,11 @@ class Healing(Recorded):
         """Numbers read off a motion, and once more with smaller tolerances for the errors."""
         hold = _hold(scene)
         first = _follow(scene, hold, accuracy, meter)
-        said = _beginning(scene, hold, first.begin, max(_STEADY, accuracy.rtol))
+        begin, reload = first.begun[:2]
+        said = _beginning(scene, hold, begin, max(_STEADY, accuracy.rtol))
         peakless = Outcome(
             Status.NOT_APPLICABLE,
-            {"relaxation": _relaxation(scene, first)},
+            {"relaxation": reload.point.reading - begin.point.reading},
             "; ".join(filter(None, ("no peak of friction on reloading", said))),
         )
         if first.peak is None:
@@ -126,7 +117,10 @@ class Healing(Recorded):
         again = _follow(scene, hold, accuracy.refined(), meter, self._end(scene, hold, first.peak))
         if again.peak is None:
             return peakless
-        values, refined = _read(scene, first, first.peak), _read(scene, again, again.peak)
+        values, refined = (
+            _read(scene, record.begun, peak)
+            for record, peak in ((first, first.peak), (again, again.peak))
+        )
         # friction peaks where slip rate passes that of the load point, ln V being friction over a
         turning = 1.0 / (scene.a * first.peak.point.growth) if first.peak.point.growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
@@ -143,7 +137,7 @@ class Healing(Recorded):
         goes_on = self.record / history[hold + 1].load_velocity
         return min(peak.time + goes_on, math.fsum(s.duration for s in history[: hold + 2]))
 
-    def _shown(self, scene: Scene, record: _Record) -> dict[str, np.ndarray]:
+    def _shown(self, scene: Scene, record: Record) -> dict[str, np.ndarray]:
         """The record itself, from the beginning of the hold on."""
         path = along_path(record.rows, self.phases, READ)
         moved = load_point_of(scene, np.column_stack([*path.values()]))
@@ -180,39 +174,21 @@ def _beginning(scene: Scene, hold: int, begin: Event, near: float) -> str:
 
 def _follow(
     scene: Scene, hold: int, accuracy: Accuracy, meter: Meter, until: float = math.inf
-) -> _Record:
+) -> Record:
     """From before the hold to the peak, or to where friction has settled or the next segment begins
     without one; or as long as told, or as the motion can go on after the peak.
     """
-    begun: list[Event] = []
-    peak, recording, watch = None, Recording(), maximum(watched(scene)[0])
-    watches = (watch, settling(_SETTLED, ends=until == math.inf))
-    motion = follow(scene, accuracy, meter, watches, clock=True, recording=recording, until=until)
-    try:
-        for event in motion:
-            if event.kind in (Kind.START, Kind.SEGMENT):
-                begun.append(event)
-            elif event.watch == watch and len(begun) == hold + 2 and peak is None:
-                peak = event
-            over = peak is not None or len(begun) > hold + 2
-            if over and until == math.inf:
-                break
-    except Halt:
-        if peak is None:
-            raise
-    rows = recording.seen(scene)
-    return _Record(begun[hold], begun[hold + 1], peak, rows[rows[:, 0] >= begun[hold].time])
+    peak, settled = maximum(watched(scene)[0]), settling(_SETTLED, ends=until == math.inf)
+    asked = peak, settled
+    return followed(scene, accuracy, meter, asked, hold, hold + 1, until=until, halts=True)
 
 
-def _relaxation(scene: Scene, record: _Record) -> float:
-    return record.reload.point.reading - record.begin.point.reading
-
-
-def _read(scene: Scene, record: _Record, peak: Event) -> dict[str, float]:
-    before = record.begin.point.reading
-    longer = (peak.point.spring_stress - record.reload.point.spring_stress) / scene.stiffness
+def _read(scene: Scene, begun: Sequence[Event], peak: Event) -> dict[str, float]:
+    """Healing, relaxation and the displacement from reloading to the peak."""
+    before, reload = begun[0].point.reading, begun[1]
+    longer = (peak.point.spring_stress - reload.point.spring_stress) / scene.stiffness
     return {
         "healing": peak.point.reading - before,
-        "relaxation": _relaxation(scene, record),
-        "peak_displacement": peak.slip - record.reload.slip + longer,
+        "relaxation": reload.point.reading - before,
+        "peak_displacement": peak.slip - reload.slip + longer,
     }

@@ -11,14 +11,14 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, errors_of, recorded, since
+from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
 from rsfstudy.measures._single_step import check_leaves_alone
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, fall, maximum, minimum, rise
+from rsfstudy.motion.events import Event, fall, maximum, minimum, rise
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import friction_of, unsteady, watched
-from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
+from rsfstudy.motion.recording import OBSERVED, READ, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
@@ -89,17 +89,6 @@ class _Step(NamedTuple):
     def ratio(self) -> float:
         """ln r, the logarithm of the velocity after over that before."""
         return math.log(self.after / self.before)
-
-
-class _Record(NamedTuple):
-    """Events of a step: where the record begins and ends, and the peak between if there is one;
-    and what was recorded.
-    """
-
-    begin: Event
-    peak: Event | None
-    end: Event
-    rows: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -200,23 +189,15 @@ class VelocityStep(Recorded):
 
     def _follow(
         self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter
-    ) -> tuple[_Record, dict[str, float]]:
+    ) -> tuple[Record, dict[str, float]]:
         """The record, and what is read off it."""
         extreme = maximum if step.ratio > 0.0 else minimum
-        turn, recording = extreme(watched(scene)[0]), Recording()
-        begun: list[Event] = []
-        peak, end = None, step.start_time + step.duration
-        for event in follow(scene, accuracy, meter, [turn], recording=recording, until=end):
-            if event.kind in (Kind.START, Kind.SEGMENT):
-                begun.append(event)
-            elif event.watch == turn and len(begun) == self.step_number and peak is None:
-                peak = event
-        rows = recording.seen(scene)
-        begin = begun[self.step_number - 1]
-        record = _Record(begin, peak, event, rows[rows[:, 0] >= begin.time])
+        number, end = self.step_number - 1, step.start_time + step.duration
+        turn = extreme(watched(scene)[0])
+        record = followed(scene, accuracy, meter, [turn], number, number, until=end)
         return record, self._read(step, record, self._left(scene, record, accuracy, meter))
 
-    def _read(self, step: _Step, record: _Record, left: Event | None) -> dict[str, float]:
+    def _read(self, step: _Step, record: Record, left: Event | None) -> dict[str, float]:
         """Numbers that are read off; NaN for those of the peak where there is none."""
         before, after = (e.point.reading for e in (record.begin, record.end))
         top = record.peak.point.reading if record.peak else math.nan
@@ -231,9 +212,7 @@ class VelocityStep(Recorded):
             "friction_after": after,
         }
 
-    def _left(
-        self, scene: Scene, record: _Record, accuracy: Accuracy, meter: Meter
-    ) -> Event | None:
+    def _left(self, scene: Scene, record: Record, accuracy: Accuracy, meter: Meter) -> Event | None:
         """Event where 1/e of the evolution is left, with time and slip since the peak: followed
         from there, because the step that holds the peak may hold a crossing of the level on either
         side.
@@ -251,7 +230,7 @@ class VelocityStep(Recorded):
         events = follow(stepped, accuracy, meter, [watch], start=peak.point, until=rest)
         return next((event for event in events if event.watch == watch), None)
 
-    def _shown(self, scene: Scene, step: _Step, record: _Record) -> dict[str, float | np.ndarray]:
+    def _shown(self, scene: Scene, step: _Step, record: Record) -> dict[str, float | np.ndarray]:
         """True if friction has settled, how far it departs from that of a stiff slider, and the
         record itself.
         """
@@ -282,7 +261,7 @@ def _by_friction(step: _Step, values: Mapping[str, float]) -> dict[str, float]:
     return dict.fromkeys(values, 1.0) | effects | {n: over_friction * values[n] for n in distances}
 
 
-def _departure(scene: Scene, step: _Step, record: _Record) -> float:
+def _departure(scene: Scene, step: _Step, record: Record) -> float:
     """Largest departure of friction, from the peak on, from what a stiff slider shows after so much
     slip: the steady change, ``(a - b) ln r`` by most laws, and ``b relaxation(ln r, slip)``; NaN
     where there is no such form.
@@ -301,7 +280,7 @@ def _departure(scene: Scene, step: _Step, record: _Record) -> float:
     return float(np.abs(seen - expected).max())
 
 
-def _has_closed_form(scene: Scene, step: _Step, record: _Record) -> bool:
+def _has_closed_form(scene: Scene, step: _Step, record: Record) -> bool:
     """True if friction alone acts, and slides steadily before the step, at a rate from which the
     law counts.
     """
