@@ -30,29 +30,13 @@ _TURNS = 3.0
 #: Part of the largest distance from steady sliding at which there is no more peak to come.
 _SETTLED = 1e-6
 
+_DISPLACED = "load point displacement from reloading to the peak of friction"
+_HEALED = "healing: peak friction on reloading less friction before the hold"
+_RELAXED = "change of friction during the hold: that at its end less that before"
 _OUTPUTS = (
-    Output(
-        "healing",
-        r"$\Delta\mu$",
-        "1",
-        "healing: peak friction on reloading less friction before the hold",
-        error=True,
-    ),
-    Output(
-        "relaxation",
-        r"$\Delta\mu_c$",
-        "1",
-        "change of friction during the hold: that at its end less that before",
-        error=True,
-    ),
-    Output(
-        "peak_displacement",
-        r"$\delta_0/D_c$",
-        "1",
-        "load point displacement from reloading to the peak of friction",
-        "D_c",
-        error=True,
-    ),
+    Output("healing", r"$\Delta\mu$", "1", _HEALED, error=True),
+    Output("relaxation", r"$\Delta\mu_c$", "1", _RELAXED, error=True),
+    Output("peak_displacement", r"$\delta_0/D_c$", "1", _DISPLACED, "D_c", error=True),
     *recorded("time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
 )
 

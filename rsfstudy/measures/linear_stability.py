@@ -38,9 +38,7 @@ _OUTPUTS = (
     Output("relative_critical_stiffness"),
     Output(
         "rise_by_dynamics",
-        "",
-        "1",
-        "fraction by which mass raises, or radiation lowers, the critical stiffness",
+        long_name="fraction by which mass raises, or radiation lowers, the critical stiffness",
     ),
     Output("steady_friction"),
     Output("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),

@@ -28,47 +28,35 @@ from rsfstudy.status import Status
 #: Part of a by which friction evolves after a step, at least: less is lost to rounding.
 _EVOLVES = 1e-9
 
-_OUTPUTS = (
-    Output("evolution_distance", error=True),
-    Output("direct_stress_change", "", "1", "stress change just after a rate step", "sigma_*"),
-    Output(
-        "direct_asymmetry",
-        "",
-        "1",
-        "direct stress change of the step over that of its inverse, less 1",
-    ),
-    Output(
+#: Stress changes over sigma_*, and their quotients.
+_CHANGES = (
+    ("direct_stress_change", "sigma_*", "stress change just after a rate step"),
+    ("direct_asymmetry", "", "direct stress change of the step over that of its inverse, less 1"),
+    (
         "evolution_asymmetry",
         "",
-        "1",
         "stress change from direct effect to steady state over that of the inverse step, less 1",
     ),
-    Output(
-        "steady_stress_change", "", "1", "change of steady-state stress by a rate step", "sigma_*"
-    ),
-    Output(
-        "stress_left_at_unit_slip",
-        "",
-        "1",
-        "stress above its steady state after a slip of D_c",
-        "sigma_*",
-    ),
-    Output(
+    ("steady_stress_change", "sigma_*", "change of steady-state stress by a rate step"),
+    ("stress_left_at_unit_slip", "sigma_*", "stress above its steady state after a slip of D_c"),
+    (
         "closed_form_misfit",
-        "",
-        "1",
-        "largest departure of stress from the closed form at constant normal stress",
         "sigma_*",
+        "largest departure of stress from the closed form at constant normal stress",
     ),
-    Output(
+    (
         "exponential_misfit",
         "",
-        "1",
         "largest departure from exponential decay over D_c, as a fraction of the stress change",
     ),
-    Output("shear_stress", dims=("slip",)),
-    Output("normal_stress_ratio", dims=("slip",)),
-    Output("state_variable", dims=("slip",)),
+)
+_OUTPUTS = (
+    Output("evolution_distance", error=True),
+    *(Output(name, "", "1", meaning, scale) for name, scale, meaning in _CHANGES),
+    *(
+        Output(name, dims=("slip",))
+        for name in ("shear_stress", "normal_stress_ratio", "state_variable")
+    ),
 )
 
 

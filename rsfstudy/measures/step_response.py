@@ -31,9 +31,8 @@ _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
     Output(
         "peak_ratio",
-        "",
-        "1",
-        "second over first peak of ln V above the load point velocity: 1 where oscillations repeat",
+        long_name="second over first peak of ln V above the load point velocity: 1 where "
+        "oscillations repeat",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
     *recorded(*OBSERVED),

@@ -31,47 +31,31 @@ _LAST, _STAYS = 0.1, 0.01
 #: Part of ln r within which slip is steady before the step.
 _STEADY = 1e-3
 
+#: What is read off: name, symbol, scale and meaning.
+_READ_OFF = (
+    ("apparent_a", "$a$", "", "direct effect parameter as read off"),
+    ("apparent_b", "$b$", "", "evolution effect parameter as read off"),
+    ("apparent_a_minus_b", "$a-b$", "", "rate dependence of friction as read off"),
+    *(
+        (name, "$D_c$", "D_c", f"{moved} from the peak until 1/e of the evolution is left")
+        for name, moved in (
+            ("apparent_slip_distance", "load point displacement"),
+            ("corrected_slip_distance", "slip"),
+        )
+    ),
+    ("peak_friction", r"$\mu$", "", "friction coefficient at the peak after the step"),
+    ("friction_before", r"$\mu$", "", "friction coefficient just before the step"),
+    ("friction_after", r"$\mu$", "", "friction coefficient at the end of the record"),
+)
 _OUTPUTS = (
-    Output("apparent_a", "$a$", "1", "direct effect parameter as read off", error=True),
-    Output("apparent_b", "$b$", "1", "evolution effect parameter as read off", error=True),
-    Output(
-        "apparent_a_minus_b", "$a-b$", "1", "rate dependence of friction as read off", error=True
+    *(
+        Output(name, symbol, "1", meaning, scale, error=True)
+        for name, symbol, scale, meaning in _READ_OFF
     ),
-    Output(
-        "apparent_slip_distance",
-        "$D_c$",
-        "1",
-        "load point displacement from the peak until 1/e of the evolution is left",
-        "D_c",
-        error=True,
-    ),
-    Output(
-        "corrected_slip_distance",
-        "$D_c$",
-        "1",
-        "slip from the peak until 1/e of the evolution is left",
-        "D_c",
-        error=True,
-    ),
-    Output(
-        "peak_friction",
-        r"$\mu$",
-        "1",
-        "friction coefficient at the peak after the step",
-        error=True,
-    ),
-    Output(
-        "friction_before", r"$\mu$", "1", "friction coefficient just before the step", error=True
-    ),
-    Output(
-        "friction_after", r"$\mu$", "1", "friction coefficient at the end of the record", error=True
-    ),
-    Output("settled", "", "1", "whether friction has settled at the end of the record"),
+    Output("settled", long_name="whether friction has settled at the end of the record"),
     Output(
         "closed_form_departure",
-        "",
-        "1",
-        "largest departure of friction, from the peak on, from that of a stiff slider",
+        long_name="largest departure of friction, from the peak on, from that of a stiff slider",
     ),
     *recorded("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
 )
