@@ -33,7 +33,6 @@ def once(make: Callable[Concatenate[Any, P], T]) -> Callable[Concatenate[Any, P]
         key = make, *stated, *named.values()
         if key not in scene.made:
             scene.made[key] = make(scene, *stated, **named)
-        found: T = scene.made[key]
-        return found
+        return scene.made[key]
 
     return known

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsfstudy.slider.derived import once
-from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import Form, functions
+from rsfstudy.slider.system import Form, System, functions
 
 #: The regime of the full equations of a scene with mass, and that of a rigid slider.
 IN_RUPTURE, RIGID = "inertial", "rigid"
@@ -65,8 +64,7 @@ class Equations(NamedTuple):
 
     def rates(self, state: Numbers) -> Numbers:
         """Derivatives of the unknowns."""
-        changes: Numbers = self.rate(state, self.p)
-        return changes
+        return self.rate(state, self.p)
 
     @property
     def is_rigid(self) -> bool:
@@ -75,8 +73,7 @@ class Equations(NamedTuple):
 
     def at(self, state: Numbers) -> Point:
         """The point of the motion at a state."""
-        now: Point = self.point(state, self.rate(state, self.p), self.p)
-        return now
+        return self.point(state, self.rate(state, self.p), self.p)
 
 
 @once
@@ -84,7 +81,7 @@ def between_ruptures(scene: Scene, *, clock: bool) -> Equations:
     """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
     of a law that has several), and time as a passenger where a `clock` is wanted.
     """
-    return _slow(scene, scene.dynamics, clock=clock)
+    return _slow(scene, scene.functions, scene.dynamics.regime, clock=clock)
 
 
 @once
@@ -92,34 +89,22 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
     """The form between ruptures with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
         return between_ruptures(scene, clock=clock)
-    return _slow(scene, QuasiStatic(), clock=clock)
+    return _slow(scene, functions(scene, QuasiStatic()), QuasiStatic.regime, clock=clock)
 
 
-def _slow(scene: Scene, dynamics: Dynamics, *, clock: bool) -> Equations:
-    forms = scene.functions if dynamics is scene.dynamics else functions(scene, dynamics)
-    unknowns: tuple[str, ...] = ("spring_stress", *_states(scene))
-    scales, form = (scene.a,) * len(unknowns), forms.between_ruptures
-    return _along_path(
-        scene, dynamics.regime, form, unknowns, scales, clock=clock, balance=forms.balance
+def _slow(scene: Scene, forms: System, regime: str, *, clock: bool) -> Equations:
+    unknowns, form = ("spring_stress", *_states(scene)), forms.between_ruptures
+    scales, p = (scene.a,) * len(unknowns), scene.numbers
+    equations = Equations(
+        regime, unknowns, scales, form.rate, form.point, p, scene.states, forms.balance
     )
+    return _with_time(equations, form) if clock else equations
 
 
-def _along_path(
-    scene: Scene,
-    regime: str,
-    form: Form,
-    unknowns: tuple[str, ...],
-    scales: tuple[float, ...],
-    *,
-    clock: bool,
-    balance: Function | None = None,
-) -> Equations:
-    """Equations along the path, with time as a passenger where a `clock` is wanted."""
-    rate = form.rate
-    if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), form.rate_with_time
-    p, count = scene.numbers, scene.states
-    return Equations(regime, unknowns, scales, rate, form.point, p, count, balance)
+def _with_time(equations: Equations, form: Form) -> Equations:
+    """The same equations with time, of the form's clock, as a passenger."""
+    names, scales = (*equations.unknowns, "time"), (*equations.scales, 1.0)
+    return equations._replace(unknowns=names, scales=scales, rate=form.rate_with_time)
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -134,10 +119,11 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
-    a, others = scene.a, _states(scene)[1:]
+    a, form, others = scene.a, _full(scene), _states(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
-    scales = (a, 1.0, a, *[a] * len(others))
-    return _along_path(scene, IN_RUPTURE, _full(scene), unknowns, scales, clock=clock)
+    scales, p = (a, 1.0, a, *[a] * len(others)), scene.numbers
+    equations = Equations(IN_RUPTURE, unknowns, scales, form.rate, form.point, p, scene.states)
+    return _with_time(equations, form) if clock else equations
 
 
 def _full(scene: Scene) -> Form:
@@ -173,14 +159,9 @@ def relation_of(
     """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
     pore pressure of steady sliding, unless states are given.
     """
-    relation, p = scene.functions.friction.strength, scene.numbers_of_friction
+    strength, p = scene.functions.friction.strength, scene.numbers_of_friction
     known = psis or (0.0,) * scene.states
-
-    def at(friction: float) -> tuple[float, float, float, float]:
-        values: tuple[float, float, float, float] = relation(friction, known, p)
-        return values
-
-    return at
+    return lambda friction: strength(friction, known, p)
 
 
 def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float:
@@ -203,28 +184,17 @@ def log_slip_rate_at(scene: Scene, spring_stress: float, psi: float) -> float:
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
-
-    def at(log_slip_rate: float, state: float) -> float:
-        return float(evolutions(log_slip_rate, (state,), 0.0, 1.0, p)[0])
-
-    return at
+    evolve = evolutions_of(scene)
+    return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]
 
 
 def evolutions_of(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
-
-    def at(log_slip_rate: float, psis: Numbers, shift: float) -> Numbers:
-        changes: Numbers = evolutions(log_slip_rate, psis, shift, 1.0, p)
-        return changes
-
-    return at
+    return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
 def steady_states_of(scene: Scene, log_slip_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
-    psis: Numbers = scene.functions.friction.steady_states(
-        log_slip_rate, shift, scene.numbers_of_friction
-    )
-    return psis
+    p = scene.numbers_of_friction
+    return scene.functions.friction.steady_states(log_slip_rate, shift, p)

@@ -120,46 +120,35 @@ def constant(g: float, p: Numbers) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def constant_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-    """The same, whatever the states."""
-    return 0.0, 0.0
-
-
-def stress_of(normal_stress: Function | None) -> Function:
-    """``s - 1`` and its slope, of ``(g, p) -> (sigma/sigma_* - 1, its slope)`` without pressure."""
-    if normal_stress is None:
-        return constant_stress
+@cache
+def stress_of(normal_stress: Function, place: int) -> Function:
+    """``(g, psis, p) -> (s - 1, its slope)``, made of ``(g, p) -> (sigma/sigma_* - 1, its slope)``
+    and the pore pressure at a place among the states, from their end; 0 where there is none.
+    """
 
     def total_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-        stress: tuple[float, float] = normal_stress(g, p)
-        return stress
-
-    return total_stress
-
-
-def less_pressure(normal_stress: Function, place: int = -1) -> Function:
-    """``s - 1`` and its slope, of the same and the pore pressure that stands last, or elsewhere."""
+        return normal_stress(g, p)
 
     def effective_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         excess, change = normal_stress(g, p)
         return min(max(excess - psis[place], SMALLEST_RATIO - 1.0), LARGEST_RATIO), change
 
-    return effective_stress
+    return effective_stress if place else total_stress
+
+
+@cache
+def pressure_at(place: int) -> Function:
+    """``(psis) -> P`` at a place; 0 where there is none."""
+
+    def pressure(psis: Numbers) -> float:
+        return psis[place]
+
+    return pressure if place else no_pressure
 
 
 def no_pressure(psis: Numbers) -> float:
     """P where there is none."""
     return 0.0
-
-
-@cache
-def pressure_at(place: int) -> Function:
-    """``(psis) -> P`` at a place."""
-
-    def pressure(psis: Numbers) -> float:
-        return psis[place]
-
-    return pressure
 
 
 Relation = tuple[float, float, float, float]
@@ -170,20 +159,10 @@ def plain(g: float, psis: Numbers, p: Numbers) -> Relation:
     return g, 1.0, 0.0, 0.0
 
 
-def strength_of(stress: Function | None, state_effect: Function | None) -> Function:
+def strength_of(stress: Function, state_effect: Function | None) -> Function:
     """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
-    stress (None where it is constant), and of the effect of stress on the state, if there is one.
+    stress that changes, and of the effect of stress on the state, if there is one.
     """
-    if stress is None:
-        if state_effect is None:
-            return plain
-
-        def plain_with_state_effect(g: float, psis: Numbers, p: Numbers) -> Relation:
-            shift, shift_slope = state_effect(g, 1.0, 0.0, p)
-            return g + shift, 1.0 + shift_slope, shift, shift_slope
-
-        return plain_with_state_effect
-
     if state_effect is None:
 
         def coupled(g: float, psis: Numbers, p: Numbers) -> Relation:
@@ -294,8 +273,7 @@ def under(function: Function) -> Function:
     """A function ``(g, psis, p)`` of frictional stress, of g without what is `ahead`."""
 
     def pushed(g: float, psis: Numbers, p: Numbers) -> Numbers:
-        values: Numbers = function(g + ahead(psis, p), psis, p)
-        return values
+        return function(g + ahead(psis, p), psis, p)
 
     return pushed
 
@@ -358,10 +336,10 @@ def friction_of(parts: Parts) -> Friction:
     """Friction, made of what the parts of a scene say of it."""
     effect = reduce(both, parts.state_effects) if parts.state_effects else None
     pressure, outside = parts.unknowns > 0 and not parts.displaces, parts.outside
-    total, dry = parts.normal_stress or constant, stress_of(parts.normal_stress)
-    wet = less_pressure(total) if pressure else dry
-    around = wet if outside == -1 else less_pressure(total, outside) if outside else dry
-    strength = strength_of(None if wet is constant_stress else wet, effect)
+    total = parts.normal_stress or constant
+    wet, around = stress_of(total, -1 if pressure else 0), stress_of(total, outside)
+    changes = pressure or total is not constant or effect is not None
+    strength = strength_of(wet, effect) if changes else plain
     if parts.regularised:
         strength = reversible(strength)
     evolutions, steady_states = parts.evolutions, parts.steady_states
@@ -376,7 +354,7 @@ def friction_of(parts: Parts) -> Friction:
         strength=strength,
         effective_stress=wet,
         outer_stress=around,
-        outer_pressure=pressure_at(outside) if outside else no_pressure,
+        outer_pressure=pressure_at(outside),
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=sum_of(parts.states),
@@ -384,6 +362,6 @@ def friction_of(parts: Parts) -> Friction:
         by_pressure=by_last or by_pressure_of(wet, effect),
         states_at=states_at_of(parts.states),
         imposed=ahead if parts.displaces else no_stress,
-        imposed_change=pressure_at(-1) if parts.displaces else no_pressure,
+        imposed_change=pressure_at(-1 if parts.displaces else 0),
         states=parts.states + parts.unknowns,
     )

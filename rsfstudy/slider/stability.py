@@ -184,8 +184,7 @@ def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
 
 
 def _dot(first: Sequence[float], second: Sequence[float]) -> float:
-    product: float = sum(map(mul, first, second))
-    return product
+    return sum(map(mul, first, second))
 
 
 def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:

@@ -65,8 +65,7 @@ def sum_of(count: int) -> Function:
     others, last = sum_of(count - 1), count - 1
 
     def total(numbers: Numbers) -> float:
-        together: float = others(numbers) + numbers[last]
-        return together
+        return others(numbers) + numbers[last]
 
     return total
 
@@ -107,29 +106,22 @@ def moved(count: int) -> Function:
     return several
 
 
-def of_one(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-    """Change of a ln(V/V_*) by the only state, with its sign turned."""
-    return changes[0]
-
-
 def contribution_of(count: int, by_pressure: Function | None) -> Function:
     """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
     less what the change of P, or of imposed shear stress, gives, if there is any.
     """
     state_sum = sum_of(count)
-    if by_pressure is not None:
+    if by_pressure is None:
 
-        def with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-            taken: float = state_sum(changes) - by_pressure(g, psis, p)[0] * changes[-1]
-            return taken
+        def of_states(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+            return state_sum(changes)
 
-        return with_pressure
+        return of_states
 
-    def of_several(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-        taken: float = state_sum(changes)
-        return taken
+    def with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+        return state_sum(changes) - by_pressure(g, psis, p)[0] * changes[-1]
 
-    return of_one if count == 1 else of_several
+    return with_pressure
 
 
 def states_at_of(count: int) -> Function:

@@ -150,8 +150,7 @@ def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, 
 
     def along_path(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate(state, p)
-        scaled_by: Numbers = times(by, path_metric(by[1] / UNITS))
-        return scaled_by
+        return times(by, path_metric(by[1] / UNITS))
 
     def along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate(state[:end], p)
@@ -240,8 +239,7 @@ def point_between_ruptures(
         x_change = growth(unknowns, rates[:end], x, g, p)
         slope = strength(g, psis, p)[1]
         g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
-        now: Point = point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, p)
-        return now
+        return point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, p)
 
     return point
 
@@ -253,9 +251,7 @@ def point_in_rupture(made: Friction, point_at: Function) -> Function:
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         f, x, g, others = state[0], state[1], state[2], state[3:end]
         psis = states_at(strength(g, others, p)[0], x, others, p)
-        forces = f, rates[0], g, rates[2]
-        now: Point = point_at(x, rates[1], forces, psis, rates[:end], p)
-        return now
+        return point_at(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], p)
 
     return point
 
@@ -267,8 +263,7 @@ def point_of_rigid(made: Friction, point_at: Function) -> Function:
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         g, others, x = state[0], state[1:], p[-1]
         psis = states_at(strength(g, others, p)[0], x, others, p)
-        now: Point = point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, p)
-        return now
+        return point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, p)
 
     return point
 

@@ -84,8 +84,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
         rounding errors that show in its growth.
         """
         taken = resistance(spring_stress, psis, p)
-        slope: float = strength(spring_stress - 0.5 * taken, psis, p)[1]
-        return -slope * taken / p[A]
+        return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         """The quasi-static one along the motion, and the change of what ln V differs by from its
@@ -93,8 +92,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
-        change: float = slope * rates[0] - contribution(rates[1:], spring_stress, psis, p)
-        quasi_static = change / p[A]
+        quasi_static = (slope * rates[0] - contribution(rates[1:], spring_stress, psis, p)) / p[A]
         if weight_at(x, velocity_ratios(x, p)[1], p) <= LIGHTER:
             return quasi_static
         then = trailing(spring_stress + AHEAD * rates[0], ahead(psis, rates[1:], AHEAD), p)

@@ -24,8 +24,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         psis = state[1:]
         slope = strength(g, psis, p)[1]
-        change: float = slope * rates[0] - contribution(rates[1:], g, psis, p)
-        return change / p[A]
+        return (slope * rates[0] - contribution(rates[1:], g, psis, p)) / p[A]
 
     return balance, growth
 

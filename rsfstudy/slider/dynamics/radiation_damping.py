@@ -85,8 +85,7 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
         psis = state[1:]
         slope = strength(g, psis, p)[1]
         resists = p[A] + slope * p[DYNAMICS] * math.exp(min(x, LARGEST_LOG_SLIP_RATE))
-        growing: float = (slope * rates[0] - contribution(rates[1:], g, psis, p)) / resists
-        return growing
+        return (slope * rates[0] - contribution(rates[1:], g, psis, p)) / resists
 
     return balance, growth
 
