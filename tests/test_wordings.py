@@ -52,6 +52,8 @@ BREAKING = {
     "": (),
     "must be greater than 0": (0.0, -1.0),
     "must be 0 or greater": (-1.0,),
+    "must be a whole number from 0 to 100,000": (-1.0, 1.5, 1e6),
+    "must be a whole number from 1 to 100,000": (0.0, 1.5, 1e6),
     "must be greater than -1": (-1.0,),
     "must be -1 or greater": (-1.5,),
     "must lie between 0 and 1": (-0.1, 1.1),
@@ -66,7 +68,7 @@ def calling(part: type) -> dict[str, Any]:
     if part is Slider:
         return {}
     if part.called_by:
-        return {part.called_by: True if is_flag(part, part.called_by) else 0.01}
+        return {part.called_by: True if is_flag(part, part.called_by) else 1.0}
     slot = next(slot for slot in SLOTS if part in slot.choices.values())
     return {slot.name: part.name} if not slot.callers and part.name != slot.default else {}
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, is_name
-from rsfstudy.slider.loading import Segment, ramp, refuse_fluid
+from rsfstudy.slider.loading import Segment, ramp
 from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LOG_VELOCITY, RELIEF
 from rsfstudy.slider.protocol import Stated
@@ -64,7 +64,7 @@ class History(Stated):
     samples: bytes = field(repr=False)  # type: ignore[misc]  # of each, and not of the class
     digest: str  # type: ignore[misc]
     of_stress: bool
-    of_pressure: bool = False
+    of_pressure: bool = False  # type: ignore[misc]
     back: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
 
     auxiliary_rates = staticmethod(ramp.auxiliary_rates)
@@ -75,18 +75,11 @@ class History(Stated):
         """The fall of normal stress, where that is sampled."""
         return _UNKNOWNS if self.of_stress else ()
 
-    def check(self, scene: Scene) -> None:
-        """No fluid that changes normal stress too, unless it is of pressure; see `Stated`."""
-        super().check(scene)
-        if self.of_stress and not self.of_pressure:
-            refuse_fluid(scene, "loading", self.name)
-
     def stated_at(self, number: int) -> tuple[str, float, str]:
         velocity = float(self.columns[number, VELOCITY])
         return self.back or ("velocity", velocity, f"sample {number + 1}")
 
-    @property
-    def beginning(self) -> Numbers:
+    def begins(self, scene: Scene) -> Numbers:
         """The fall at the first sample."""
         return (float(self.columns[0, FALL]),) if self.of_stress else ()
 

@@ -30,12 +30,10 @@ if TYPE_CHECKING:
 else:  # parts name it in annotations only, and a scene is made of them
     Scene = Any
 
-#: Rules of most fields.
-POSITIVE, NOT_NEGATIVE, _FLAG = (
-    "must be greater than 0",
-    "must be 0 or greater",
-    "must be true or false",
-)
+#: Rules of most fields; counts are of segments of loading.
+POSITIVE, NOT_NEGATIVE = "must be greater than 0", "must be 0 or greater"
+ANY_COUNT, COUNT = (f"must be a whole number from {least} to 100,000" for least in (0, 1))
+_FLAG = "must be true or false"
 #: Names that members of a user's own part may still bear.
 _FORMER_NAMES = {
     "resting": "steady_states",
@@ -143,6 +141,8 @@ RULES: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     POSITIVE: lambda value: value > 0.0,
     NOT_NEGATIVE: lambda value: value >= 0.0,
+    ANY_COUNT: lambda value: value.is_integer() and 0.0 <= value <= 1e5,
+    COUNT: lambda value: value.is_integer() and 1.0 <= value <= 1e5,
     "must be greater than -1": lambda value: value > -1.0,
     "must be -1 or greater": lambda value: value >= -1.0,
     "must lie between 0 and 1": lambda value: 0.0 <= value <= 1.0,

@@ -37,13 +37,14 @@ class Stated(Loading):
     name: str  # type: ignore[misc]  # of each, and not of the class
 
     def check(self, scene: Scene) -> None:
-        """A load point that moves back only where slip may."""
+        """A load point that moves back only where slip may; see `Loading`."""
         back = np.asarray(self.table)[:, VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
             name, value, place = self.stated_at(int(np.argmax(back)))
             rule = "moves the load point back, and friction is that of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
             raise InvalidValue(name, value, rule, remedy=remedy).at(place)
+        super().check(scene)
 
     def stated_at(self, number: int) -> tuple[str, float, str]:
         """Name and value of what was stated of a segment that moves back, and where."""

@@ -21,9 +21,6 @@ from rsfstudy.slider.parts import (
     number,
 )
 
-#: Most segments of a history that is stated by their number.
-MOST_SEGMENTS = 100_000
-
 
 class Segment(NamedTuple):
     """A part of a loading history.
@@ -82,6 +79,9 @@ class Loading(Part):
     #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
     #: motion, less what stands as third of its numbers.
     displaces: ClassVar[bool] = False
+    #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
+    #: its surroundings.
+    of_pressure: ClassVar[bool] = True
     #: Of a history that was sampled: its numbers, and what tells them.
     samples: ClassVar[bytes] = b""
     digest: ClassVar[str] = ""
@@ -92,14 +92,19 @@ class Loading(Part):
     def functions(cls) -> tuple[str, ...]:
         return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
-    @property
-    def beginning(self) -> Numbers:
+    def begins(self, scene: Scene) -> Numbers:
         """Initial values of its unknowns."""
         return ()
 
-    def begins(self, scene: Scene) -> Numbers:
-        """Initial values of its unknowns in a scene."""
-        return self.beginning
+    def check(self, scene: Scene) -> None:
+        """No fluid that changes normal stress too, unless it is its pressure that is loaded."""
+        fluid, name = scene.parts.fluid, self.called_by
+        if self.unknowns and fluid.unknowns and not self.of_pressure:
+            rule = f"has no meaning for fluid={fluid.name!r}"
+            rule += ", whose pore pressure changes normal stress"
+            value = getattr(self, name or "name")
+            remedy = "Leave one of them out."
+            raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     @property
     def presses(self) -> bool:
@@ -162,14 +167,6 @@ class Loading(Part):
         """True if it changes normal stress."""
         return self.presses or any(segment.normal_stress for segment in self.segments)
 
-    def check_count(self, name: str) -> None:
-        """Raise InvalidValue for a field that holds no whole number, or too large a one: as many
-        are the segments.
-        """
-        count = getattr(self, name)
-        if count % 1.0 or count > MOST_SEGMENTS:
-            raise self.invalid(name, f"must be a whole number, {MOST_SEGMENTS:,} at most")
-
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
         owners = (p for p in PARTS.values() if name in p.__dataclass_fields__)
@@ -204,14 +201,6 @@ class AtVelocity(Loading):
     def load_velocity(self) -> float:
         """V_0/V_*, but for what oscillates."""
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
-
-
-def refuse_fluid(scene: Scene, name: str, value: object) -> None:
-    """Refuse a field of a loading that has unknowns beside a fluid that has some too."""
-    fluid = scene.parts.fluid
-    if fluid.unknowns:
-        rule = f"has no meaning for fluid={fluid.name!r}, whose pore pressure changes normal stress"
-        raise InvalidValue(name, value, rule, remedy="Leave one of them out.")
 
 
 PARTS = found_in(__name__, __path__)

@@ -84,11 +84,13 @@ class Train(AtVelocity):
         if_stated=True,
     )
 
+    of_pressure = False
     auxiliary_rates = staticmethod(auxiliary_rates)
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: Scene) -> None:
-        """Slow enough where there is no mass."""
+        """Slow enough where there is no mass; see `Loading`."""
+        super().check(scene)
         free = 2.0 * math.pi * scene.inertial_time
         if self.oscillation_period < free and not scene.has_mass:
             rule = f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters"

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train, refuse_fluid
+from rsfstudy.slider.loading import _train
 from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 
@@ -43,18 +43,13 @@ class Oscillation(_train.Train):
     )
 
     def check(self, scene: Scene) -> None:
-        """Normal stress that stays positive, slow enough where there is no mass, and is not that of
-        a fluid too.
-        """
-        amplitude = self.oscillation_amplitude
-        if amplitude >= 1.0:
+        """Normal stress that stays positive; see `Train`."""
+        if self.oscillation_amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
             raise self.invalid("oscillation_amplitude", "must be less than 1", remedy)
-        refuse_fluid(scene, "oscillation_amplitude", amplitude)
         super().check(scene)
 
-    @property
-    def beginning(self) -> Numbers:
+    def begins(self, scene: Scene) -> Numbers:
         """y and P of its phase."""
         amplitude, angle = self.oscillation_amplitude, self.angle
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import AtVelocity, Segment, refuse_fluid, velocity_ratio
+from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
 from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
@@ -68,12 +68,9 @@ class Ramp(AtVelocity):
     unknowns = (
         Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
     )
+    of_pressure = False
     auxiliary_rates = staticmethod(auxiliary_rates)
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
-
-    def check(self, scene: Scene) -> None:
-        """No fluid that changes normal stress too."""
-        refuse_fluid(scene, "normal_stress_ramp", self.normal_stress_ramp)
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -81,8 +78,7 @@ class Ramp(AtVelocity):
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
-    @property
-    def beginning(self) -> Numbers:
+    def begins(self, scene: Scene) -> Numbers:
         """All of the change is yet to come."""
         return (self.normal_stress_ramp,)
 

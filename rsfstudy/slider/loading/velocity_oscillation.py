@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train, refuse_fluid
+from rsfstudy.slider.loading import _train
 from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
 
 
@@ -40,16 +40,14 @@ class VelocityOscillation(_train.Train):
     )
 
     def check(self, scene: Scene) -> None:
-        """A load point that moves, back only where slip may, beside no fluid that has unknowns."""
-        amplitude = self.velocity_oscillation or 0.0
-        if amplitude > 1.0 and not scene.parts.law.regularised:
+        """A load point that moves, back only where slip may; see `Train`."""
+        if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
             rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
             raise self.invalid("velocity_oscillation", rule, remedy)
         if self.load_velocity == 0.0:
             rule = "must be greater than 0: velocity_oscillation is over it"
             raise self.invalid("load_velocity_ratio", rule)
-        refuse_fluid(scene, "velocity_oscillation", amplitude)
         super().check(scene)
 
     def begins(self, scene: Scene) -> Numbers:

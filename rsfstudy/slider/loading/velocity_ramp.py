@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import POSITIVE, Scene, number
+from rsfstudy.slider.parts import COUNT, POSITIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,15 +40,11 @@ class VelocityRamp(Loading):
         "",
         "1",
         "number of stairs that stand for a ramp of load point velocity",
-        rule=POSITIVE,
+        rule=COUNT,
     )
 
     name = "velocity_ramp"
     called_by = "velocity_ramp"
-
-    def check(self, scene: Scene) -> None:
-        """A whole number of stairs."""
-        self.check_count("velocity_ramp_stairs")
 
     @property
     def segments(self) -> tuple[Segment, ...]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Scene, number
+from rsfstudy.slider.parts import ANY_COUNT, POSITIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class VelocitySteps(Loading):
         "",
         "1",
         "number of steps of load point velocity, there and back in turn",
-        rule=NOT_NEGATIVE,
+        rule=ANY_COUNT,
     )
     velocity_ratio: float = number(
         10.0,
@@ -44,10 +44,6 @@ class VelocitySteps(Loading):
 
     name = "velocity_steps"
     called_by = "velocity_steps"
-
-    def check(self, scene: Scene) -> None:
-        """A whole number of steps."""
-        self.check_count("velocity_steps")
 
     @property
     def segments(self) -> tuple[Segment, ...]:
