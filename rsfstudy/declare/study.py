@@ -157,7 +157,7 @@ class Study:
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Fields that its scenes may have: those of every scene, and those of its own parts."""
-        return fields_with(self.own_parts.values())
+        return tuple(fields_with(self.own_parts.values()))
 
     @cached_property
     def of_scene(self) -> frozenset[str]:

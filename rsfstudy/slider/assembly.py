@@ -87,8 +87,10 @@ def _by_place(given: Mapping[str, Any], layout: Layout) -> dict[int, dict[str, A
             if value is not None:
                 values.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
         elif name in layout.refusing:
-            if value is not None:
-                _refuse_unless_idle(name, value, layout.refusing[name])
+            # one that calls for another part may be stated, if it does not call
+            owner = OWNERS[name]
+            if value is not None and (name != owner.called_by or checked(owner, name, value)):
+                raise layout.refusing[name].refuse(name, value)
         elif name not in SLOT_NAMES:
             raise _unknown_field(name, value, layout)
     return values
@@ -175,7 +177,7 @@ def layout_of(chosen: tuple[type[Part], ...]) -> Layout:
                 if not calls or slot.name in owned:
                     foreign.add(name)
     named = tuple(slot.name for slot in SLOTS if slot in NAMED or slot.name in owned)
-    fields = fields_with(owned.values())
+    fields = tuple(fields_with(owned.values()))
     plain = frozenset(fields) - {*SLOT_NAMES, *CALLERS, *SPRING}
     return Layout(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
 
@@ -309,15 +311,6 @@ class Assembled(ShownAsTable):
         if any(changes.get(name) is not None for name in SPRING):
             dropped |= {*SPRING}
         return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
-
-
-def _refuse_unless_idle(name: str, value: Any, part: type[Part]) -> None:
-    """Refuse a value for a field of another part than the one chosen, but for one that calls for
-    that part and does not call.
-    """
-    owner = OWNERS[name]
-    if name != owner.called_by or checked(owner, name, value):
-        raise part.refuse(name, value)
 
 
 def _unknown_field(name: str, value: Any, layout: Layout) -> InvalidValue:

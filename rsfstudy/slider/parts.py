@@ -158,13 +158,8 @@ def names_of(part: type[Part]) -> tuple[str, ...]:
     """Names of the fields that a part brings to a scene, made by `number` or `flag`: first that
     which calls for it, if one does. Cells of journals are known by their fields in this order.
     """
-    if part not in _NAMES:
-        names = (f.name for f in fields(part) if "about" in f.metadata)
-        _NAMES[part] = tuple(sorted(names, key=lambda name: name != part.called_by))
-    return _NAMES[part]
-
-
-_NAMES: dict[type[Part], tuple[str, ...]] = {}
+    names = (f.name for f in fields(part) if "about" in f.metadata)
+    return tuple(sorted(names, key=lambda name: name != part.called_by))
 
 
 def quantities_of(part: type[Part]) -> list[Quantity]:

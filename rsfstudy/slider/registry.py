@@ -51,9 +51,10 @@ class Slot:
     long_name: str
     own: dict[str, Own] = field(default_factory=dict)
 
-    def takes(self, kind: type[Part]) -> bool:
-        """True if a class is one of parts that fill it."""
-        return issubclass(kind, self.base)
+    @property
+    def quantity(self) -> Quantity:
+        """What its name means as a field."""
+        return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
     def callers(self) -> Mapping[str, type[Part]]:
@@ -90,12 +91,13 @@ _EVERY_PART: tuple[type[Part], ...] = (
 OWNERS: Mapping[str, type[Part]] = {
     name: part for part in reversed(_EVERY_PART) for name in names_of(part)
 }
-#: Names of all fields of a scene.
-FIELDS: tuple[str, ...] = tuple(
-    dict.fromkeys(
-        [*(slot.name for slot in NAMED), *(n for part in _EVERY_PART for n in names_of(part))]
-    )
+#: What the fields of a scene mean.
+QUANTITIES: tuple[Quantity, ...] = (
+    *(slot.quantity for slot in NAMED),
+    *(about for part in _EVERY_PART for about in quantities_of(part)),
 )
+#: Their names.
+FIELDS: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in QUANTITIES))
 #: Those that are among the values of a scene only if they were stated.
 IF_STATED: frozenset[str] = frozenset(
     name
@@ -106,11 +108,6 @@ IF_STATED: frozenset[str] = frozenset(
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Those that call for a part by their values.
 CALLERS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.callers)
-#: What they mean.
-QUANTITIES: tuple[Quantity, ...] = (
-    *(Quantity(slot.name, "", "", slot.long_name) for slot in NAMED),
-    *(q for part in _EVERY_PART for q in quantities_of(part)),
-)
 
 
 def defaults() -> dict[str, Any]:
@@ -149,7 +146,7 @@ def kind_of(part: Own) -> type[Part]:
 
 def slot_of(kind: type[Part]) -> Slot:
     """The slot that parts of a class fill."""
-    return next(slot for slot in SLOTS if slot.takes(kind))
+    return next(slot for slot in SLOTS if issubclass(kind, slot.base))
 
 
 def resolve(slot: Slot, part: Any) -> Own:
@@ -210,42 +207,37 @@ def by_class(values: Mapping[str, Any], parts: Mapping[str, Own]) -> Mapping[str
     return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
 
 
-def fields_with(parts: Iterable[Own]) -> tuple[str, ...]:
-    """Names of the fields of scenes that may have these parts of the user's own.
+def fields_with(parts: Iterable[Own]) -> dict[str, Quantity]:
+    """Fields of scenes that may have these parts of the user's own, by name, with what they mean.
 
     Raises
     ------
     InvalidValue
         Where one name means several things.
     """
-    stated = {name: part.__dataclass_fields__[name] for name, part in OWNERS.items()}
-    names = dict.fromkeys(FIELDS)
+    found = {about.name: about for about in QUANTITIES}
     for kind in map(kind_of, parts):
-        names[slot_of(kind).name] = None
-        for name in names_of(kind):
-            field_, names[name] = kind.__dataclass_fields__[name], None
-            known = stated.setdefault(name, field_).metadata
-            if known["about"] != field_.metadata["about"]:
+        for about in (slot_of(kind).quantity, *quantities_of(kind)):
+            if found.setdefault(about.name, about) != about:
                 rule = "is the name of something else, of another part"
-                raise InvalidValue(f"field of {kind.name}", name, rule)
-    return tuple(names)
+                raise InvalidValue(f"field of {kind.name}", about.name, rule)
+    return found
 
 
 def quantities_with(parts: Iterable[Own]) -> Iterator[Quantity]:
     """Quantities of the fields that parts of the user's own add to those of every scene."""
-    for kind in map(kind_of, parts):
-        slot = slot_of(kind)
-        stated = (Quantity(slot.name, "", "", slot.long_name), *quantities_of(kind))
-        yield from (about for about in stated if about.name not in FIELDS)
+    return (about for name, about in fields_with(parts).items() if name not in FIELDS)
 
 
 def kinds_with(parts: Iterable[Own]) -> Mapping[str, Any]:
     """Types of those fields; with None, where a part that fills the slot does without."""
     kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
     classes = tuple(map(kind_of, parts))
-    filling: list[tuple[type[Part], ...]] = [(Slider,)]
-    filling += [(*slot.choices.values(), *filter(slot.takes, classes)) for slot in SLOTS]
-    for every in filling:
+    filling: dict[str, list[type[Part]]] = {"": [Slider]}
+    filling |= {slot.name: [*slot.choices.values()] for slot in SLOTS}
+    for own_kind in classes:
+        filling[slot_of(own_kind).name].append(own_kind)
+    for every in filling.values():
         for part in every:
             for name in names_of(part):
                 kind: Any = bool if is_flag(part, name) else float
@@ -270,7 +262,7 @@ def shown(
     parts : iterable of type or Stated
         Parts of the user's own whose fields may be among those.
     """
-    about = {one.name: one for one in (*QUANTITIES, *quantities_with(parts))}
+    about = fields_with(parts)
     for name, value in values.items():
         if value is not None:
             yield about.get(name, Quantity(name, "", "", "")), value
