@@ -227,16 +227,16 @@ class Measure:
         """The outcome of `__call__`, and the meter with the work that was spent."""
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
-            found = self._checked(self.find(scene, accuracy, meter))
-            if found[0] is Status.OK:
-                found = self._held_to(accuracy.rtol, scene, *found[1:])
+            outcome = self._checked(self.find(scene, accuracy, meter))
+            if outcome.status is Status.OK:
+                outcome = self._held_to(accuracy.rtol, scene, outcome)
         except Halt as halt:
-            found = halt.status, {}, str(halt)
-        return Outcome(*found, _checks.count(meter.spent)), meter
+            outcome = Outcome(halt.status, message=str(halt))
+        return replace(outcome, rhs_evaluations=_checks.count(meter.spent)), meter
 
-    def _checked(self, outcome: Outcome) -> tuple[Status, Mapping[str, Value], str]:
-        """Status, numbers and message of an outcome, if they are as declared; ok without a number
-        that it must have becomes `not_finite`.
+    def _checked(self, outcome: Outcome) -> Outcome:
+        """An outcome whose numbers are as declared; ok without one that it must have becomes
+        `not_finite`.
 
         Raises
         ------
@@ -253,16 +253,13 @@ class Measure:
         if outcome.status is Status.PENDING:
             raise InvalidValue("measured", outcome, "must say what became of the cell")
         declared, inner = self.variables, self.inner_coordinates
-        values = {
-            name: _checks.number(declared, inner, name, value)
-            for name, value in outcome.values.items()
-        }
-        if outcome.status is not Status.OK:
-            return outcome.status, values, outcome.message
-        lacking = self._lacking(values)
+        given = outcome.values.items()
+        values = {name: _checks.number(declared, inner, name, value) for name, value in given}
+        lacking = self._lacking(values) if outcome.status is Status.OK else None
         if lacking:
-            return Status.NOT_FINITE, values, f"{lacking} = {values.get(lacking, math.nan)}"
-        return Status.OK, values, outcome.message
+            why = f"{lacking} = {values.get(lacking, math.nan)}"
+            return Outcome(Status.NOT_FINITE, values, why)
+        return replace(outcome, values=values)
 
     def _lacking(self, values: Mapping[str, Value]) -> str | None:
         """The first number of an ok outcome that is missing or not finite: the headline, and each
@@ -278,18 +275,18 @@ class Measure:
                 return name
         return None
 
-    def _held_to(
-        self, rtol: float, scene: Scene, values: Mapping[str, Value], message: str
-    ) -> tuple[Status, Mapping[str, Value], str]:
+    def _held_to(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
         """An ok outcome, or `unverified` with what is known too badly."""
-        doubts = [message] if message else []
+        values, doubts = outcome.values, []
         for name, scale in self.scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), rtol * scale
             if error > MUCH_WORSE * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
-        status = Status.UNVERIFIED if len(doubts) > bool(message) else Status.OK
-        return status, values, "; ".join(doubts)
+        if not doubts:
+            return outcome
+        message = "; ".join([*filter(None, [outcome.message]), *doubts])
+        return Outcome(Status.UNVERIFIED, values, message)
 
     def describe(self) -> dict[str, Any]:
         """The measure as plain data."""
