@@ -1,18 +1,23 @@
 """The registry of parts and fields: the slots of a slider, what may fill each, and the fields that
 these bring to a scene.
+
+A part of a user's own is a class that fills a slot as the files of that slot do. It is known by its
+name from its first use on, in this process. A notebook cell that is run again defines it anew; a
+name that stands for something else is refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from inspect import Parameter, signature
+from inspect import Parameter, getattr_static, signature
+from types import FunctionType
 from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, own
+from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Stated
@@ -135,6 +140,8 @@ def completed(*more: str) -> Callable[[F], F]:
 
 # ---- parts of a user's own -----------------------------------------------------------------------
 
+#: Names that every scene has beside its fields; `scene` states them.
+RESERVED: set[str] = set()
 #: Classes that were checked.
 _CHECKED: set[type[Part]] = set()
 
@@ -161,11 +168,73 @@ def resolve(slot: Slot, part: Any) -> Own:
     if part in slot.choices.values() and slot in NAMED:
         return found
     if isinstance(part, Stated) and slot.base is loading.Loading:
-        own.check_name(slot, part, SLOTS)
+        _check_name(slot, part)
     elif part not in _CHECKED or slot_of(part) is not slot:
-        own.check(slot, part, SLOTS, OWNERS)
+        _check(slot, part)
     register([found])
     return found
+
+
+def _check(slot: Slot, part: Any) -> None:
+    """Raise InvalidValue for what cannot fill a slot."""
+    if not isinstance(part, type) or not issubclass(part, slot.base):
+        is_part = issubclass(part if isinstance(part, type) else type(part), Part)
+        rule = "fills another slot" if is_part else "is no part of a slider"
+        remedy = f"Derive a class from {slot.base.__module__}.{slot.base.__name__}."
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    params = vars(part).get("__dataclass_params__")
+    if params is None or not params.frozen:
+        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
+        raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
+    _check_name(slot, part)
+    _check_fields(slot, part)
+    for name in part.functions():
+        function = getattr_static(part, name, None)
+        if not isinstance(getattr(function, "__func__", None), FunctionType):
+            rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
+            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _check_name(slot: Slot, part: Own) -> None:
+    """Raise InvalidValue for a name that no part may have, or that something else has."""
+    name: object = getattr(part, "name", None)
+    rule = "" if is_name(name) else f"must be named by a Python identifier, not {name!r}"
+    for other in SLOTS:
+        if name in other.choices:
+            rule = f"takes the name of a part of rsfstudy, {name!r}"
+        elif name in other.own and _origin(other.own[name]) != _origin(part):
+            rule = f"takes the name {name!r} of {'.'.join(_origin(other.own[name]))}"
+    if rule:
+        remedy = f'Write name = "..." in {_origin(part)[1]}.'
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _origin(part: Own) -> tuple[str, str]:
+    """Module and name of a definition, which an earlier definition of the part shares."""
+    return kind_of(part).__module__, kind_of(part).__qualname__
+
+
+def _check_fields(slot: Slot, part: type[Part]) -> None:
+    """Refuse fields that say nothing of themselves, or have the name of something else."""
+    what, remedy = f"field of {part.__qualname__}", "Give it another name."
+    for stated in fields(part):
+        name, about, owner = stated.name, stated.metadata.get("about"), OWNERS.get(stated.name)
+        if about is None:
+            rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
+            raise InvalidValue(what, name, rule, remedy=state)
+        if not is_name(name):
+            rule = "must be a Python identifier, its accents composed (NFC)"
+            raise InvalidValue(what, name, rule)
+        whose = "every scene" if owner is None and name in RESERVED | SLOT_NAMES else ""
+        if owner is not None:
+            # a part of one's own may rule out more
+            same = about == owner.__dataclass_fields__[name].metadata["about"]
+            if not same or owner not in slot.choices.values():
+                common = name in slot.base.__dataclass_fields__
+                whose = f"every {slot.long_name}" if common else owner.name
+        if whose:
+            rule = f"is the name of something else, of {whose}"
+            raise InvalidValue(what, name, rule, remedy=remedy)
 
 
 def register(parts: Iterable[Own]) -> None:

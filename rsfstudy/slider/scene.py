@@ -19,7 +19,6 @@ from rsfstudy.slider import (
     laws,
     loading,
     normal_stress,
-    own,
     places,
     registry,
     stability,
@@ -371,7 +370,7 @@ class Scene(Assembled):
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
 
 
-own.RESERVED.update(dir(Scene), Scene.__annotations__)
+registry.RESERVED.update(dir(Scene), Scene.__annotations__)
 
 
 @lru_cache(_KEPT)
