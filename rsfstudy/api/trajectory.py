@@ -19,7 +19,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.events import Event, Kind, rise
 from rsfstudy.motion.meter import Halt, Meter, more_work
-from rsfstudy.motion.readings import FRICTION, LOAD_POINT, friction_of, load_point_of
+from rsfstudy.motion.readings import friction_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
@@ -151,7 +151,8 @@ def simulate(
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
-    columns |= {LOAD_POINT: load_point_of(scene, seen), FRICTION: friction_of(seen)}
+    columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
+    columns[quantity("friction_coefficient")] = friction_of(seen)
     dataset = xr.Dataset({q.name: ("time", values, q.attributes) for q, values in columns.items()})
     regimes = {
         "long_name": quantity("regime").long_name,

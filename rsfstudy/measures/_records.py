@@ -17,7 +17,6 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.readings import FRICTION, LOAD_POINT
 from rsfstudy.motion.recording import PLACE, Recording
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
@@ -38,16 +37,11 @@ KEPT = (
     "normal_stress_ratio",
     "log10_slip_rate",
 )
-#: Described beside what reads them; the vocabulary has the others.
-_READINGS = {about.name: about for about in (FRICTION, LOAD_POINT)}
 
 
 def recorded(*names: str) -> tuple[Output, ...]:
-    """Outputs along `phase`: what these names say of each point that is kept."""
-    abouts = [_READINGS.get(name) or Output(name) for name in names]
-    return tuple(
-        Output(q.name, q.symbol, q.units, q.long_name, q.scale, dims=("phase",)) for q in abouts
-    )
+    """Outputs along `phase`: quantities of the vocabulary, of each point that is kept."""
+    return tuple(Output(name, dims=("phase",)) for name in names)
 
 
 class Record(NamedTuple):

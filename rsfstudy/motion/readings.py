@@ -7,20 +7,8 @@ import math
 import numpy as np
 
 from rsfstudy.motion.recording import OBSERVED, READ
-from rsfstudy.quantity import Quantity
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
-
-FRICTION = Quantity(
-    "friction_coefficient",
-    r"$\mu$",
-    "1",
-    "friction coefficient as a rig reads it: stress of the spring over normal stress less the pore "
-    "pressure outside the fault",
-)
-LOAD_POINT = Quantity(
-    "load_point_displacement", r"$\delta_0/D_c$", "1", "load point displacement", "D_c"
-)
 
 
 def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
