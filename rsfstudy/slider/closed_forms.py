@@ -41,6 +41,20 @@ def critical_stiffness(
     """Critical stiffness ``k_cr D_c/sigma_*`` as an explicit function of V, without mass: ``(b - a)
     sigma_* (1 - mu_* cot(phi)) / {D_c (1 - mu_ss cot(phi)) [1 - (mu_ss - alpha) cot(phi)]}`` with
     ``mu_ss = mu_* - (b - a) ln(V/V_*)`` (He et al. 1998).
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        ln(V/V_*).
+    mu_star, a, b : float
+        Friction coefficient at V_*, direct effect and evolution effect.
+    cot_phi, alpha : float
+        d sigma/d tau, 0 where normal stress is constant, and its effect on the state variable.
+
+    References
+    ----------
+    Eq. 8 of doi:10.1007/s11589-014-0098-4; Dieterich and Linker (1992), Geophys. Res. Lett. 19,
+    1691-1694.
     """
     mu_ss = mu_star - (b - a) * log_slip_rate
     above = (b - a) * (1.0 - mu_star * cot_phi)
@@ -48,8 +62,23 @@ def critical_stiffness(
 
 
 def displacement_step(b_over_a: float, exponent: float, ratio: float) -> float:
-    """Critical displacement step of the family of laws, over D_c: ``a/(b-a) (-ln(1 - eps r))/(eps
-    r)``, r = k/k_cr; NaN where there is none.
+    """Critical displacement step of the family of laws, over D_c; NaN where there is none.
+
+    ``a/(b-a) [-ln(1 - eps r)]/(eps r)`` with r = k/k_cr, at constant normal stress, under a load
+    point that is held and with an infinite norm; ``a/(b-a)`` by the slip law, eps = 0.
+
+    Parameters
+    ----------
+    b_over_a : float
+        b/a, above 1.
+    exponent : float
+        eps of the family, from 0 (slip law) to 1 (slowness law).
+    ratio : float
+        k/k_cr.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law.
     """
     product = exponent * ratio
     if math.isnan(product) or product >= 1.0:
@@ -61,8 +90,13 @@ def displacement_step(b_over_a: float, exponent: float, ratio: float) -> float:
 def velocity_step(b_over_a: float, exponent: float) -> float:
     """Critical V_0/V_* of the family of laws at critical stiffness; NaN where there is none.
 
+    ``V_0/V_* = 1 + a/[(1 - eps)(b - a)]``, at constant normal stress and with an infinite norm.
     With q = exp(-eps u) and y = V_0/V the motion follows a system of Lotka-Volterra equations,
     which the line from V_* through its saddle (1 - eps, 0) does not leave.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law, eps = 0.
     """
     if math.isnan(exponent) or exponent >= 1.0:
         return math.nan
@@ -72,6 +106,10 @@ def velocity_step(b_over_a: float, exponent: float) -> float:
 def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     """Effective friction, which makes of a small change of normal stress one of Coulomb stress:
     ``mu' = mu_* - alpha (1 - a/b)``, because a fall of normal stress also strengthens the state.
+
+    References
+    ----------
+    Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940, for alpha.
     """
     return mu_star - alpha * (1.0 - 1.0 / b_over_a) if alpha else mu_star
 

@@ -89,8 +89,10 @@ def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool
 
 
 def critical_stiffnesses(scene: Scene, log_slip_rate: float) -> list[float]:
-    """Every stiffness at which small changes of steady sliding come to grow or to decay, or more of
-    them grow, from the smallest up: several states may have more than one.
+    """Every stiffness over sigma_*/D_c at which small changes of steady sliding come to grow or to
+    decay, or more of them grow, from the smallest up: several states may have more than one.
+
+    Those K at which a root of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` is imaginary.
     """
     scene = scene.unforced
     steady = steady_sliding(scene, log_slip_rate)
@@ -157,6 +159,18 @@ def _grows(around: _Around, stiffness: float) -> bool:
 def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     """Friction against slip around steady sliding, ``G(p) = p above(p)/below(p)``: coefficients of
     the two polynomials, from the constant one up.
+
+    ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``, as at the top of this file; by a
+    law of one state at constant normal stress ``G(p) = p [a - b/(p + 1)]``, over sigma_*/D_c.
+
+    Parameters
+    ----------
+    scene : Scene
+    steady : Steady
+
+    References
+    ----------
+    Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
     by_rate, by_shift, by_state = slopes_of_law(scene, steady)
@@ -189,7 +203,10 @@ def _dot(first: Sequence[float], second: Sequence[float]) -> float:
 
 def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:
     """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
-    ln V, to the shift, and to each state (columns).
+    ln V and to the shift, both of shape (states,), and to each state, of shape (states, states).
+
+    By central differences of order eight: ``f' = sum of w_n [f(x + n h) - f(x - n h)]/h``, n from 1
+    to 4.
     """
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
     shift = relation_of(scene)(steady.friction)[2]
@@ -239,8 +256,21 @@ def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
 
 
 def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
-    """Growth rates p, per slip in D_c, of small changes of steady sliding at the stiffness of the
-    scene; complex, the fastest first. They go as exp(p V t/D_c).
+    """Growth rates p of small changes of steady sliding at the stiffness of the scene.
+
+    The roots of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` with w = V T/(2 pi D_c). Small changes
+    go as exp(p V t/D_c).
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+
+    Returns
+    -------
+    ndarray of complex
+        Per slip in D_c, the fastest first.
 
     Raises
     ------

@@ -49,6 +49,15 @@ class Steady:
 def steady_sliding(scene: Scene, log_slip_rate: float) -> Steady | None:
     """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
     strong.
+
+    Frictional stress g solves ``strength(g) = a ln(V/V_*) + sum of Psi_i``, and spring stress is
+    that and what waves radiate.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
     """
     friction = stress_at(scene, steady_excess(scene, log_slip_rate))
     if friction is None:
@@ -61,14 +70,37 @@ def steady_sliding(scene: Scene, log_slip_rate: float) -> Steady | None:
 
 
 def steady_excess(scene: Scene, log_slip_rate: float) -> float:
-    """Steady friction coefficient at ln(V/V_*), less mu_*: (a - b) ln(V/V_*) by most laws."""
+    """Steady friction coefficient at a slip rate, less mu_*.
+
+    ``mu_ss - mu_* = (a - b) ln(V/V_*)`` by most laws.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+
+    References
+    ----------
+    Ruina (1983), J. Geophys. Res. 88, 10359-10370.
+    """
     psi = scene.functions.friction.state_sum(steady_states_of(scene, log_slip_rate, 0.0))
     return float(scene.a * log_slip_rate + psi)
 
 
 def stress_at(scene: Scene, excess: float) -> float | None:
-    """Deviation of frictional stress at which the friction coefficient is mu_* + `excess`; None
-    where it never is.
+    """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
+    mu_* + `excess`; None where it never is.
+
+    ``(mu_* + g)/s(g) = mu_* + excess``, s being the normal stress ratio; where normal stress
+    follows shear stress there is none below phi = atan(mu_ss), eq. 9 of
+    doi:10.1007/s11589-014-0098-4.
+
+    Parameters
+    ----------
+    scene : Scene
+    excess : float
+        Friction coefficient less mu_*.
     """
     relation = relation_of(scene)
 
@@ -80,8 +112,19 @@ def stress_at(scene: Scene, excess: float) -> float | None:
 
 
 def stress_after_jump(scene: Scene, excess: float, psis: Numbers = ()) -> float | None:
-    """Deviation of frictional stress at which strength is `excess`: that of a sudden change; None
-    where it never is. At the pore pressure of steady sliding, unless states are given.
+    """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
+    where there is none.
+
+    The states freed of stress stay as they are, so that ``strength(g) = excess`` with ``excess = a
+    ln(V/V_*) + sum of Psi_i`` (eqs. 12 and 13 of doi:10.1007/s11589-014-0098-4).
+
+    Parameters
+    ----------
+    scene : Scene
+    excess : float
+        What strength becomes, over sigma_*.
+    psis : tuple of float, optional
+        States freed of stress, by which pore pressure is told; else that of steady sliding.
     """
     relation = relation_of(scene, psis)
     return _root(lambda friction: relation(friction)[0] - excess, excess, _weakest(scene))
@@ -124,6 +167,9 @@ def _root(missing: Callable[[float], float], near: float, lowest: float) -> floa
 def slowest_steady(scene: Scene) -> float:
     """Smallest ln(V/V_*) with steady sliding: where stress would grow without bound; ``-inf`` where
     there is none.
+
+    Of a driving stress at the angle phi, without an effect of normal stress on the law, it is where
+    ``mu_ss = tan(phi)``, eq. 9 of doi:10.1007/s11589-014-0098-4.
     """
     value, _slope, shift, _shift_slope = relation_of(scene)(_STRONGEST)
     strongest = value - shift
