@@ -310,8 +310,8 @@ def test_a_scene_of_ones_own_parts():
         ({"law": Doubled, "factor": -1.0}, "factor = -1.0: must be 0 or greater"),
         ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
         ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
-        ({"law": Sticky}, "law = .*fills another slot. Derive a class from rsfstudy.slider.laws.L"),
-        ({"law": int}, "law = <class 'int'>: is no part of a slider"),
+        ({"law": Sticky}, "law = .*no class that fills the slot law. Derive a class from"),
+        ({"law": int}, "law = <class 'int'>: is no class that fills the slot"),
     ],
 )
 def test_scenes_that_are_refused(given, rule):

@@ -122,12 +122,12 @@ class Elasticities(Measure):
         outcome = self.measure.charged(scene, accuracy, meter)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
-        y, error = self._numbers(outcome)
-        values: dict[str, Value] = {self.headline: y, f"{self.headline}_error": error}
-        if y == 0.0:
+        names = self.headline, f"{self.headline}_error"
+        values: dict[str, Value] = {name: outcome.values.get(name, 0.0) for name in names}
+        here = self._level(outcome)
+        if here is None:
             why = f"{self.headline} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
-        here = _level(y, error)
         step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
@@ -160,19 +160,17 @@ class Elasticities(Measure):
         if not outcome.status.is_answer:
             where = f"at {name} = {getattr(beside, name):.9g}"
             raise Halt(outcome.status, f"{where}: {outcome.message}")
-        y, error = self._numbers(outcome) if outcome.status is Status.OK else (0.0, 0.0)
-        return _level(y, error) if y else None
+        return self._level(outcome)
 
-    def _numbers(self, outcome: Outcome) -> tuple[float, float]:
-        """The headline, and its error; that of rounding where none is told."""
-        y = float(outcome.values[self.headline])
-        return y, float(outcome.values.get(f"{self.headline}_error", 0.0))
-
-
-def _level(y: float, error: float) -> _Level:
-    """ln|y| with the error of y, and what rounding leaves of it, of y and of p."""
-    value = math.log(abs(y))
-    return _Level(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
+    def _level(self, outcome: Outcome) -> _Level | None:
+        """ln|y| with the error of y, and what rounding leaves of it, of y and of p; None without a
+        number, or where it is zero.
+        """
+        y = float(outcome.values[self.headline]) if outcome.status is Status.OK else 0.0
+        if not y:
+            return None
+        value, error = math.log(abs(y)), float(outcome.values.get(f"{self.headline}_error", 0.0))
+        return _Level(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
 
 
 def _derivative(here: _Level, sides: Sequence[_Level | None], step: float) -> tuple[float, float]:

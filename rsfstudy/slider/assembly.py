@@ -281,11 +281,8 @@ class Assembled(ShownAsTable):
         """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or
         the digest of its samples.
         """
-        history = self.parts.loading
-        if history.samples:
-            return self.as_dict() | {"samples": history.digest}
-        stated = history.stated if "loading" in self.layout.named else ()
-        return self.as_dict() | ({"segments": [s.as_dict() for s in stated]} if stated else {})
+        history = self.parts.loading.describe() if "loading" in self.layout.named else {}
+        return self.as_dict() | history
 
     @property
     def own_parts(self) -> tuple[Own, ...]:

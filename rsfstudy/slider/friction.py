@@ -154,7 +154,7 @@ def no_pressure(psis: Numbers) -> float:
 Relation = tuple[float, float, float, float]
 
 
-def plain(g: float, psis: Numbers, p: Numbers) -> Relation:
+def at_constant_stress(g: float, psis: Numbers, p: Numbers) -> Relation:
     """The friction relation at constant normal stress, of a state that stress does not change."""
     return g, 1.0, 0.0, 0.0
 
@@ -196,7 +196,7 @@ def stress_dependence(g: float, ratio: float, change: float, p: Numbers) -> tupl
     return c * g * mean, c / ratio
 
 
-def both(effect: Function, other: Function) -> Function:
+def added(effect: Function, other: Function) -> Function:
     """Two effects of stress on the state at once: ``(g, ratio, change, p) -> (shift, slope)``."""
 
     def effects(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
@@ -259,23 +259,23 @@ def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
     return with_state_effect
 
 
-def no_stress(psis: Numbers, p: Numbers) -> float:
+def no_load_point_stress(psis: Numbers, p: Numbers) -> float:
     """K D where the load point moves steadily."""
     return 0.0
 
 
-def ahead(psis: Numbers, p: Numbers) -> float:
+def load_point_stress(psis: Numbers, p: Numbers) -> float:
     """K D of an oscillation, which begins where D is 0."""
     return psis[-1] - p[LOADING + 2]
 
 
-def under(function: Function) -> Function:
-    """A function ``(g, psis, p)`` of frictional stress, of g without what is `ahead`."""
+def with_load_point_stress(function: Function) -> Function:
+    """A function ``(g, psis, p)`` of frictional stress, of g without `load_point_stress`."""
 
-    def pushed(g: float, psis: Numbers, p: Numbers) -> Numbers:
-        return function(g + ahead(psis, p), psis, p)
+    def loaded(g: float, psis: Numbers, p: Numbers) -> Numbers:
+        return function(g + load_point_stress(psis, p), psis, p)
 
-    return pushed
+    return loaded
 
 
 def slopes_of(strength: Function) -> Function:
@@ -334,34 +334,34 @@ class Parts(NamedTuple):
 @cache
 def friction_of(parts: Parts) -> Friction:
     """Friction, made of what the parts of a scene say of it."""
-    effect = reduce(both, parts.state_effects) if parts.state_effects else None
+    effect = reduce(added, parts.state_effects) if parts.state_effects else None
     pressure, outside = parts.unknowns > 0 and not parts.displaces, parts.outside
     total = parts.normal_stress or constant
-    wet, around = stress_of(total, -1 if pressure else 0), stress_of(total, outside)
+    effective, outer = stress_of(total, -1 if pressure else 0), stress_of(total, outside)
     changes = pressure or total is not constant or effect is not None
-    strength = strength_of(wet, effect) if changes else plain
+    strength = strength_of(effective, effect) if changes else at_constant_stress
     if parts.regularised:
         strength = reversible(strength)
     evolutions, steady_states = parts.evolutions, parts.steady_states
     if parts.auxiliary_rates is not None and parts.auxiliary_steady_states is not None:
         evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
         steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)
-    by_last = by_pressure_of(wet, effect) if pressure else None
+    by_last = by_pressure_of(effective, effect) if pressure else None
     if parts.displaces:
-        strength, wet, around = under(strength), under(wet), under(around)
+        strength, effective, outer = map(with_load_point_stress, (strength, effective, outer))
         by_last = slopes_of(strength)
     return Friction(
         strength=strength,
-        effective_stress=wet,
-        outer_stress=around,
+        effective_stress=effective,
+        outer_stress=outer,
         outer_pressure=pressure_at(outside),
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=sum_of(parts.states),
         contribution=contribution_of(parts.states, by_last),
-        by_pressure=by_last or by_pressure_of(wet, effect),
+        by_pressure=by_last or by_pressure_of(effective, effect),
         states_at=states_at_of(parts.states),
-        imposed=ahead if parts.displaces else no_stress,
+        imposed=load_point_stress if parts.displaces else no_load_point_stress,
         imposed_change=pressure_at(-1 if parts.displaces else 0),
         states=parts.states + parts.unknowns,
     )

@@ -61,8 +61,8 @@ class History(Stated):
         Name, value and place of the first sample that moves the load point back.
     """
 
-    samples: bytes = field(repr=False)  # type: ignore[misc]  # of each, and not of the class
-    digest: str  # type: ignore[misc]
+    samples: bytes = field(repr=False)
+    digest: str
     of_stress: bool
     of_pressure: bool = False  # type: ignore[misc]
     back: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
@@ -123,10 +123,9 @@ class History(Stated):
         """The end of the record alone: each sample would be an event."""
         return min(1, len(self.columns) - 1)
 
-    @property
-    def stated(self) -> tuple[Segment, ...]:
-        """Samples are told by their digest."""
-        return ()
+    def describe(self) -> dict[str, Any]:
+        """The digest of its samples."""
+        return {"samples": self.digest}
 
     @property
     def lasts(self) -> float:

@@ -68,9 +68,9 @@ class Protocol(Stated):
 
     history: tuple[Segment, ...]
 
-    @property
-    def stated(self) -> tuple[Segment, ...]:
-        return self.history
+    def describe(self) -> dict[str, Any]:
+        """Its segments as they were stated: the last may say how long it lasts."""
+        return {"segments": [segment.as_dict() for segment in self.history]}
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:

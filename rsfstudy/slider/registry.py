@@ -178,8 +178,7 @@ def resolve(slot: Slot, part: Any) -> Own:
 def _check(slot: Slot, part: Any) -> None:
     """Raise InvalidValue for what cannot fill a slot."""
     if not isinstance(part, type) or not issubclass(part, slot.base):
-        is_part = issubclass(part if isinstance(part, type) else type(part), Part)
-        rule = "fills another slot" if is_part else "is no part of a slider"
+        rule = f"is no class that fills the slot {slot.name}"
         remedy = f"Derive a class from {slot.base.__module__}.{slot.base.__name__}."
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
     params = vars(part).get("__dataclass_params__")
@@ -216,7 +215,7 @@ def _origin(part: Own) -> tuple[str, str]:
 
 def _check_fields(slot: Slot, part: type[Part]) -> None:
     """Refuse fields that say nothing of themselves, or have the name of something else."""
-    what, remedy = f"field of {part.__qualname__}", "Give it another name."
+    what = f"field of {part.__qualname__}"
     for stated in fields(part):
         name, about, owner = stated.name, stated.metadata.get("about"), OWNERS.get(stated.name)
         if about is None:
@@ -225,16 +224,15 @@ def _check_fields(slot: Slot, part: type[Part]) -> None:
         if not is_name(name):
             rule = "must be a Python identifier, its accents composed (NFC)"
             raise InvalidValue(what, name, rule)
-        whose = "every scene" if owner is None and name in RESERVED | SLOT_NAMES else ""
-        if owner is not None:
-            # a part of one's own may rule out more
-            same = about == owner.__dataclass_fields__[name].metadata["about"]
-            if not same or owner not in slot.choices.values():
-                common = name in slot.base.__dataclass_fields__
-                whose = f"every {slot.long_name}" if common else owner.name
-        if whose:
-            rule = f"is the name of something else, of {whose}"
-            raise InvalidValue(what, name, rule, remedy=remedy)
+        if owner is None:
+            taken = name in RESERVED | SLOT_NAMES
+        else:  # another part of the slot may have it, with another rule
+            known = owner.__dataclass_fields__[name].metadata["about"]
+            taken = about != known or owner not in slot.choices.values()
+        if taken:
+            rule = "is the name of something else, of "
+            rule += owner.name if owner else "every scene"
+            raise InvalidValue(what, name, rule, remedy="Give it another name.")
 
 
 def register(parts: Iterable[Own]) -> None:

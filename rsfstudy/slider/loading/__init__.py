@@ -82,9 +82,6 @@ class Loading(Part):
     #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
-    #: Of a history that was sampled: its numbers, and what tells them.
-    samples: ClassVar[bytes] = b""
-    digest: ClassVar[str] = ""
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
 
@@ -116,10 +113,9 @@ class Loading(Part):
         """The history; its last segment goes on for ever."""
         raise TypeError(f"{type(self).__name__} loads nothing")
 
-    @property
-    def stated(self) -> tuple[Segment, ...]:
-        """The history as it was stated: the last segment may say how long it lasts."""
-        return self.segments
+    def describe(self) -> dict[str, Any]:
+        """The history as plain data: its segments, as `protocol` takes them."""
+        return {"segments": [segment.as_dict() for segment in self.segments]}
 
     def alone(self, number: int) -> Loading | Segment:
         """One of its segments without the others; the history itself, if it has one only, or
