@@ -61,7 +61,7 @@ def critical_stiffness(
     return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
 
 
-def displacement_step(b_over_a: float, exponent: float, ratio: float) -> float:
+def displacement_step(b_over_a: float, exponent: float = 0.0, ratio: float = 0.0) -> float:
     """Critical displacement step of the family of laws, over D_c; NaN where there is none.
 
     ``a/(b-a) [-ln(1 - eps r)]/(eps r)`` with r = k/k_cr, at constant normal stress, under a load
@@ -87,7 +87,7 @@ def displacement_step(b_over_a: float, exponent: float, ratio: float) -> float:
     return longer / (b_over_a - 1.0)
 
 
-def velocity_step(b_over_a: float, exponent: float) -> float:
+def velocity_step(b_over_a: float, exponent: float = 0.0) -> float:
     """Critical V_0/V_* of the family of laws at critical stiffness; NaN where there is none.
 
     ``V_0/V_* = 1 + a/[(1 - eps)(b - a)]``, at constant normal stress and with an infinite norm.
@@ -162,7 +162,7 @@ FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_at_critical_stiffness": ClosedForm(
         "V_0/V_* = 1 + a/(b-a)",
         ("b_over_a",),
-        lambda b_over_a: 1.0 + 1.0 / (b_over_a - 1.0),
+        velocity_step,
         "Gu et al. (1984), slip law, constant normal stress, k = k_cr",
     ),
     "velocity_step_for_b_over_a_of_e": ClosedForm(
@@ -174,7 +174,7 @@ FORMS: Mapping[str, ClosedForm] = {
     "displacement_step": ClosedForm(
         "D_c a/(b-a)",
         ("b_over_a",),
-        lambda b_over_a: 1.0 / (b_over_a - 1.0),
+        displacement_step,
         "Gu et al. (1984), slip law, constant normal stress, load point held",
     ),
     "displacement_step_of_the_family": ClosedForm(
@@ -189,28 +189,6 @@ FORMS: Mapping[str, ClosedForm] = {
         velocity_step,
         "invariant line of the orbits at k = k_cr, constant normal stress, infinite norm; eps = 0 "
         "is that of Gu et al. (1984)",
-    ),
-    "normal_stress_step": ClosedForm(
-        "1/q - 1 where mu_* (q-1)/a - alpha (1/a - 1/b) ln q = q k/k_cr",
-        ("mu_star", "a", "b_over_a", "alpha", "stiffness_ratio"),
-        lambda mu_star, a, b_over_a, alpha, ratio: normal_stress_step(
-            mu_star, a, b_over_a, alpha, 0.0, ratio
-        ),
-        "h(u*) = -q k/k_cr, q = sigma_*/sigma, slip law, load point held, infinite norm",
-    ),
-    "normal_stress_step_of_the_family": ClosedForm(
-        "1/q - 1 where mu_* (q-1)/a - alpha (1/a - 1/b) ln q = -ln(1 - eps q k/k_cr)/eps",
-        ("mu_star", "a", "b_over_a", "alpha", "law_exponent", "stiffness_ratio"),
-        normal_stress_step,
-        "h(u*) = -q k/k_cr, q = sigma_*/sigma, load point held, infinite norm",
-    ),
-    "coulomb_normal_stress_step": ClosedForm(
-        "-a k/k_cr/[mu_* - alpha (1 - a/b)]",
-        ("mu_star", "a", "b_over_a", "alpha", "stiffness_ratio"),
-        lambda mu_star, a, b_over_a, alpha, ratio: (
-            -a * ratio / effective_friction(mu_star, b_over_a, alpha)
-        ),
-        "the same to first order, by any law: a change of Coulomb stress by a k/k_cr",
     ),
     "net_weakening": ClosedForm(
         "(a-b) sigma_*",
