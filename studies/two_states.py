@@ -132,6 +132,7 @@ peaks = Panel(
     at={"law": 0},
     title="Peaks of slip rate, event by event",
     marks=[mark_peaks, abscissa(False)],
+    when=lambda dataset: bool(dataset["peak_spread"].notnull().any()),
 )
 multipliers = replace(
     peaks,

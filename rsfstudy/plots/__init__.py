@@ -59,8 +59,9 @@ NAMES = (*_ANY, _FITS, *names.names())
 _ON_SCREEN = 150
 #: What would make two files of one figure differ.
 _DATES: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-#: Most points of axes that a figure does not know for which its panels are repeated.
-_REPEATED = 4
+#: Most points of axes that a figure does not know for which its panels are repeated, and panels
+#: that there may be then.
+_REPEATED, _MOST = 4, 12
 #: Height in mm of a panel of a scatter matrix.
 _OF_SQUARE = 44.0
 
@@ -193,7 +194,8 @@ def _fitting(
     drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
     panels = _repeated(drawing, dataset, further)
-    return (replace(drawing, panels=panels) if panels else _of_any(dataset)), dataset
+    few = panels and (len(panels) <= _MOST or not further)
+    return (replace(drawing, panels=panels) if few else _of_any(dataset)), dataset
 
 
 def _repeated(
@@ -262,8 +264,8 @@ def _panels(drawing: Declared, dataset: xr.Dataset) -> list[Panel | Draw]:
         for panel in drawing.panels
         for each in (_panel.expanded(panel, dataset) if isinstance(panel, Panel) else [panel])
     ]
-    named = [panel.y for panel in drawing.panels if isinstance(panel, Panel)]
-    if not found and not any(isinstance(name, str) and name in dataset for name in named):
+    named = [p.y for p in drawing.panels if isinstance(p, Panel) and isinstance(p.y, str) and p.y]
+    if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results (they have none of its variables)"
         raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
     return found or list(_of_any(dataset).panels)

@@ -16,7 +16,16 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from rsfstudy.plots._text import label, length, number, pretty, stiffness, symbol, wrapped
+from rsfstudy.plots._text import (
+    label,
+    length,
+    number,
+    pretty,
+    stiffness,
+    symbol,
+    with_powers,
+    wrapped,
+)
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -96,7 +105,7 @@ def place(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
         return stiffness(value)
     if dimension == "inertia":
         return "with mass" if value else "without mass"
-    units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {pretty(about.units)}")
+    units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {with_powers(about.units)}")
     return f"{symbol(about)} = {number(value, 4)}{units}"
 
 

@@ -33,6 +33,8 @@ MM = 1.0 / 25.4
 #: Between the two columns of a journal, in inches.
 _GAP = 6.0 * MM
 _MARKERS = "os^Dv<>P*X"
+#: Part of the width of a panel that a scale of colours takes, with its label.
+_BAR = 0.24
 
 
 @contextlib.contextmanager
@@ -125,6 +127,8 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     lines = axes.get_xlabel().count("\n") + _tick_lines(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
+    if getattr(axes, "_colorbars", ()):  # else the layout leaves the panel what is beside both
+        right -= _BAR * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
         axes.legend,

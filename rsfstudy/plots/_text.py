@@ -118,9 +118,13 @@ def label(about: Quantity, width: int = 45) -> str:
     words = _SHORT.get(about.name, about.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
+    return wrapped(f"{pretty(text)} ({with_powers(units)})" if units else pretty(text), width)
+
+
+def with_powers(units: str) -> str:
+    """Units as figures write them."""
     powers = re.sub(r"\b([a-zA-Z]+)(-?\d)\b", r"\1$^{\2}$", units)
-    powers = re.sub(r"\bum\b", r"$\\mu$m", powers)
-    return wrapped(pretty(f"{text} ({powers})" if units else text), width)
+    return pretty(re.sub(r"\bum\b", r"$\\mu$m", powers))
 
 
 def symbol(about: Quantity) -> str:

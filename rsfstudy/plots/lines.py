@@ -42,7 +42,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     that is no number.
     """
     if variable is None:
-        names = varied(dataset)[:_PANELS] or [str(next(iter(dataset.data_vars)))]
+        names = varied(dataset)[:_PANELS] or ["status"]
     else:
         known = variable in dataset
         drawn = known and (is_number(dataset[variable]) or flag_meanings(dataset[variable]))

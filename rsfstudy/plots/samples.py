@@ -17,7 +17,7 @@ from rsfstudy.declare.figure import Draw, Panel
 from rsfstudy.files import contents
 from rsfstudy.plots._axes import is_number, is_numeric, place, varied
 from rsfstudy.plots._style import look
-from rsfstudy.plots._text import pretty, symbol
+from rsfstudy.plots._text import symbol, with_powers, wrapped
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import quantity
 
@@ -25,8 +25,8 @@ from rsfstudy.vocabulary import quantity
 _MOST, _TICKS = 4, 3
 #: Points of a scatter; in a file of lines they are one image, since there may be 10^5 of them.
 _POINTS = {"marker": ".", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
-#: Bins of a histogram, at most.
-_BINS = 30
+#: Bins of a histogram, at most, and characters of a line of a label.
+_BINS, _WIDTH = 30, 17
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
@@ -73,10 +73,11 @@ def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
 
 
 def _label(dataset: xr.Dataset, name: str) -> str:
-    """Symbol and units: panels are small."""
-    about = quantity(name, stated_by(dataset))
-    units = "" if about.units in ("", "1") or about.scale else f" ({pretty(about.units)})"
-    return f"{symbol(about)}{units}"
+    """Symbol and units, in short lines: panels are small."""
+    about = quantity(name.removesuffix("_error"), stated_by(dataset))
+    error = "error of " * name.endswith("_error")
+    units = "" if about.units in ("", "1") or about.scale else f" ({with_powers(about.units)})"
+    return wrapped(f"{error}{symbol(about)}{units}", _WIDTH)
 
 
 def _few_ticks(_dataset: xr.Dataset, axes: Axes) -> None:

@@ -190,7 +190,8 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
             other = next(dim for dim in converted.dims if dim != name)
             text = f"the scale of the axis {name} varies along {other}: select one place on that"
             raise DataError(f"{text} first, as in dataset.isel({other}=0)")
-        kept = {key: value for key, value in values.attrs.items() if key != "scale"}
+        gone = {"scale", "symbol"} if "/" in values.attrs.get("symbol", "") else {"scale"}
+        kept = {key: value for key, value in values.attrs.items() if key not in gone}
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
     held = {"sigma_star": "sigma_*", "slip_distance": "D_c", "reference_velocity": "V_*"}
     for name in set(held) & set(dataset.coords) - set(dataset.dims):  # beside the axes
