@@ -84,6 +84,8 @@ class Panel:
     columns : int
         Most entries of the legend beside each other.
     legend_title : str
+    as_marked : bool
+        Leave scales, legend and title as marks leave them: a figure of the user's own.
     """
 
     x: Along = ""
@@ -110,6 +112,7 @@ class Panel:
     when: Callable[[xr.Dataset], bool] | None = None
     columns: int = 2
     legend_title: str | None = None
+    as_marked: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,18 +130,23 @@ class Figure:
         Whether it shows further axes of the lattice too.
     """
 
-    panels: Sequence[Panel | Draw]
+    panels: Sequence[Any]
     columns: int = 2
     height: float | Callable[[Any], float] | None = None
     more_axes: bool = False
 
+    def __post_init__(self) -> None:
+        panels = [
+            panel if isinstance(panel, Panel) else Panel(marks=[panel], as_marked=True)
+            for panel in self.panels
+        ]
+        object.__setattr__(self, "panels", panels)
+
     @property
     def dimensions(self) -> set[str]:
         """Axes that its panels name."""
-        panels = [panel for panel in self.panels if isinstance(panel, Panel)]
-        return {
-            name for p in panels for name in (p.x, *p.by, *p.each, *p.at) if isinstance(name, str)
-        }
+        named = (name for p in self.panels for name in (p.x, *p.by, *p.each, *p.at))
+        return {name for name in named if isinstance(name, str)}
 
 
 def level(height: float, **style: Any) -> Draw:

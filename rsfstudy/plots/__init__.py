@@ -9,9 +9,8 @@ import importlib
 import io
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +44,6 @@ from rsfstudy.rig.scales import in_units_of_rig
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, quantity
 from rsfstudy.wording import settings
-
-Draw = Callable[[xr.Dataset, Axes], Any]
 
 #: What draws any lattice.
 _ANY = ("lines", "maps")
@@ -103,7 +100,7 @@ def figure(
     dataset = in_units_of_rig(dataset)
     with styled(style):
         drawing, dataset = _fitting(dataset, own, variable)
-        panels = _panels(drawing, dataset)
+        panels = drawing.panels
         columns = min(drawing.columns, len(panels))
         rows = -(-len(panels) // columns)
         height = drawing.height(dataset) if callable(drawing.height) else drawing.height
@@ -126,20 +123,17 @@ def figure(
     return figure
 
 
-def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | Draw | None = None) -> Axes:
+def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
     drawing, dataset = _fitting(in_units_of_rig(dataset))
-    panel = panel or _panels(drawing, dataset)[0]
+    panel = panel or drawing.panels[0]
     _draw(dataset, axes, panel)
     _panel.settle([panel], [axes])
     return axes
 
 
-def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel | Draw) -> None:
-    if isinstance(panel, Panel):
-        _panel.draw(panel, dataset, axes)
-    else:
-        panel(dataset, axes)
+def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel) -> None:
+    _panel.draw(panel, dataset, axes)
     lacking = _lacking(dataset)
     if lacking:
         axes.set_title(f"{axes.get_title()}\n[{lacking}]".strip(), color="tab:red")
@@ -170,8 +164,8 @@ def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:
 def _fitting(
     dataset: xr.Dataset, own: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
-    """Figure of a dataset, and the dataset with the axes that it expects: the one that the study
-    declares, or plain lines or maps if there are more axes than that can show.
+    """Figure of a dataset with all its panels, and the dataset with the axes that it expects: the
+    one that the study declares, or plain lines or maps if there are more axes than that can show.
     """
     name, sizes = declaration(dataset).plot, dataset["status"].sizes
     study = catalogue.load(name) if name in names.names() else None
@@ -193,35 +187,27 @@ def _fitting(
         return _of_any(dataset, variable), dataset
     drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
-    panels = _repeated(drawing, dataset, further)
+    panels = _expanded(drawing, dataset, further)
     few = panels and (len(panels) <= _MOST or not further)
     return (replace(drawing, panels=panels) if few else _of_any(dataset)), dataset
 
 
-def _repeated(
-    drawing: Declared, dataset: xr.Dataset, further: Sequence[str]
-) -> Sequence[Panel | Draw]:
-    """The panels of a figure at each point of axes that it does not know, which titles say."""
-    if not further:
-        return drawing.panels
-    found: list[Panel | Draw] = []
+def _expanded(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) -> list[Panel]:
+    """The panels of a figure, each of one point of the axes that have a panel for each; and of each
+    point of axes that it does not know, which titles say.
+    """
+    found: list[Panel] = []
     for at in np.ndindex(*(dataset.sizes[dimension] for dimension in further)):
         where = dict(zip(further, at, strict=True))
         part = dataset.isel(where)
         said = ", ".join(place(part, dimension) for dimension in further)
-        for panel in drawing.panels:
-            if isinstance(panel, Panel):
-                found += [_panel.within(one, where, said) for one in _panel.expanded(panel, part)]
-            else:
-                found.append(partial(_drawn_within, panel, where, said))
+        each = [one for panel in drawing.panels for one in _panel.expanded(panel, part)]
+        found += [_panel.within(panel, where, said) for panel in each] if further else each
+    named = [panel.y for panel in drawing.panels if isinstance(panel.y, str) and panel.y]
+    if not found and named and not any(name in dataset for name in named):
+        rule = "does not fit these results (they have none of its variables)"
+        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
     return found
-
-
-def _drawn_within(
-    panel: Draw, where: Mapping[str, int], said: str, dataset: xr.Dataset, axes: Axes
-) -> None:
-    panel(dataset.isel(where), axes)
-    axes.set_title(", ".join(filter(None, (axes.get_title(), said))))
 
 
 def _with_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
@@ -255,20 +241,6 @@ def _of_any(dataset: xr.Dataset, variable: str | None = None) -> Declared:
             return Declared(found)
     choices = [str(name) for name, values in dataset.data_vars.items() if _axes.is_number(values)]
     raise InvalidValue("variable", variable, "is no number of these results", choices=choices)
-
-
-def _panels(drawing: Declared, dataset: xr.Dataset) -> list[Panel | Draw]:
-    """All panels, each of one point of the axes that have a panel for each."""
-    found = [
-        each
-        for panel in drawing.panels
-        for each in (_panel.expanded(panel, dataset) if isinstance(panel, Panel) else [panel])
-    ]
-    named = [p.y for p in drawing.panels if isinstance(p, Panel) and isinstance(p.y, str) and p.y]
-    if not found and named and not any(name in dataset for name in named):
-        rule = "does not fit these results (they have none of its variables)"
-        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
-    return found or list(_of_any(dataset).panels)
 
 
 # ---- files --------------------------------------------------------------------------------------

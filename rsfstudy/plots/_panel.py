@@ -24,7 +24,8 @@ from rsfstudy.plots._axes import (
     place,
 )
 from rsfstudy.plots._style import in_grey, legend, look, marker, room
-from rsfstudy.plots._text import label, pretty, slope_with_error, wrapped
+from rsfstudy.plots._text import label as labelled
+from rsfstudy.plots._text import pretty, slope_with_error, wrapped
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
@@ -84,6 +85,7 @@ def within(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
 def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     """Draw all of a panel that does not depend on others."""
     part = _part(panel, dataset)
+    places = "" if panel.as_marked else _places(part, panel.at)
     if panel.x and (panel.y in part if isinstance(panel.y, str) else panel.y):
         values = [_curve(panel, row, axes, style) for row, style in rows(panel, part)]
         _name_second(panel, part, axes)
@@ -97,17 +99,19 @@ def draw(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
             top = float(axes.dataLim.ymax)  # what lies highest is seen whole
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = room(axes)
-    axes.set_xlabel(_label(panel.x, panel.x_label, part, across - _LETTER))
-    axes.set_ylabel(_label(panel.y, panel.y_label, part, up))
-    title = _text(panel.title, part, _places(part, panel.at))
+    if label := _label(panel.x, panel.x_label, part, across - _LETTER):
+        axes.set_xlabel(label)
+    if label := _label(panel.y, panel.y_label, part, up):
+        axes.set_ylabel(label)
+    title = ", ".join(filter(None, [axes.get_title(), _text(panel.title, part, places)]))
     axes.set_title(wrapped(title, across - _LETTER))
 
 
-def settle(panels: Sequence[Any], axes_of: Sequence[Axes]) -> None:
+def settle(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
     """Have panels that are to be alike the same scales along y and of colours, and then numbers and
     legends.
     """
-    pairs = [(p, axes) for p, axes in zip(panels, axes_of, strict=True) if isinstance(p, Panel)]
+    pairs = [(p, axes) for p, axes in zip(panels, axes_of, strict=True) if not p.as_marked]
     for name in {panel.alike for panel, _axes in pairs if panel.alike}:
         group = [axes for panel, axes in pairs if panel.alike == name and axes.has_data()]
         ends = [end for axes in group for end in axes.get_ylim()]
@@ -230,7 +234,9 @@ def _scales(panel: Panel, part: xr.Dataset, axes: Axes, values: np.ndarray) -> N
 def _label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
     if said is not None:
         return wrapped(_text(said, part, ""), width)
-    return label(quantity(what, stated_by(part)), width) if isinstance(what, str) and what else ""
+    return (
+        labelled(quantity(what, stated_by(part)), width) if isinstance(what, str) and what else ""
+    )
 
 
 def _text(said: Any, part: xr.Dataset, otherwise: str) -> str:
