@@ -49,39 +49,26 @@ PROBLEMS = {
     "rigid response": posed(
         {**QUASI_STATIC, "load_velocity_ratio": 200.0},
         RigidResponse(points=2),
-        answer=known.EVOLUTION_DISTANCE,
-        uncertainty=1e-16,
-        source="closed form (eq. 17a)",
+        **known.EVOLUTION_DISTANCE._asdict(),
     ),
     "oscillation": posed(
         {**QUASI_STATIC, "load_velocity_ratio": 20.0},
         StepResponse(peaks=2, phases=2),
-        answer=known.PEAK_AFTER_20,
-        uncertainty=1e-16,
-        source=known.CONSERVED,
+        **known.PEAK_AFTER_20._replace(uncertainty=1e-16, scale=0.0)._asdict(),
     ),
     "critical step": posed(
         {"law": "slip", "normal_stress": "constant", "stiffness_ratio": 1.25},
         CriticalStep(),
-        answer=known.CRITICAL_VELOCITY,
-        scale=known.CRITICAL_VELOCITY - 1.0,
-        uncertainty=1e-17,
-        source=known.EXTENDED,
+        **known.CRITICAL_VELOCITY._asdict(),
     ),
     "cycle, slip law: static drop": posed(
         {**CYCLE, "law": "slip"},
         cycle,
         quantity="static_stress_drop",
-        answer=known.SLIP_STATIC_DROP[0],
-        uncertainty=known.SLIP_STATIC_DROP[1],
-        source=known.EXTENDED,
+        **known.SLIP_STATIC_DROP._asdict(),
     ),
     "cycle, slowness law: recurrence": posed(
-        {**CYCLE, "law": "slowness"},
-        cycle,
-        answer=known.SLOWNESS_RECURRENCE[0],
-        uncertainty=known.SLOWNESS_RECURRENCE[1],
-        source=known.EXTENDED,
+        {**CYCLE, "law": "slowness"}, cycle, **known.SLOWNESS_RECURRENCE._asdict()
     ),
 }
 

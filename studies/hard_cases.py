@@ -8,7 +8,7 @@ estimate, or with the status that names the reason.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ from rsfstudy.status import Status
 
 from . import _references as known
 from ._problem import ERRORS, Fields, Posing, Problem, posed
+from ._references import Known
 
 
 @dataclass(frozen=True)
@@ -72,19 +73,29 @@ class HardCase(Posing):
 CASES: dict[str, tuple[Fields, Problem]] = {}
 
 CONSTANT: Fields = {"normal_stress": "constant"}
-SLOWNESS: Fields = {"law": "slowness", "normal_stress": "constant"}
+SLIP: Fields = {**CONSTANT, "law": "slip"}
+SLOWNESS: Fields = {**CONSTANT, "law": "slowness"}
 CYCLE: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
-EXACT = "closed form"
+EXACT, LINEAR = "closed form", "linear theory: every orbit grows below k_cr, and decays above"
 
-step, triggered = CriticalStep(), Triggered()
+step, triggered, rigid = CriticalStep(), Triggered(), RigidResponse()
+growth = LinearStability()
 cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
 
 
-def number(
-    label: str, measure: Measure, answer: float, source: str, fields: Fields, **more: float
-) -> None:
+def loaded(velocity_ratio: float, **fields: Any) -> Fields:
+    """Fields of a scene with this velocity of its load point."""
+    return {**fields, "load_velocity_ratio": velocity_ratio}
+
+
+def near(off: float, **fields: Any) -> Fields:
+    """Fields of a scene with a stiffness of (1 + off) k_cr, at constant normal stress."""
+    return {**CONSTANT, "stiffness_ratio": 1.0 + off, **fields}
+
+
+def number(label: str, measure: Measure, known: Known, fields: Fields) -> None:
     """A case with a number to come out."""
-    CASES[label] = posed(fields, measure, answer=answer, source=source, **more)
+    CASES[label] = posed(fields, measure, **known._asdict())
 
 
 def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
@@ -92,178 +103,75 @@ def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
     CASES[label] = posed(fields, measure, status=status, source="the physics")
 
 
-def critical(label: str, fields: Fields) -> None:
+def critical(label: str, **fields: Any) -> None:
     """A critical step of the slip law by the independent computation."""
-    answer = known.HARD_STEPS[label]
-    size = answer - 1.0
-    number(label, step, answer, known.EXTENDED, fields, scale=size, uncertainty=1e-15)
+    number(label, step, known.HARD_STEPS[label], fields)
 
 
-def recurs(label: str, name: str, fields: Fields) -> None:
+def recurs(label: str, name: str, **fields: Any) -> None:
     """A limit cycle of the slip law by the independent computation."""
-    number(name, cycle, known.HARD_CYCLES[label], known.EXTENDED, fields, uncertainty=4e-12)
+    number(name, cycle, known.HARD_CYCLES[label], {**CONSTANT, **CYCLE, **fields})
 
 
 # rates and steps beyond what numbers hold
-number(
-    "200-fold step, peak at 10^87 V_*",
-    peaks,
-    known.PEAK_AFTER_200,
-    known.CONSERVED,
-    {**SLOWNESS, "load_velocity_ratio": 200.0},
-    scale=1.0,
-)
-number(
-    "20-fold step, neutral orbit",
-    peaks,
-    known.PEAK_AFTER_20,
-    known.CONSERVED,
-    {**SLOWNESS, "load_velocity_ratio": 20.0},
-    scale=1.0,
-)
-ends(
-    "1000-fold step, peak beyond 10^120 V_*",
-    peaks,
-    Status.SLIP_RATE_UNBOUNDED,
-    {**SLOWNESS, "load_velocity_ratio": 1000.0},
-)
-number(
-    "rigid, V = 1e12 V_*",
-    RigidResponse(slip=60.0),
-    math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)),
-    EXACT,
-    {**SLOWNESS, "load_velocity_ratio": 1e12},
-)
-number(
-    "rigid, V = 1e-40 V_*",
-    RigidResponse(),
-    1.0,
-    EXACT,
-    {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e-40},
-)
-number(
-    "rigid, mu_ss = -0.03",
-    RigidResponse(),
-    1.0,
-    EXACT,
-    {**CONSTANT, "law": "slip", "load_velocity_ratio": 1e24},
-)
+number("200-fold step, peak at 10^87 V_*", peaks, known.PEAK_AFTER_200, loaded(200.0, **SLOWNESS))
+number("20-fold step, neutral orbit", peaks, known.PEAK_AFTER_20, loaded(20.0, **SLOWNESS))
+UNBOUNDED = Status.SLIP_RATE_UNBOUNDED
+ends("1000-fold step, peak beyond 10^120 V_*", peaks, UNBOUNDED, loaded(1000.0, **SLOWNESS))
+FAST = Known(math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)), EXACT)
+number("rigid, V = 1e12 V_*", RigidResponse(slip=60.0), FAST, loaded(1e12, **SLOWNESS))
+number("rigid, V = 1e-40 V_*", rigid, Known(1.0, EXACT), loaded(1e-40, **SLIP))
+number("rigid, mu_ss = -0.03", rigid, Known(1.0, EXACT), loaded(1e24, **SLIP))
 # at and around the critical stiffness
-number(
-    "critical step, k = (1 +1e-08) k_cr",
-    step,
-    known.JUST_ABOVE_CRITICAL_STIFFNESS,
-    known.EXTENDED,
-    {**CONSTANT, "stiffness_ratio": 1.0 + 1e-8},
-    scale=known.JUST_ABOVE_CRITICAL_STIFFNESS - 1.0,
-)
+number("critical step, k = (1 +1e-08) k_cr", step, known.JUST_ABOVE_CRITICAL_STIFFNESS, near(1e-8))
 for off in (-1e-3, 1e-3):
-    number(
-        f"tiny step, k = (1 {off:+g}) k_cr",
-        triggered,
-        float(off < 0.0),
-        "linear theory: every orbit grows below k_cr, and decays above",
-        {**CONSTANT, "stiffness_ratio": 1.0 + off, "load_velocity_ratio": 1.0 + 1e-3},
-        scale=1.0,
-    )
+    grows = Known(float(off < 0.0), LINEAR, scale=1.0)
+    tiny = near(off, load_velocity_ratio=1.0 + 1e-3)
+    number(f"tiny step, k = (1 {off:+g}) k_cr", triggered, grows, tiny)
 # growth and decay of 1e-8 an orbit cannot be told apart at rtol 1e-7, and the status says so
 for off in (-1e-8, 1e-8):
-    ends(
-        f"tiny step, k = (1 {off:+g}) k_cr",
-        triggered,
-        Status.UNVERIFIED,
-        {**CONSTANT, "stiffness_ratio": 1.0 + off, "load_velocity_ratio": 1.0 + 1e-3},
-    )
+    tiny = near(off, load_velocity_ratio=1.0 + 1e-3)
+    ends(f"tiny step, k = (1 {off:+g}) k_cr", triggered, Status.UNVERIFIED, tiny)
 # every step is unstable there, by a growth of 1e-8 an orbit that no motion can show
-ends(
-    "critical step, k = (1 -1e-08) k_cr",
-    step,
-    Status.UNVERIFIED,
-    {**CONSTANT, "stiffness_ratio": 1.0 - 1e-8},
-)
-ends(
-    "any step, k = (1 -0.001) k_cr",
-    step,
-    Status.UNSTABLE_AT_ANY_STEP,
-    {**CONSTANT, "stiffness_ratio": 1.0 - 1e-3},
-)
-recurs("k = 0.99 k_cr", "cycle at 0.99 k_cr", {**CONSTANT, **CYCLE, "stiffness_ratio": 0.99})
-recurs(
-    "V_0 = V_*", "cycle from a nudge, V_0 = V_*", {**CONSTANT, **CYCLE, "load_velocity_ratio": 1.0}
-)
+ends("critical step, k = (1 -1e-08) k_cr", step, Status.UNVERIFIED, near(-1e-8))
+ends("any step, k = (1 -0.001) k_cr", step, Status.UNSTABLE_AT_ANY_STEP, near(-1e-3))
+recurs("k = 0.99 k_cr", "cycle at 0.99 k_cr", stiffness_ratio=0.99)
+recurs("V_0 = V_*", "cycle from a nudge, V_0 = V_*", load_velocity_ratio=1.0)
 # parameters at the ends of their ranges
-critical("lambda = 0.01", {**CONSTANT, "b_over_a": 1.01})
-critical("lambda = 20", {**CONSTANT, "b_over_a": 21.0})
-critical("a = 1e-4", {"a": 1e-4})
-critical("a = 0.1", {"a": 0.1})
-critical("alpha = 0", {"alpha": 0.0})
-critical("alpha = mu_*", {"alpha": 0.76})
-critical("alpha = 1", {"alpha": 1.0})
-STEEPEST = math.degrees(math.atan(0.76)) + 0.01
-critical("phi = atan(mu_*) + 0.01", {"phi": STEEPEST})
-critical("T = 1e-6 s", {"period": 1e-6})
-critical("T = 1e4 s", {"period": 1e4})
-recurs("T = 1e-6 s", "cycle, T = 1e-6 s", {**CONSTANT, **CYCLE, "period": 1e-6})
-recurs("T = 1e4 s", "cycle, T = 1e4 s", {**CONSTANT, **CYCLE, "period": 1e4})
+critical("lambda = 0.01", **CONSTANT, b_over_a=1.01)
+critical("lambda = 20", **CONSTANT, b_over_a=21.0)
+critical("a = 1e-4", a=1e-4)
+critical("a = 0.1", a=0.1)
+critical("alpha = 0", alpha=0.0)
+critical("alpha = mu_*", alpha=0.76)
+critical("alpha = 1", alpha=1.0)
+STEEP = {"phi": math.degrees(math.atan(0.76)) + 0.01}
+critical("phi = atan(mu_*) + 0.01", **STEEP)
+critical("T = 1e-6 s", period=1e-6)
+critical("T = 1e4 s", period=1e4)
+recurs("T = 1e-6 s", "cycle, T = 1e-6 s", period=1e-6)
+recurs("T = 1e4 s", "cycle, T = 1e4 s", period=1e4)
 # where there is no answer but a name
-ends(
-    "no steady state below some V",
-    RigidResponse(),
-    Status.NO_STEADY_STATE,
-    {"phi": STEEPEST, "load_velocity_ratio": 0.9},
-)
-ends("a slider that locks", peaks, Status.LOCKED, {"phi": STEEPEST, "load_velocity_ratio": 0.5})
-ends(
-    "cycle where k_cr has fallen",
-    cycle,
-    Status.NO_LIMIT_CYCLE,
-    {**CYCLE, "phi": 50.0, "load_velocity_ratio": 1000.0},
-)
-ends(
-    "norm beyond the inertial peak",
-    step,
-    Status.NORM_UNREACHABLE,
-    {"inertia": True, "instability_norm": 1e3},
-)
-ends(
-    "norm below the loading rate",
-    triggered,
-    Status.NORM_BELOW_LOADING_RATE,
-    {"load_velocity_ratio": 1e5},
-)
-ends("slip law without mass", peaks, Status.SLIP_RATE_UNBOUNDED, {"load_velocity_ratio": 20.0})
-ends(
-    "step past zero shear stress",
-    triggered,
-    Status.SHEAR_STRESS_REVERSED,
-    {"displacement_step": -47.0},
-)
-ends(
-    "step past zero normal stress",
-    triggered,
-    Status.NORMAL_STRESS_LOST,
-    {"displacement_step": -106.0},
-)
-number(
-    "step of 1e-14",
-    triggered,
-    0.0,
-    "linear theory: it decays",
-    {"load_velocity_ratio": 1.0 + 1e-14, "stiffness_ratio": 1.1},
-    scale=1.0,
-)
-number(
-    "2361-fold step",
-    step,
-    known.CRITICAL_VELOCITY_OF_SECTION_4,
-    known.EXTENDED,
-    {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5},
-)
+ends("no steady state below some V", rigid, Status.NO_STEADY_STATE, loaded(0.9, **STEEP))
+ends("a slider that locks", peaks, Status.LOCKED, loaded(0.5, **STEEP))
+FALLEN = loaded(1000.0, **CYCLE | {"phi": 50.0})
+ends("cycle where k_cr has fallen", cycle, Status.NO_LIMIT_CYCLE, FALLEN)
+BEYOND: Fields = {"inertia": True, "instability_norm": 1e3}
+ends("norm beyond the inertial peak", step, Status.NORM_UNREACHABLE, BEYOND)
+ends("norm below the loading rate", triggered, Status.NORM_BELOW_LOADING_RATE, loaded(1e5))
+ends("slip law without mass", peaks, UNBOUNDED, loaded(20.0))
+PULLED_BACK: Fields = {"displacement_step": -47.0}
+ends("step past zero shear stress", triggered, Status.SHEAR_STRESS_REVERSED, PULLED_BACK)
+FARTHER: Fields = {"displacement_step": -106.0}
+ends("step past zero normal stress", triggered, Status.NORMAL_STRESS_LOST, FARTHER)
+DECAYS = Known(0.0, "linear theory: it decays", scale=1.0)
+number("step of 1e-14", triggered, DECAYS, loaded(1.0 + 1e-14, stiffness_ratio=1.1))
+SECTION_4: Fields = {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}
+number("2361-fold step", step, known.CRITICAL_VELOCITY_OF_SECTION_4, SECTION_4)
 number(
     "slip law, down to 10^-137 V_*",
     cycle,
-    known.DOWN_TO_137[0],
-    known.EXTENDED,
+    known.DOWN_TO_137,
     {
         "law": "slip",
         "a": 0.008794017206350683,
@@ -277,13 +185,11 @@ number(
         "load_velocity_ratio": 86.431987832162,
         "inertia": True,
     },
-    uncertainty=known.DOWN_TO_137[1],
 )
 number(
     "slowness law, down to 10^-1745 V_*",
     cycle,
-    known.DOWN_TO_1745[0],
-    known.EXTENDED,
+    known.DOWN_TO_1745,
     {
         "law": "slowness",
         "a": 0.004822260947305701,
@@ -297,14 +203,9 @@ number(
         "load_velocity_ratio": 1.2036896528515733,
         "inertia": True,
     },
-    uncertainty=known.DOWN_TO_1745[1],
 )
-ends(
-    "mass against every stiffness",
-    LinearStability(),
-    Status.UNSTABLE_AT_ANY_STIFFNESS,
-    {"inertia": True, "period": 1e8, "load_velocity_ratio": 100.0},
-)
+HEAVY: Fields = loaded(100.0, inertia=True, period=1e8)
+ends("mass against every stiffness", growth, Status.UNSTABLE_AT_ANY_STIFFNESS, HEAVY)
 
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
