@@ -2,6 +2,7 @@
 measures that solve such problems.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -87,10 +88,14 @@ class Problem:
 
 Fields = dict[str, str | float | bool]
 
+#: All problems that the studies pose.
+POSED: list[Problem] = []
+
 
 def posed(fields: Fields, measure: Measure, **known: Any) -> tuple[Fields, Problem]:
     """Fields of a scene, and the problem that it poses."""
-    return fields, Problem(scene=Scene(**fields), measure=measure, **known)
+    POSED.append(Problem(scene=Scene(**fields), measure=measure, **known))
+    return fields, POSED[-1]
 
 
 @dataclass(frozen=True)
@@ -112,15 +117,17 @@ class Posing(Measure):
 
     @classmethod
     def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """The problems, taken out of a description."""
+        """The problems, taken out of a description: those that are posed, described so."""
         from rsfstudy.files import contents  # which workers do not load
 
         if "problems" not in described:
             return {}
-        listed = described.pop("problems")
-        plain = contents.fit(listed, Sequence[dict[str, Any]], f"{path}.problems")
-        made = [_restored(each, f"{path}.problems[{n}]") for n, each in enumerate(plain)]
-        return {"problems": tuple(made)}
+        known = [json.loads(json.dumps(problem.describe())) for problem in POSED]
+        listed = contents.fit(described.pop("problems"), Sequence[dict[str, Any]], path)
+        for number, each in enumerate(listed):
+            if each not in known:
+                raise contents.refused(f"{path}.problems[{number}]", "is posed by no study")
+        return {"problems": tuple(POSED[known.index(each)] for each in listed)}
 
     def posed_by(self, scene: Scene) -> Problem:
         """The problem of this scene.
@@ -139,32 +146,3 @@ class Posing(Measure):
             "has no known answer",
             remedy="Choose among the points of the axis; other values have no reference.",
         )
-
-
-def _restored(described: dict[str, Any], path: str) -> Problem:
-    """The problem with this description, which stands at `path` in a file."""
-    from rsfstudy.files import contents, restore
-
-    statuses = {status.label: status for status in Status}
-    kinds = {
-        "scene": contents.PlainScene,
-        "measure": contents.PlainMeasure,
-        "status": str,
-        "scale": float | None,
-    }
-    for name, kind in kinds.items():
-        if name not in described:
-            raise contents.refused(f"{path}.{name}", "is missing")
-        contents.fit(described[name], kind, f"{path}.{name}")
-    if described["status"] not in statuses:
-        raise contents.refused(f"{path}.status", "is unknown")
-    made: Problem = contents.restored(
-        {name: value for name, value in described.items() if name not in kinds},
-        Problem,
-        path,
-        scene=contents.scene(described["scene"], path=f"{path}.scene"),
-        measure=restore.measure(described["measure"], f"{path}.measure"),
-        status=statuses[described["status"]],
-        scale=described["scale"] or 0.0,
-    )
-    return made
