@@ -34,6 +34,9 @@ LAWS: dict[str, dict[str, str | float]] = {
     NAGATA: {"law": "slowness", "stress_dependence": 1.0},
 }
 
+#: Those that are told apart by name: all but the quarters of the family.
+NAMED = (SLIP, MIDDLE, SLOWNESS, PERRIN, COMPOSITE, CUT_OFF, NAGATA)
+
 #: w exp(w) = exp(-V_*/V_c): the steady state of the composite law at V_*.
 HEALED = 0.56353169695
 

@@ -24,6 +24,7 @@ from rsfstudy.analysis.fitting.model import (
 )
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.search import Search
+from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
@@ -37,6 +38,11 @@ _AR1, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
 _PROCESSES = ("ar1", *_MOVING_AVERAGES)
 #: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
 ONE, TWO = 0.6827, 0.9545
+#: The fault and machine of the studies that fit synthetic records, the work that one of those may
+#: take, and steps from 1 to 10 um/s and back.
+RIG = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
+ACCURACY = Accuracy(budget=50_000_000, engine="compiled")
+UP, BACK = "1:30, 10:270", "10:30, 1:270"
 _NUMBER = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
 #: Velocity and displacement of a piece, or time where an s follows.
 _PIECE = re.compile(rf"{_NUMBER}:{_NUMBER}(s?)\s*")
@@ -54,6 +60,11 @@ _OF_PARAMETER = (
     ("naive_inside_two", "the same, residuals taken for white noise"),
     ("told", "whether the record tells the parameter"),
 )
+
+
+def designs(protocols: Mapping[str, str]) -> Axis:
+    """An axis of protocols, by what they are called."""
+    return Axis("design", {name: {"protocol": text} for name, text in protocols.items()})
 
 
 class _Piece(NamedTuple):
@@ -95,7 +106,7 @@ class SyntheticFit(Measure):
         Tells the noise.
     """
 
-    protocol: str = "1:30, 10:270"
+    protocol: str = UP
     free: tuple[str, ...] = ("a", "b", "slip_distance", "mu_star", "trend1")
     slip_distance: float = 10.0
     rows: int = 500

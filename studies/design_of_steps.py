@@ -9,25 +9,26 @@ records keep what is promised.
 
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 
-from .law_identification import BACK, CHANCE, EXPONENT_FREE, FAMILY, STEP, ScatterOverPromise
+from ._synthetic_fit import ACCURACY, BACK, UP
+from .law_identification import CHANCE, EXPONENT_FREE, FAMILY, ScatterOverPromise
 
 RECORDS, DISTANCE = 4, 10.0
 HOLD = "1:30, 0:1000 s, 1:270"
 #: Rows of a step, and white noise.
 ROWS, NOISE = 500, 5e-4
 DESIGNS: dict[str, dict[str, str | float]] = {
-    "step up": {"protocol": STEP},
-    "4 times the rows": {"protocol": STEP, "rows": 4 * ROWS},
-    "half the noise": {"protocol": STEP, "noise_size": 0.5 * NOISE},
+    "step up": {"protocol": UP},
+    "4 times the rows": {"protocol": UP, "rows": 4 * ROWS},
+    "half the noise": {"protocol": UP, "noise_size": 0.5 * NOISE},
     "step back": {"protocol": BACK},
     "hold": {"protocol": HOLD},
-    "two steps up": {"protocol": f"{STEP}; {STEP}"},
-    "up and back": {"protocol": f"{STEP}; {BACK}"},
-    "up and hold": {"protocol": f"{STEP}; {HOLD}"},
+    "two steps up": {"protocol": f"{UP}; {UP}"},
+    "up and back": {"protocol": f"{UP}; {BACK}"},
+    "up and hold": {"protocol": f"{UP}; {HOLD}"},
 }
 SHOWN = ("a", "b", "slip_distance", "law_exponent")
 #: Stiffness over normal stress in 1/um.
@@ -119,5 +120,5 @@ study = Study(
         *(kept(k, name) for k in MACHINES for name in SHOWN),
     ],
     plot=figure,
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
 )

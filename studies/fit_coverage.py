@@ -13,15 +13,13 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
-from ._synthetic_fit import ONE, TWO, SyntheticFit
+from ._synthetic_fit import ACCURACY, ONE, RIG, TWO, SyntheticFit
 
-#: Of the studies that fit synthetic records.
-RIG = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
 RECORDS = 24
 PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
 #: Of which shares of records are told, with what Gaussian errors cover.
@@ -150,7 +148,7 @@ study = Study(
         *(naive_fails(p, law) for p in PROCESSES[1:] for law in LAWS),
     ],
     plot=Figure([shares]),
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
     references=[
         "Patterson and Thompson (1971), Biometrika 58, 545-554",
         "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",

@@ -9,9 +9,9 @@ those of the likelihood, which is no parabola. Markers are as in fit_coverage.
 
 from dataclasses import replace
 
-from rsfstudy import Accuracy, Axis, Figure, Scene, Study
+from rsfstudy import Axis, Figure, Scene, Study
 
-from ._synthetic_fit import SyntheticFit
+from ._synthetic_fit import ACCURACY, SyntheticFit, designs
 from .fit_coverage import REDUCTIONS, covers, shares
 
 RECORDS = 6
@@ -34,7 +34,7 @@ study = Study(
     ),
     axes=[
         Axis("process", list(PROCESSES)),
-        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        designs(DESIGNS),
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(
@@ -47,5 +47,5 @@ study = Study(
         for claim in covers("J", f"white noise, {design}", process="white", design=design)
     ],
     plot=Figure([replace(shares, each=["design"])]),
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
 )

@@ -33,6 +33,8 @@ from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.status import Status
 
+from ._synthetic_fit import ACCURACY
+
 #: Slip distance in um, rows of a record, and the accuracy of its motion.
 DISTANCE, ROWS, SMOOTH = 10.0, 300, 1e-9
 #: How long all slides steadily before the record begins, in s: loading may come as late.
@@ -290,6 +292,6 @@ study = Study(
     measure=Recovered(),
     claims=[comes_back(case, source) for case in CASES for source in LEAVES],
     plot=figure,
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
     references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
 )

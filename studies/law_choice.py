@@ -12,16 +12,15 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
-from ._synthetic_fit import SyntheticFit
-from .fit_coverage import RIG
+from ._synthetic_fit import ACCURACY, BACK, RIG, UP, SyntheticFit, designs
 
 RECORDS = 6
 LAWS = ("slip", "slowness")
-DESIGNS = {"one step up": "1:30, 10:270", "a pair, up and back": "1:30, 10:270; 10:30, 1:270"}
+DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}"}
 NOISE = (5e-4, 5e-3)
 #: Difference of the criterion that decides: the other law is then e^2 times less likely.
 DECIDES = 4.0
@@ -127,7 +126,7 @@ study = Study(
     axes=[
         Axis("law", list(LAWS)),
         Axis("fitted_law", list(LAWS)),
-        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        designs(DESIGNS),
         Axis("noise_size", list(NOISE)),
         Axis("seed", list(range(RECORDS))),
     ],
@@ -139,6 +138,6 @@ study = Study(
         *(seldom_wrong(law) for law in LAWS),
     ],
     plot=figure,
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
     references=["Bhattacharya et al. (2015), J. Geophys. Res. 120, 6365-6385"],
 )

@@ -14,19 +14,17 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Derivatives, Reduction
 
-from ._synthetic_fit import SyntheticFit
-from .fit_coverage import RIG
+from ._synthetic_fit import ACCURACY, BACK, RIG, UP, SyntheticFit, designs
 
 RECORDS = 12
-STEP, BACK = "1:30, 10:270", "10:30, 1:270"
 DESIGNS = {
-    "one step up": STEP,
-    "a pair, up and back": f"{STEP}; {BACK}",
-    "two steps up": f"{STEP}; {STEP}",
+    "one step up": UP,
+    "a pair, up and back": f"{UP}; {BACK}",
+    "two steps up": f"{UP}; {UP}",
 }
 #: Standard errors of the exponent by Fisher's information.
 PROMISED = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
@@ -144,13 +142,13 @@ study = Study(
     summary=Study.caption(__doc__),
     base=FAMILY,
     axes=[
-        Axis("design", {name: {"protocol": text} for name, text in DESIGNS.items()}),
+        designs(DESIGNS),
         Axis("seed", list(range(RECORDS))),
     ],
     measure=EXPONENT_FREE,
     reductions=[ScatterOverPromise("scatter", "deviation")],
     claims=[claim for design in DESIGNS for claim in claims(design)],
     plot=figure,
-    accuracy=Accuracy(budget=50_000_000, engine="compiled"),
+    accuracy=ACCURACY,
     references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
 )

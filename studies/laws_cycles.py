@@ -13,18 +13,7 @@ from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import Difference, LinearFit, OverClosedForm
 
-from ._laws import (
-    COMPOSITE,
-    CUT_OFF,
-    LAWS,
-    MIDDLE,
-    NAGATA,
-    PERRIN,
-    REFERENCES,
-    SLIP,
-    SLOWNESS,
-    by_law,
-)
+from ._laws import LAWS, MIDDLE, NAMED, PERRIN, REFERENCES, SLIP, SLOWNESS, by_law
 from ._paper import PAPER, REFERENCE
 
 base = Scene(b_over_a=2.0, stiffness_ratio=0.8, inertia=True)
@@ -108,7 +97,7 @@ study = Study(
         known(SLIP, "static_stress_drop", 40.16070456254199 * base.a),
         known(SLOWNESS, "recurrence_interval", 23.9399987067),
         known(SLOWNESS, "static_stress_drop", 37.127939244 * base.a),
-        *map(dynamic, (SLIP, MIDDLE, SLOWNESS, PERRIN, COMPOSITE, CUT_OFF, NAGATA)),
+        *map(dynamic, NAMED),
         slower(SLIP, "below", -9.0),
         slower(PERRIN, "below", -5.0),
         slower(MIDDLE, "above", -1.5),
