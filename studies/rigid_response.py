@@ -6,77 +6,19 @@ the slowness law it separates the responses to large downward steps.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import level
 from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.reduce import RelativeDifference
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
+from rsfstudy.reduce import Range, RelativeDifference
 
 from ._paper import PAPER, REFERENCE
 
 #: Steps of 1 to 4 decades; a small one, and the one of section 3.4.
 STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
-
-
-@dataclass(frozen=True)
-class Spread(Reduction):
-    """Spread of the values along one coordinate: the largest less the smallest.
-
-    Parameters
-    ----------
-    name : str
-        Name of the result; ``<name>_points``, the number of values, comes with it.
-    of : str
-        Variable to compare.
-    on : str
-        Coordinate along one dimension.
-    within : tuple of float
-        Range of `on`, both ends included; all of it by default.
-    """
-
-    on: str = ""
-    within: tuple[float, float] | None = None
-    kind: ClassVar[str] = "spread"
-
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
-        """The points in range."""
-        return within(status, self.on, self.within)
-
-    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Along the dimension of `on`; nothing where fewer than two points are in range."""
-        dimension = dimension_of(dataset, self.on)
-        support = within(dataset, self.on, self.within)
-        if support.sizes[dimension] < 2:
-            return xr.Dataset()
-        values = support[self.of]
-        spread = values.max(dimension) - values.min(dimension)
-        answered = values.notnull().sum(dimension)
-        spread = spread.where(~refused(support, self.of, dimension) & (answered > 1))
-        span = "" if self.within is None else f" from {self.within[0]:g} to {self.within[1]:g}"
-        note = f"largest less smallest {self.of} over {self.on}{span}"
-        return xr.Dataset(
-            {
-                self.name: spread.assign_attrs(comment=note),
-                f"{self.name}_points": answered.astype("int32").assign_attrs(comment=note),
-            }
-        )
-
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """By the cells that, within their errors, may be the largest and the smallest."""
-        dimension = dimension_of(dataset, self.on)
-        support = within(dataset, self.on, self.within)
-        values, errors = support[self.of], support[f"{self.of}_error"]
-        number = xr.DataArray(
-            np.arange(support.sizes[dimension]), {dimension: support[dimension]}, dimension
-        )
-        reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
-        return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
 
 def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
@@ -147,10 +89,10 @@ study = Study(
         RelativeDifference(
             name="slowing", of="evolution_distance", along="normal_stress", reference="constant"
         ),
-        Spread(
+        Range(
             name="separation",
             of="stress_left_at_unit_slip",
-            on="load_velocity_ratio",
+            over="load_velocity_ratio",
             within=(1e-4, 1e-2),
         ),
     ],

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from rsfstudy.named_studies.rigid_response import Spread
 
 from rsfstudy.reduce import (
     Boundary,
@@ -16,6 +15,7 @@ from rsfstudy.reduce import (
     OverClosedForm,
     ProportionalFit,
     Quantile,
+    Range,
     RelativeDifference,
     StandardDeviation,
     reduced,
@@ -56,8 +56,8 @@ KINDS = [
     Difference("r", OF, **AGAINST),
     RelativeDifference("r", OF, **AGAINST),
     OverClosedForm("r", OF, form="velocity_step_at_critical_stiffness"),
-    Spread("r", OF, ON),
-    Spread("r", OF, ON, within=(0.5, 2.0)),
+    Range("r", OF, ON),
+    Range("r", OF, ON, within=(0.5, 2.0)),
     Mean("r", OF, over="b_over_a"),
     StandardDeviation("r", OF, over="b_over_a"),
     Quantile("r", OF, over="b_over_a", level=0.4),
@@ -122,7 +122,7 @@ def test_a_cell_of_no_known_error_leaves_it_unknown():
     errors = ERRORS.copy()
     errors[1, 4] = np.nan
     fits = (LinearFit("all", OF, ON), LinearFit("some", OF, ON, within=(0.25, 2.0)))
-    result = reduced(lattice(errors=errors), (*fits, Spread("r", OF, ON)))
+    result = reduced(lattice(errors=errors), (*fits, Range("r", OF, ON)))
     for name in ("all", "r"):
         assert result[f"{name}_error"].isnull().values.tolist() == [False, True]
         assert result[name].notnull().all()
@@ -160,7 +160,7 @@ def test_a_spread_knows_the_cells_that_may_be_farthest():
     """The second largest is off by more than what the largest leads by."""
     values = np.tile([1.0, 1.5, 2.0, 2.999, 3.0], (2, 1))
     errors = np.tile([1e-6, 1e-6, 1e-6, 1e-2, 1e-6], (2, 1))
-    result = reduced(lattice(values, errors), (Spread("r", OF, ON),))
+    result = reduced(lattice(values, errors), (Range("r", OF, ON),))
     np.testing.assert_allclose(result.r_error, 1e-2 + 1e-6, rtol=1e-9)
 
 

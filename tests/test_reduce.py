@@ -6,7 +6,6 @@ import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import Parting
-from rsfstudy.named_studies.rigid_response import Spread
 from rsfstudy.named_studies.stability_map import CyclingEdge
 from running import claimed
 from scipy.stats import linregress
@@ -21,6 +20,7 @@ from rsfstudy.reduce import (
     LinearFit,
     OverClosedForm,
     ProportionalFit,
+    Range,
     RelativeDifference,
     reduced,
 )
@@ -81,7 +81,7 @@ CHAIN = (
         name="lowering", of="critical_velocity_ratio", along="case", reference="reference"
     ),
     LinearFit(name="slope", of="gain", on="a_over_b_minus_a"),
-    Spread(name="apart", of="gain", on="a_over_b_minus_a"),
+    Range(name="apart", of="gain", over="a_over_b_minus_a"),
     Boundary(name="edge", of="gain", on="a_over_b_minus_a", level=2.5),
 )
 
@@ -115,7 +115,7 @@ def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
 @pytest.mark.parametrize("name", ["critical_velocity_ratio", "status", "b_over_a"])
 def test_a_reduction_replaces_nothing(name):
     with pytest.raises(InvalidValue, match=f"would replace '{name}'"):
-        reduced(lattice(1.0 + X), (Spread(name, "critical_velocity_ratio", "b_over_a"),))
+        reduced(lattice(1.0 + X), (Range(name, "critical_velocity_ratio", "b_over_a"),))
 
 
 def test_failed_cells_outside_of_the_support_do_not_matter():
@@ -355,8 +355,8 @@ def test_differences_and_spreads():
         name="apart", of="critical_velocity_ratio", along="case", reference="reference"
     )
     np.testing.assert_allclose(reduced(dataset, (apart,)).apart.sel(case="other"), 2.0 * X)
-    spread = Spread(
-        name="spread", of="critical_velocity_ratio", on="a_over_b_minus_a", within=(0.25, 1.0)
+    spread = Range(
+        name="spread", of="critical_velocity_ratio", over="a_over_b_minus_a", within=(0.25, 1.0)
     )
     assert reduced(dataset, (spread,)).spread.values.tolist() == [0.75, 2.25]
     codes = np.zeros((2, 5))
@@ -406,7 +406,7 @@ def test_reductions_of_reductions_keep_to_their_dimensions():
     spread = Difference(name="apart", of="slope", along="case", reference="reference")
     result = reduced(dataset.assign_coords(number=("law", [1.0, 2.0])), (slope, spread))
     assert result.apart.dims == ("law", "case")
-    again = reduced(result, (Spread(name="s", of="slope", on="number"),))
+    again = reduced(result, (Range(name="s", of="slope", over="number"),))
     assert again.s.dims == ("case",)
 
 

@@ -43,8 +43,7 @@ _NOUNS = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load po
 
 def is_numeric(dataset: xr.Dataset, dimension: str) -> bool:
     """True if the points of a dimension are numbers, not names or flags."""
-    points = dataset[dimension]
-    return points.dtype.kind in "fiu" and "flag_values" not in points.attrs
+    return is_number(dataset[dimension]) and dataset[dimension].dtype.kind != "b"
 
 
 def is_number(values: xr.DataArray) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -37,35 +38,29 @@ _DISPLACEMENT = r"Load point displacement ($\mu$m)"
 def panels(dataset: xr.Dataset) -> Sequence[Panel]:
     """Each record with its fits; and of the first one, what is left, and correlations."""
     records = dataset.sizes.get("record", 1)
-    whole = {d: 0 for d in ("part",) if d in dataset.dims}
-    first = whole | {d: 0 for d in ("record",) if d in dataset.dims}
+    part, record = ([d] if d in dataset.dims else [] for d in ("part", "record"))
+    named = Panel(title=partial(_named, records), x_label=_DISPLACEMENT)
     of_record = [
-        Panel(
-            at=whole | ({"record": number} if "record" in dataset.dims else {}),
+        replace(
+            named,
+            at=dict.fromkeys(part, 0) | dict.fromkeys(record, number),
             marks=[_record],
-            title=partial(_named, records),
-            x_label=_DISPLACEMENT,
             y_label="Friction coefficient",
         )
         for number in range(min(records, _RECORDS))
     ]
+    first = replace(named, at=of_record[0].at)
     return (
         *of_record,
-        Panel(
-            at=first,
-            marks=[_residuals],
-            title=partial(_named, records),
-            x_label=_DISPLACEMENT,
-            y_label="Residual friction",
-        ),
-        Panel(
-            at=first,
+        replace(first, marks=[_residuals], y_label="Residual friction"),
+        replace(
+            first,
             marks=[_autocorrelation],
             title=_step,
             x_label="Lag (rows)",
             y_label="Autocorrelation of residuals",
         ),
-        Panel(at=first, marks=[_correlation], title=_whose),
+        Panel(at=first.at, marks=[_correlation], title=_whose),
     )
 
 

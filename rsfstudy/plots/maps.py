@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, LogNorm, Normalize
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
@@ -99,7 +99,9 @@ def draw_map(
     axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if is_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
     if found := scale or _scale(dataset[name]):
-        drawn = _colours(axes, at, values.values, norm=found[0])
+        axes.grid(False)
+        known = np.ma.masked_invalid(values.values)
+        drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0])
         if meanings := flag_meanings(dataset[name]):
             for flag in found[1]:
                 colour = drawn.to_rgba(np.array(flag))
@@ -145,25 +147,6 @@ def _edges(points: np.ndarray, log: bool = False) -> np.ndarray:
     halfway = 0.5 * (at[1:] + at[:-1])
     ends = np.concatenate([[2.0 * at[0] - halfway[0]], halfway, [2.0 * at[-1] - halfway[-1]]])
     return np.asarray(np.exp(ends) if log else ends)
-
-
-def _colours(
-    axes: Axes, at: tuple[np.ndarray, np.ndarray], values: np.ndarray, **scale: Any
-) -> QuadMesh:
-    """Cells with their numbers in colours.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    at : tuple of array
-        Edges of the cells along x and along y.
-    values : array
-        Along y, then x.
-    **scale
-        As `matplotlib.axes.Axes.pcolormesh` takes.
-    """
-    axes.grid(False)
-    return axes.pcolormesh(*at, np.ma.masked_invalid(values), rasterized=True, **scale)
 
 
 def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
@@ -214,24 +197,19 @@ def _statuses(
         The cells to hatch.
     """
     for hatch, code in zip(_HATCHES, np.unique(status[unknown]), strict=False):
-        rows = [_run(at, *run) for run in _runs(unknown & (status == code))]
+        rows = [_outline(at, *run) for run in _runs(unknown & (status == code))]
         name = _NAMES[int(code)].replace("_", " ") if code else "no number"
-        axes.add_collection(
-            PolyCollection(
-                rows, facecolor="0.93", edgecolor="0.55", linewidth=0.0, hatch=hatch, label=name
-            ),
-            autolim=False,
-        )
+        grey: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "0.55", "linewidth": 0.0}
+        axes.add_collection(PolyCollection(rows, hatch=hatch, label=name, **grey), autolim=False)
 
 
 def _runs(here: np.ndarray) -> list[tuple[int, int, int]]:
     """Cells side by side: their row, and the first and the one after the last of their columns."""
-    padded = np.pad(here.astype(int), ((0, 0), (1, 1)))
-    change = np.diff(padded, axis=1)
+    change = np.diff(np.pad(here.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)
     return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
 
 
-def _run(at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int) -> list[tuple[float, float]]:
-    (left, right), (low, high) = (at[0][a], at[0][b]), (at[1][row], at[1][row + 1])
+def _outline(at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int) -> list[tuple[Any, Any]]:
+    (left, right), (low, high) = at[0][[a, b]], at[1][row : row + 2]
     return [(left, low), (right, low), (right, high), (left, high)]

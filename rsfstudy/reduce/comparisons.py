@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Derivatives, Reduction, refused
+from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
 from rsfstudy.slider.closed_forms import FORMS
 
 Pair = tuple[xr.DataArray, xr.DataArray]
@@ -86,7 +87,7 @@ class RelativeDifference(Difference):
 
 @dataclass(frozen=True)
 class Range(Reduction):
-    """Largest less least value along a dimension.
+    """Largest less least value along a dimension, of two at least.
 
     Parameters
     ----------
@@ -95,22 +96,46 @@ class Range(Reduction):
     of : str
         Variable to reduce.
     over : str
-        The dimension.
+        The dimension, or a coordinate of numbers along one.
+    within : tuple of float
+        Part of that coordinate, both ends included; all of it by default.
     """
 
     over: str = ""
+    within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
 
+    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+        """The points in range."""
+        return within(status, self.over, self.within)
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce along the dimension."""
-        of = dataset[self.of].reset_coords(drop=True)
-        found = (of.max(self.over) - of.min(self.over)).where(~refused(dataset, self.of, self.over))
-        return xr.Dataset({self.name: found.assign_attrs(measured_as=self.of)})
+        """Reduce along the dimension; nothing where fewer than two points are in range."""
+        dimension, support = self._support(dataset)
+        if support.sizes[dimension] < 2:
+            return xr.Dataset()
+        of = support[self.of].reset_coords(drop=True)
+        known = ~refused(support, self.of, dimension) & (of.notnull().sum(dimension) > 1)
+        found = (of.max(dimension) - of.min(dimension)).where(known)
+        span = "" if self.within is None else " from {:g} to {:g}".format(*self.within)
+        note = f"largest less least {self.of} over {self.over}{span}"
+        return xr.Dataset({self.name: found.assign_attrs(comment=note, measured_as=self.of)})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """1 by the largest, -1 by the least."""
-        of = dataset[self.of].reset_coords(drop=True)
-        return [(1.0 * (of == of.max(self.over)) - 1.0 * (of == of.min(self.over)), {})]
+        """1 by the cell that, within its error, may be the largest, -1 by that which may be the
+        least: the sizes of both count.
+        """
+        dimension, support = self._support(dataset)
+        values, errors = support[self.of], support[f"{self.of}_error"]
+        number = support[dimension].copy(data=np.arange(support.sizes[dimension]))
+        reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
+        return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
+
+    def _support(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
+        """The dimension, and the points in range."""
+        along = self.over in dataset[self.of].dims
+        dimension = self.over if along else dimension_of(dataset, self.over)
+        return dimension, within(dataset, self.over, self.within)
 
 
 @dataclass(frozen=True)
