@@ -76,11 +76,7 @@ READINGS: Mapping[str, Question] = {
     ),
     "healing": Question(
         Healing(phases=2),
-        {
-            "stiffness_ratio": _RIG,
-            "load_velocity_ratio": _ANY_RATE,
-            "hold_time": decades(1.0, 1e5),
-        },
+        {"stiffness_ratio": _RIG, "load_velocity_ratio": _ANY_RATE, "hold_time": decades(1.0, 1e5)},
     ),
     "normal stress transient": Question(
         NormalStressTransient(phases=2),

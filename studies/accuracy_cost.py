@@ -273,12 +273,7 @@ figure = Figure(
 )
 
 
-HEADLINES = (
-    "critical step",
-    "cycle, slip law: static drop",
-    "cycle, slowness law: recurrence",
-)
-STATIC_DROP, RECURRENCE = HEADLINES[1:]
+HEADLINES = ("critical step", "cycle, slip law: static drop", "cycle, slowness law: recurrence")
 
 
 def proportional(label: str) -> Claim:
@@ -321,10 +316,7 @@ study = Study(
     measure=WorkPrecision(problems=tuple(problem for _fields, problem in PROBLEMS.values())),
     reductions=[
         LinearFit(
-            name="proportionality",
-            of="achieved_digits",
-            on="requested_digits",
-            within=(4.0, 9.0),
+            name="proportionality", of="achieved_digits", on="requested_digits", within=(4.0, 9.0)
         ),
         Cheapest(name="cheapest", of="achieved_digits", default="DOP853", digits=(4.0, 6.0, 9.0)),
     ],
@@ -332,11 +324,7 @@ study = Study(
         # where few digits are asked for, cycles of the slowness law have up to four more by luck,
         # because limits on the length of steps bind before the tolerance does
         *(proportional(label) for label in HEADLINES[:-1]),
-        *(cheapest("critical step", digits) for digits in (6.0, 9.0)),
-        cheapest(STATIC_DROP, 6.0),
-        cheapest(STATIC_DROP, 9.0),
-        cheapest(RECURRENCE, 6.0),
-        cheapest(RECURRENCE, 9.0),
+        *(cheapest(label, digits) for label in HEADLINES for digits in (6.0, 9.0)),
     ],
     plot=figure,
     references=["Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I"],

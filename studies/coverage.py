@@ -243,50 +243,47 @@ figure = Figure(
 )
 
 
-def claim(number: int, statement: str, variable: str, digits: int, **held: object) -> Claim:
-    """One of the three figures of error estimates, at one accuracy."""
-    return Claim(
+#: What is promised of error estimates at each accuracy: in words, of which number, and how far.
+PROMISES: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    (
+        "at least 99.5 % of errors lie within their estimates",
+        "covered_share",
+        {
+            "relation": "above",
+            "published": 0.995,
+            "tolerance": 0.005,
+            "reason": "over 250 numbers the share scatters by a half of that, and a last bit moves "
+            "it",
+        },
+    ),
+    (
+        "no error is three times its estimate",
+        "covered_worst",
+        {"relation": "below", "published": 3.0},
+    ),
+    (
+        "the usual estimate is within ten times the error",
+        "covered_typical",
+        {
+            "relation": "below",
+            "published": 10.0,
+            "tolerance": 4.0,
+            "reason": "two standard errors of a median over 290 numbers, by resampling them",
+        },
+    ),
+)
+CLAIMS = [
+    Claim(
         id=f"T{number}",
         statement=f"rtol 1e-{digits}: {statement}",
         source="this project's promise for its error estimates",
         variable=variable,
         where={"requested_digits": float(digits)},
-        **held,  # type: ignore[arg-type]
+        **held,
     )
-
-
-def claims(digits: int) -> list[Claim]:
-    """The three figures at one accuracy."""
-    return [
-        claim(
-            1,
-            "at least 99.5 % of errors lie within their estimates",
-            "covered_share",
-            digits,
-            relation="above",
-            published=0.995,
-            tolerance=0.005,
-            reason="over 250 numbers the share scatters by a half of that, and a last bit moves it",
-        ),
-        claim(
-            2,
-            "no error is three times its estimate",
-            "covered_worst",
-            digits,
-            relation="below",
-            published=3.0,
-        ),
-        claim(
-            3,
-            "the usual estimate is within ten times the error",
-            "covered_typical",
-            digits,
-            relation="below",
-            published=10.0,
-            tolerance=4.0,
-            reason="two standard errors of a median over 290 numbers, by resampling them",
-        ),
-    ]
+    for digits in DIGITS
+    for number, (statement, variable, held) in enumerate(PROMISES, start=1)
+]
 
 
 study = Study(
@@ -311,7 +308,7 @@ study = Study(
             by=("question", "requested_digits"),
         ),
     ],
-    claims=[c for digits in DIGITS for c in claims(digits)],
+    claims=CLAIMS,
     plot=figure,
     references=["Shampine (1985), Numerical Methods: on global error estimates"],
 )

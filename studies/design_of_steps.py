@@ -72,12 +72,7 @@ def promise(design: str, k: float, published: float) -> Claim:
         statement=f"{design}, k = {k:g} per um: standard error of the exponent",
         source="Fisher's information; of 500 rows a step and white noise of 5e-4, if not said",
         variable="promised_spread",
-        where={
-            "design": design,
-            "stiffness": k * DISTANCE,
-            "parameter": "law_exponent",
-            "seed": 0,
-        },
+        where={"design": design, "stiffness": k * DISTANCE, "parameter": "law_exponent", "seed": 0},
         published=published,
         tolerance=0.1 * published,
         reason="rows before the step are not told; 10 to 100 um of them move it by as much",

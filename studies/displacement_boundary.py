@@ -111,12 +111,7 @@ study = Study(
         near(
             CONSTANT, 1.0, 2e-5, "eq. 14 holds for an infinite norm: exp(-10.9 (b/a - 1)) is left"
         ),
-        near(
-            CONSTANT,
-            2.0,
-            2e-3,
-            "an infinite norm is approached more slowly when stiff",
-        ),
+        near(CONSTANT, 2.0, 2e-3, "an infinite norm is approached more slowly when stiff"),
         near(WEAK, 1.0, 0.03, CLOSE),
         near(STRONG, 1.0, 0.03, CLOSE),
         Claim(

@@ -207,21 +207,12 @@ study = Study(
     ],
     measure=EffectCost(),
     reductions=[
-        RelativeDifference(
-            name="drop_lost_without_mass",
-            of="static_stress_drop",
-            along="dynamics",
-            reference="inertia",
-        ),
-        RelativeDifference(
-            name="drop_lost_without_coupling",
-            of="static_stress_drop",
-            along="coupling",
-            reference="inclined driving, alpha",
-        ),
-        RelativeDifference(
-            name="work_saved", of="work_per_cycle", along="dynamics", reference="inertia"
-        ),
+        RelativeDifference(name=name, of=of, along=along, reference=FULL[along])
+        for name, of, along in (
+            ("drop_lost_without_mass", "static_stress_drop", "dynamics"),
+            ("drop_lost_without_coupling", "static_stress_drop", "coupling"),
+            ("work_saved", "work_per_cycle", "dynamics"),
+        )
     ],
     claims=[
         loses("slip", "radiation damping", 0.3),

@@ -18,13 +18,7 @@ from scipy.special import lambertw
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import (
-    LOGARITHMIC,
-    PARAMETERS,
-    Model,
-    Values,
-    parameters_of,
-)
+from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values, parameters_of
 from rsfstudy.analysis.fitting.search import Search
 from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue

@@ -273,7 +273,9 @@ study = Study(
     title="Cases that break ordinary slider codes, and what comes out",
     summary=Study.caption(__doc__),
     base=Scene(),
-    axes=[Axis("hard_case", {label: fields for label, (fields, _problem) in CASES.items()})],
+    axes=[
+        Axis("hard_case", {label: fields for label, (fields, _problem) in CASES.items()}),
+    ],
     measure=HardCase(problems=tuple(problem for _fields, problem in CASES.values())),
     claims=[
         Claim.below(

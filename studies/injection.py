@@ -324,10 +324,7 @@ def off(at: str) -> Panel:
     )
 
 
-figure = Figure(
-    [pressures(ENDS), pressures(BEGINS), off(ENDS), off(BEGINS)],
-    height=50.0,
-)
+figure = Figure([pressures(ENDS), pressures(BEGINS), off(ENDS), off(BEGINS)], height=50.0)
 
 study = Study(
     name="injection",

@@ -116,7 +116,7 @@ study = Study(
             along="boundary",
             levels={SOFT: 11.8, STIFF: 2361.0},
             uncertainty={SOFT: 0.05 / 11.8, STIFF: 0.5 / 2361.0},
-        ),
+        )
     ],
     claims=[
         Claim(

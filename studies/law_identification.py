@@ -21,11 +21,7 @@ from rsfstudy.reduce.base import Derivatives, Reduction
 from ._synthetic_fit import ACCURACY, BACK, RIG, UP, SyntheticFit, designs
 
 RECORDS = 12
-DESIGNS = {
-    "one step up": UP,
-    "a pair, up and back": f"{UP}; {BACK}",
-    "two steps up": f"{UP}; {UP}",
-}
+DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}", "two steps up": f"{UP}; {UP}"}
 #: Standard errors of the exponent by Fisher's information.
 PROMISED = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
 #: Standard deviations of chance.

@@ -116,10 +116,7 @@ study = Study(
     measure=CriticalStep(of="displacement_step"),
     reductions=[
         RelativeDifference(
-            name="lowering",
-            of="critical_displacement",
-            along="normal_stress",
-            reference="constant",
+            name="lowering", of="critical_displacement", along="normal_stress", reference="constant"
         ),
         OverClosedForm(
             name="over_closed_form",

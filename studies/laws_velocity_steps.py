@@ -66,7 +66,7 @@ study = Study(
             of="critical_velocity_ratio",
             along="normal_stress",
             reference="constant",
-        ),
+        )
     ],
     claims=[
         order(PERRIN, SLIP),

@@ -92,12 +92,7 @@ study = Study(
             form="velocity_step_of_the_family",
         ),
     ],
-    claims=[
-        zeta(0.0),
-        zeta(0.25),
-        zeta(0.5),
-        *map(below, (0.0, 0.25, 0.5)),
-    ],
+    claims=[zeta(0.0), zeta(0.25), zeta(0.5), *map(below, (0.0, 0.25, 0.5))],
     plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

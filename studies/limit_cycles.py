@@ -210,8 +210,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Rice and Tse (1986), J. Geophys. Res. 91, 521-530",
-    ],
+    references=[REFERENCE, "Rice and Tse (1986), J. Geophys. Res. 91, 521-530"],
 )

@@ -215,8 +215,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694",
-    ],
+    references=[REFERENCE, "Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694"],
 )

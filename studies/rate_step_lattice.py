@@ -57,9 +57,7 @@ study = Study(
         Axis("load_velocity_ratio", np.geomspace(1.1, 5.0, 40)),
     ],
     measure=Triggered(),
-    reductions=[
-        Boundary(name="lattice_boundary", of="unstable", on="load_velocity_ratio"),
-    ],
+    reductions=[Boundary(name="lattice_boundary", of="unstable", on="load_velocity_ratio")],
     claims=[
         Claim(
             id="C8",
@@ -70,7 +68,7 @@ study = Study(
             published=1.0 + 1.0 / (math.e - 1.0),
             tolerance=0.0309,
             reason="half of the spacing of the lattice there",
-        ),
+        )
     ],
     plot=figure,
     references=[REFERENCE],

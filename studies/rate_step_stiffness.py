@@ -90,9 +90,7 @@ study = Study(
             name="lowering", of="critical_velocity_ratio", along="case", reference=CONSTANT
         ),
         OverClosedForm(
-            name="over_eq_11",
-            of="critical_velocity_ratio",
-            form="velocity_step_for_b_over_a_of_e",
+            name="over_eq_11", of="critical_velocity_ratio", form="velocity_step_for_b_over_a_of_e"
         ),
     ],
     claims=[

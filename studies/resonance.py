@@ -203,7 +203,7 @@ study = Study(
             of="departure_from_linear",
             on="oscillation_amplitude",
             levels=FAILED,
-        ),
+        )
     ],
     claims=[
         *(is_linear("slip", ratio, period) for ratio in RATIOS for period in PERIODS),

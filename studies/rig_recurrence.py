@@ -82,7 +82,7 @@ figure = Figure(
             y_label="Recurrence interval (s)",
         ),
         replace(panel, y="static_stress_drop", log="x", y_limits=(0.0, None), alike="drop"),
-    ],
+    ]
 )
 
 study = Study(

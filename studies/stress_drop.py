@@ -226,8 +226,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Gu and Wong (1991), J. Geophys. Res. 96, 21677-21691",
-    ],
+    references=[REFERENCE, "Gu and Wong (1991), J. Geophys. Res. 96, 21677-21691"],
 )

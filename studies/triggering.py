@@ -62,11 +62,7 @@ def closed_form(law: str, alpha: float, ratio: float, within: float, reason: str
         statement=f"{law} law, imposed, alpha = {alpha:g}, k = {ratio:g} k_cr: critical fall",
         source=f"{HELD}, q = sigma_*/sigma, k^ = k/k_cr",
         variable="critical_normal_stress_step",
-        where={
-            "law": law,
-            "case": IMPOSED if alpha else PLAIN,
-            "stiffness_ratio": ratio,
-        },
+        where={"law": law, "case": IMPOSED if alpha else PLAIN, "stiffness_ratio": ratio},
         published=published,
         tolerance=within * abs(published),
         reason=reason,
@@ -187,9 +183,7 @@ study = Study(
     ],
     measure=Triggers(),
     reductions=[
-        LinearFit(
-            name="coulomb_slope", of="coulomb_ratio", on="stiffness_ratio", within=(0.0, 0.5)
-        ),
+        LinearFit(name="coulomb_slope", of="coulomb_ratio", on="stiffness_ratio", within=(0.0, 0.5))
     ],
     claims=[
         closed_form("slip", 0.0, 0.5, 2e-9, EXACT),
@@ -245,9 +239,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        REFERENCE,
-        "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940",
-        GU_ET_AL,
-    ],
+    references=[REFERENCE, "Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940", GU_ET_AL],
 )

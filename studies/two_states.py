@@ -244,9 +244,5 @@ study = Study(
         ),
     ],
     plot=figure,
-    references=[
-        GU,
-        BECKER,
-        "Ruina (1983), J. Geophys. Res. 88, 10359-10370",
-    ],
+    references=[GU, BECKER, "Ruina (1983), J. Geophys. Res. 88, 10359-10370"],
 )

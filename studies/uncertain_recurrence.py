@@ -141,7 +141,7 @@ figure = Figure(
             y_label="$b$",
             title="What is drawn",
         ),
-    ],
+    ]
 )
 
 study = Study(
@@ -162,7 +162,7 @@ study = Study(
                 "slip_distance": "slip_distance",
             },
             units={"slip_distance": "um"},
-        ),
+        )
     ],
     measure=LimitCycle(phases=2),
     accuracy=Accuracy(rtol=1e-5),

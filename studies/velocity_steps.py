@@ -172,7 +172,7 @@ study = Study(
     ],
     measure=VelocityStep(),
     reductions=[
-        OverClosedForm(name="a_minus_b_over_true", of="apparent_a_minus_b", form="net_weakening"),
+        OverClosedForm(name="a_minus_b_over_true", of="apparent_a_minus_b", form="net_weakening")
     ],
     claims=[
         *(follows("slip", ratio) for ratio in STEPS),

@@ -140,7 +140,7 @@ study = Study(
                 "b_over_a": lambda drawn: 1.0 + np.exp(drawn["ln_net"] - drawn["ln_a"]),
                 "stiffness": lambda drawn: np.exp(drawn["ln_stiffness"]),
             },
-        ),
+        )
     ],
     measure=Headlines(),
     accuracy=Accuracy(rtol=1e-6),

@@ -15,16 +15,7 @@ from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots import Drawing
 from rsfstudy.plots._axes import log_scale
-from rsfstudy.plots._style import (
-    hold_ticks,
-    legend,
-    letter,
-    look,
-    make_room,
-    settle,
-    size,
-    styled,
-)
+from rsfstudy.plots._style import hold_ticks, legend, letter, look, make_room, settle, size, styled
 from rsfstudy.plots._text import pretty, wrapped
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
@@ -44,10 +35,7 @@ _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 
 @door
 def picture(
-    motion: xr.Dataset,
-    laboratory: Laboratory | None = None,
-    *,
-    against: str | None = None,
+    motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:
     """Draw one motion.
 
