@@ -31,7 +31,11 @@ from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, Incomplete
 from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.meter import Meter
+from rsfstudy.slider.point import Point
 
 SMALL = Study(
     name="small",
@@ -275,6 +279,11 @@ def called(words: Sequence[str]) -> tuple[int, str]:
     """Exit status and what is said by the command in this process, on one line."""
     done = call(*words)
     return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
+
+
+def begun(scene: Scene) -> Point:
+    """Point at which the motion of a scene begins."""
+    return next(follow(scene, Accuracy(), Meter(1_000_000))).point
 
 
 def cells_in(journal: Path) -> int:

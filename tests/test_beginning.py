@@ -7,6 +7,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from running import begun
 
 from rsfstudy import Scene
 from rsfstudy.motion.regimes import starting
@@ -32,7 +33,7 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
         initial_state=state,
         **dynamics,
     )
-    begin = starting(scene)
+    begin = begun(scene)
     assert begin.spring_stress == stress
     assert begin.state == pytest.approx(state, abs=1e-13)
     friction = scene.mu_star + scene.a * begin.log_slip_rate + state
@@ -46,4 +47,5 @@ def test_steps_come_on_top():
     after = starting(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
     assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
     assert after.spring_stress == scene.stiffness * 0.5
+    after = begun(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)

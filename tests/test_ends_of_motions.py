@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from running import begun
 from scipy.optimize import brentq
 
 import rsfstudy
@@ -17,7 +18,6 @@ from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import Kind, rise
 from rsfstudy.motion.handover import GOES_ON, margin, termination_of
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import starting
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)
@@ -102,4 +102,4 @@ def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
 
     # stress falls and strength rises with x, where normal stress is left
     expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
-    assert starting(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)
+    assert begun(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)

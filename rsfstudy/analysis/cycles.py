@@ -106,7 +106,7 @@ def cycles(
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
     """
-    begin, begun, fallen, seen = start, 0.0, start is None, list[Event]()
+    begin, begun, fallen, seen = None, 0.0, start is None, list[Event]()
     ahead = 0 if start else scene.parts.loading.told
     swings, asked = list[float](), _asked(scene.log_load_rate)
     motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
@@ -118,6 +118,8 @@ def cycles(
         if event.kind is Kind.SETTLED:
             yield None
             return
+        if event.kind is Kind.START and start is not None:
+            begin = event.point
         fallen = fallen or event.kind is Kind.FALL
         seen.append(event)
         if event.kind is not Kind.RISE or not fallen:

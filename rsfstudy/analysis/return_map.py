@@ -34,7 +34,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regimes import at_rate, check_start, on_slow_manifold
+from rsfstudy.motion.regimes import at_rate, beginning, check_start
 from rsfstudy.slider.equations import without_mass
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
@@ -174,7 +174,9 @@ class ReturnMap:
             Where spring stress leaves no friction of forward slip.
         """
         spring_stress, *psis = at.tolist()
-        point = on_slow_manifold(self.scene, spring_stress, tuple(psis))
+        scene, states = self.scene, tuple(psis)
+        x, friction, _shift = scene.functions.balance(spring_stress, states, scene.numbers)
+        point = beginning(scene, spring_stress, states, x, friction)
         check_start(self.scene, point)
         return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
 

@@ -4,6 +4,7 @@ it does.
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 from scipy.optimize import newton
@@ -24,11 +25,13 @@ from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
+_TOLD_LATER = Point(*12 * (math.nan,), psis=())
+
 
 def starting(scene: Scene) -> Point:
-    """The beginning of a motion the instant after the step of a scene, which moves the spring and
-    imposed normal stress: with mass, slip rate follows within the inertial time. Before it the
-    slider slides steadily at V_*, or as its stated stress and state have it.
+    """The beginning of a motion the instant after the step of a scene (see `beginning`), which
+    moves the spring and imposed normal stress: with mass, slip rate follows within the inertial
+    time. Before it the slider slides steadily at V_*, or as its stated stress and state have it.
 
     Raises
     ------
@@ -41,8 +44,27 @@ def starting(scene: Scene) -> Point:
         psis, log_slip_rate = _stated(scene, psis)
     psis = _with_beginning(scene, psis)
     stress = scene.parts.slider.initial_stress + scene.spring_stress_step
-    stepped = on_slow_manifold(scene, stress, psis)
+    stepped = beginning(scene, stress, psis)
     return at_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
+
+
+def beginning(
+    scene: Scene,
+    spring_stress: float,
+    psis: Numbers,
+    log_slip_rate: float = math.nan,
+    friction: float = math.nan,
+) -> Point:
+    """A point that holds what a motion begins with: spring stress, states and, with mass, ln(V/V_*)
+    and frictional stress. All else is NaN, and told with the first event.
+    """
+    return _TOLD_LATER._replace(
+        log_slip_rate=log_slip_rate,
+        spring_stress=spring_stress,
+        friction=friction,
+        psi=scene.functions.friction.state_sum(psis),
+        psis=psis,
+    )
 
 
 def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:
