@@ -23,6 +23,7 @@ from rsfstudy.measures._checks import Value as Value
 from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, relative_work
 from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.quantity import Output, Quantity
+from rsfstudy.slider.derived import derived
 from rsfstudy.slider.registry import FIELDS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -91,19 +92,19 @@ class Measure:
         """The numbers it gives."""
         return ()
 
-    @property
+    @derived
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         """Name of each number and of each error estimate, and the inner dimensions it has within
         one cell (none for a plain number).
         """
         return {name: about.dims for about in self.outputs for name in about.names}
 
-    @property
+    @derived
     def optional(self) -> Sequence[str]:
         """Numbers with an error estimate that an ok outcome may leave out; its message says why."""
         return tuple(about.name for about in self.outputs if about.optional)
 
-    @property
+    @derived
     def estimated(self) -> tuple[str, ...]:
         """Names of the numbers that have an error estimate."""
         names = self.variables
@@ -265,10 +266,8 @@ class Measure:
         """The first number of an ok outcome that is missing or not finite: the headline, and each
         that has an error estimate, with that, but for those left out that are optional.
         """
-        left_out = set(self.optional) - set(values)
-        estimated = (name for name in self.estimated if name not in left_out)
-        pairs = ((name, f"{name}_error") for name in estimated)
-        for name in (self.headline, *(name for pair in pairs for name in pair)):
+        known = [n for n in self.estimated if n in values or n not in self.optional]
+        for name in (self.headline, *known, *(f"{name}_error" for name in known)):
             value = values.get(name, math.nan)
             finite = math.isfinite(value) if isinstance(value, float) else np.isfinite(value).any()
             if not finite:

@@ -19,6 +19,7 @@ from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import PLACE, Recording
 from rsfstudy.quantity import Output
+from rsfstudy.slider.derived import derived
 from rsfstudy.slider.scene import Scene
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
@@ -145,7 +146,7 @@ class Recorded(Measure):
         """Number of points of the record that are kept."""
         return int(self.plain_fields["phases"])
 
-    @property
+    @derived
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"phase": np.linspace(0.0, 1.0, self.points)}
 
