@@ -166,19 +166,23 @@ def along_path(
         return {name: np.full(points, np.nan) for name in names}
     columns = np.ascontiguousarray(table.T)
     seen = columns[_PATH]
-    spread = np.ptp(seen, axis=1)[:, None]
+    spread = (seen.max(axis=1) - seen.min(axis=1))[:, None]
     spread[spread == 0.0] = 1.0
-    lengths = np.abs(np.diff(seen, axis=1) / spread).sum(axis=0)
+    by_time, by_rate, by_stress = np.abs((seen[:, 1:] - seen[:, :-1]) / spread)
+    lengths = by_time + by_rate + by_stress
     total = lengths.sum()
     lengths = lengths / (total if total > 0.0 else 1.0) + 1.0 / max(len(lengths), 1)
     path = np.zeros(len(table))
     lengths.cumsum(out=path[1:])
-    at = np.interp(np.linspace(0.0, path[-1], points), path, np.arange(len(table)))
-    inner = at[1:-1]
+    at = np.interp(np.arange(points) * (path[-1] / (points - 1)), path, np.arange(len(table)))
+    at[-1], inner = len(table) - 1, at[1:-1]
     for values in seen[1:] if points > 2 else ():
         for top in (int(values.argmax()), int(values.argmin())):
             extreme = _extreme(values, top, columns[PLACE])
-            inner[np.abs(inner - extreme).argmin()] = extreme
+            after = min(int(inner.searchsorted(extreme)), points - 3)
+            inner[after - (after > 0 and extreme - inner[after - 1] <= inner[after] - extreme)] = (
+                extreme
+            )
     found = _at_rows(columns[: len(names)], columns[PLACE], at)
     # times of a rupture may differ by less than rounding
     found[0] = np.maximum.accumulate(found[0])
@@ -190,11 +194,12 @@ _PATH = [OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_str
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
 _HALF = 0.5 * SAMPLES
+_STEP = np.arange(SAMPLES + 1)
 _COEFFICIENTS = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
-#: The same of its first and second derivative.
-_DERIVATIVES = np.zeros((2, SAMPLES, SAMPLES + 1))
-_DERIVATIVES[0] = np.arange(1.0, SAMPLES + 1.0)[:, None] * _COEFFICIENTS[1:]
-_DERIVATIVES[1, :-1] = np.arange(1.0, SAMPLES)[:, None] * _DERIVATIVES[0, 1:]
+#: The same of its first and, below that, of its second derivative.
+_DERIVATIVES = np.zeros((2 * SAMPLES - 1, SAMPLES + 1))
+_DERIVATIVES[:SAMPLES] = _STEP[1:, None] * _COEFFICIENTS[1:]
+_DERIVATIVES[SAMPLES:] = _STEP[1:-1, None] * _DERIVATIVES[1:SAMPLES]
 
 
 def _polynomial(at: float, coefficients: Sequence[float]) -> float:
@@ -224,9 +229,8 @@ def _at_rows(columns: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndar
     within[jumps] = 1
     begin = after - within
     part = at - begin
-    around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
-    around *= _weights(part)
-    found: np.ndarray = around.sum(axis=1)
+    around = columns.take(begin + _STEP[:, None], axis=1, mode="clip")
+    found = np.einsum("kp,ckp->cp", _weights(part), around)
     at_a_row = np.flatnonzero(part == np.rint(part))
     found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]
@@ -242,8 +246,8 @@ def _extreme(values: np.ndarray, top: int, places: np.ndarray) -> float:
         begin = after - int(places[after])
         if begin + SAMPLES >= len(values):
             continue
-        slopes = _DERIVATIVES @ values[begin : begin + SAMPLES + 1]
-        slope, bend = slopes[0].tolist(), slopes[1].tolist()
+        slopes = (_DERIVATIVES @ values[begin : begin + SAMPLES + 1]).tolist()
+        slope, bend = slopes[:SAMPLES], slopes[SAMPLES:]
         at = (top - begin) / _HALF - 1.0
         for _ in range(4):
             curvature = _polynomial(at, bend)
