@@ -185,7 +185,7 @@ class LimitCycle(Recorded):
         values["work_per_cycle"] = one.work / one.period
         status, why = judged(accuracy, one, errors)
         path = path_of(scene, again.events, again.recording)
-        return Outcome(status, values | along_path(path, self.phases), why)
+        return Outcome(status, values | along_path(path, self.phases, engine=accuracy.engine), why)
 
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")

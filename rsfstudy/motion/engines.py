@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.parts import Numbers
@@ -159,6 +161,14 @@ def of_floats(function: Callable[..., Any], name: str, *arguments: float | Numbe
     of this form, where its loop is.
     """
     return compiled_engine().of_floats(function, *arguments) if name == COMPILED else function
+
+
+def on_arrays(function: Callable[..., None], name: str, *arrays: np.ndarray) -> None:
+    """Call a function of arrays as an engine does: compiled, or on memoryviews."""
+    if name == COMPILED:
+        compiled_engine().of_arrays(function, *(array.ndim for array in arrays))(*arrays)
+    else:
+        function(*(memoryview(array) for array in arrays))  # type: ignore[arg-type]
 
 
 def versions(name: str) -> dict[str, str]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
+from rsfstudy.motion.engines import SCIPY, on_arrays
 from rsfstudy.motion.events import Event
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
@@ -144,10 +146,10 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
         return np.vstack([table[:after], last])
     part, times = float(place), table[begin : begin + SAMPLES + 1, 0]
     if times[place] > last[0] > times[place - 1]:
-        late = (_COEFFICIENTS @ (times - last[0])).tolist()
-        sides = (place - 1.0) / _HALF - 1.0, place / _HALF - 1.0
+        late = (_INVERSE @ (times - last[0])).tolist()
+        sides = (place - 1.0) / HALF - 1.0, place / HALF - 1.0
         if _polynomial(sides[0], late) < 0.0 < _polynomial(sides[1], late):
-            part = _HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
+            part = HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
     within = part / SAMPLES * np.arange(1.0, SAMPLES)
     step = table[begin + 1 : begin + SAMPLES + 1]
     step[:-1], step[-1] = _weights(within).T @ table[begin : begin + SAMPLES + 1], last
@@ -156,7 +158,7 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
 
 
 def along_path(
-    table: np.ndarray, points: int, names: Sequence[str] = OBSERVED
+    table: np.ndarray, points: int, names: Sequence[str] = OBSERVED, engine: str = SCIPY
 ) -> dict[str, np.ndarray]:
     """Columns of a record, by the names of the first columns, at points spread evenly along the
     path, half by its length in time, ln V and stress, half by the steps the integrator took, which
@@ -164,42 +166,116 @@ def along_path(
     """
     if not len(table):
         return {name: np.full(points, np.nan) for name in names}
-    columns = np.ascontiguousarray(table.T)
-    seen = columns[_PATH]
-    spread = (seen.max(axis=1) - seen.min(axis=1))[:, None]
-    spread[spread == 0.0] = 1.0
-    by_time, by_rate, by_stress = np.abs((seen[:, 1:] - seen[:, :-1]) / spread)
-    lengths = by_time + by_rate + by_stress
-    total = lengths.sum()
-    lengths = lengths / (total if total > 0.0 else 1.0) + 1.0 / max(len(lengths), 1)
-    path = np.zeros(len(table))
-    lengths.cumsum(out=path[1:])
-    at = np.interp(np.arange(points) * (path[-1] / (points - 1)), path, np.arange(len(table)))
-    at[-1], inner = len(table) - 1, at[1:-1]
-    for values in seen[1:] if points > 2 else ():
-        for top in (int(values.argmax()), int(values.argmin())):
-            extreme = _extreme(values, top, columns[PLACE])
-            after = min(int(inner.searchsorted(extreme)), points - 3)
-            inner[after - (after > 0 and extreme - inner[after - 1] <= inner[after] - extreme)] = (
-                extreme
-            )
-    found = _at_rows(columns[: len(names)], columns[PLACE], at)
+    columns, found = np.ascontiguousarray(table.T), np.empty((len(names), points))
+    path, at, room = np.zeros(len(table)), np.empty(points), np.empty(SAMPLES + 1)
+    seen = [columns[place] for place in (*_PATH, PLACE)]
+    on_arrays(spread_along_path, engine, columns, *seen, path, at, room, found)
     # times of a rupture may differ by less than rounding
-    found[0] = np.maximum.accumulate(found[0])
+    np.maximum.accumulate(found[0], out=found[0])
     return dict(zip(names, found, strict=True))
 
 
+def spread_along_path(  # type: ignore[no-untyped-def]
+    columns, time, rate, stress, places, path, at, room, found
+):
+    """Fill in how far along the path the rows are, numbers of rows and parts that are spread evenly
+    along it, and the first columns there.
+    """
+    last, points, total = len(path) - 1, len(at), 0.0
+    for values in (time, rate, stress):
+        lowest = highest = values[0]
+        for value in values:
+            lowest, highest = min(lowest, value), max(highest, value)
+        spread, before = (highest - lowest if highest > lowest else 1.0), values[0]
+        for i in range(1, last + 1):
+            value = values[i]
+            path[i] += abs(value - before) / spread
+            before = value
+    for length in path:
+        total += length
+    share, passed = 1.0 / (total if total > 0.0 else 1.0), 0.0
+    for i in range(1, last + 1):
+        passed += path[i] * share + 1.0 / last
+        path[i] = passed
+    row, apart = 0, passed / (points - 1)
+    for i in range(points):
+        while row < last - 1 and path[row + 1] <= i * apart:
+            row += 1
+        at[i] = row + (i * apart - path[row]) / (path[row + 1] - path[row]) if last else 0.0
+    at[points - 1] = last
+    for values in (rate, stress):
+        top = bottom = 0
+        for i in range(last + 1):
+            if values[i] > values[top]:
+                top = i
+            elif values[i] < values[bottom]:
+                bottom = i
+        put_nearest(at, extreme_at(values, places, top, room))
+        put_nearest(at, extreme_at(values, places, bottom, room))
+    at_rows(columns, at, found)
+
+
+def put_nearest(at: Any, place: float) -> None:
+    """Put a place among others that rise where the nearest of those between the ends is."""
+    nearest = 1
+    while nearest < len(at) - 2 and abs(at[nearest + 1] - place) < abs(at[nearest] - place):
+        nearest += 1
+    if nearest < len(at) - 1:
+        at[nearest] = place
+
+
+def extreme_at(values: Any, places: Any, top: int, room: Any) -> float:
+    """Number of the row, and part to the next, where values are extreme; next to an extreme row."""
+    for after in (top, top + 1):  # the step it lies in, or ends, and the one that begins with it
+        begin = after - int(places[after]) if after < len(values) else after
+        if begin == after or begin + SAMPLES >= len(values):
+            continue
+        for power in range(SAMPLES + 1):
+            room[power] = 0.0
+            for k in range(SAMPLES + 1):
+                room[power] += COEFFICIENTS[power][k] * (values[begin + k] - values[top])
+        at = (top - begin) / HALF - 1.0
+        for _ in range(4):
+            slope = bend = 0.0
+            for power in range(SAMPLES, 1, -1):
+                slope = slope * at + power * room[power]
+                bend = bend * at + power * (power - 1) * room[power]
+            slope = slope * at + room[1]
+            at -= slope / bend if bend != 0.0 else 0.0
+        place = HALF * (1.0 + at)
+        if abs(place - (top - begin)) < 1.0 and 0.0 <= place <= SAMPLES:
+            return begin + place
+    return float(top)
+
+
+def at_rows(columns: np.ndarray, at: np.ndarray, found: np.ndarray) -> None:
+    """Fill in values of columns between rows, at numbers of rows and parts: of the polynomial
+    through those of the step. The compiler has a loop in place of this (`compiled.calls`).
+    """
+    columns, at, found = map(np.asarray, (columns, at, found))
+    after = np.ceil(at).astype(int)
+    within = columns[PLACE, after].astype(int)
+    # from one regime to the next there is a straight line
+    jumps = np.flatnonzero((within == 0) & (at > 0.0))
+    within[jumps] = 1
+    begin = after - within
+    part = at - begin
+    columns = columns[: len(found)]
+    around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
+    np.einsum("kp,ckp->cp", _weights(part), around, out=found)
+    at_a_row = np.flatnonzero(part == np.rint(part))
+    found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
+    line, share = begin[jumps], part[jumps]
+    found[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
+
+
 #: Columns by which the length of a path is measured.
-_PATH = [OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_stress")]
+_PATH = tuple(OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_stress"))
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
-_HALF = 0.5 * SAMPLES
-_STEP = np.arange(SAMPLES + 1)
-_COEFFICIENTS = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
-#: The same of its first and, below that, of its second derivative.
-_DERIVATIVES = np.zeros((2 * SAMPLES - 1, SAMPLES + 1))
-_DERIVATIVES[:SAMPLES] = _STEP[1:, None] * _COEFFICIENTS[1:]
-_DERIVATIVES[SAMPLES:] = _STEP[1:-1, None] * _DERIVATIVES[1:SAMPLES]
+HALF = 0.5 * SAMPLES
+_INVERSE = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
+COEFFICIENTS = tuple(tuple(row) for row in _INVERSE.tolist())
 
 
 def _polynomial(at: float, coefficients: Sequence[float]) -> float:
@@ -212,47 +288,7 @@ def _polynomial(at: float, coefficients: Sequence[float]) -> float:
 
 def _weights(parts: np.ndarray) -> np.ndarray:
     """Weights of the values at the places of a step, a row each, at parts of it in places."""
-    powers, from_middle = np.ones((SAMPLES + 1, len(parts))), parts / _HALF - 1.0
+    powers, from_middle = np.ones((SAMPLES + 1, len(parts))), parts / HALF - 1.0
     for power in range(SAMPLES):
         np.multiply(powers[power], from_middle, out=powers[power + 1])
-    return np.asarray(_COEFFICIENTS.T @ powers)
-
-
-def _at_rows(columns: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values of columns between rows, at numbers of rows and parts: of the polynomial through those
-    of the step.
-    """
-    after = np.ceil(at).astype(int)
-    within = places[after].astype(int)
-    # from one regime to the next there is a straight line
-    jumps = np.flatnonzero((within == 0) & (at > 0.0))
-    within[jumps] = 1
-    begin = after - within
-    part = at - begin
-    around = columns.take(begin + _STEP[:, None], axis=1, mode="clip")
-    found = np.einsum("kp,ckp->cp", _weights(part), around)
-    at_a_row = np.flatnonzero(part == np.rint(part))
-    found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
-    line, share = begin[jumps], part[jumps]
-    found[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
-    return found
-
-
-def _extreme(values: np.ndarray, top: int, places: np.ndarray) -> float:
-    """Number of the row, and part to the next, where values are extreme; next to an extreme row."""
-    for after in (top, top + 1):  # the step it lies in, or ends, and the one that begins with it
-        if after >= len(values) or not places[after]:
-            continue
-        begin = after - int(places[after])
-        if begin + SAMPLES >= len(values):
-            continue
-        slopes = (_DERIVATIVES @ values[begin : begin + SAMPLES + 1]).tolist()
-        slope, bend = slopes[:SAMPLES], slopes[SAMPLES:]
-        at = (top - begin) / _HALF - 1.0
-        for _ in range(4):
-            curvature = _polynomial(at, bend)
-            at -= _polynomial(at, slope) / curvature if curvature else 0.0
-        place = _HALF * (1.0 + at)
-        if abs(place - (top - begin)) < 1.0 and 0.0 <= place <= SAMPLES:
-            return begin + place
-    return float(top)
+    return np.asarray(_INVERSE.T @ powers)

@@ -7,15 +7,18 @@ Arrays would be passed from function to function as ten words each, and counted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rsfstudy.motion import calls, steppers
+from rsfstudy.motion import calls, recording, steppers
+from rsfstudy.motion.recording import COEFFICIENTS, HALF, PLACE, SAMPLES
 from rsfstudy.motion.steppers import order_eight
 
 _POINTER = types.CPointer(types.float64)
@@ -66,11 +69,37 @@ def moved(pointer, numbers):
     return _moved(pointer, numbers)
 
 
+def at_rows(columns, at, found):
+    """Fill in values of columns between rows (see `recording.at_rows`)."""
+    last, weights = columns.shape[1] - 1, np.empty(SAMPLES + 1)
+    for i in range(len(at)):
+        after = math.ceil(at[i])
+        within = int(columns[PLACE, after])
+        begin = after - (within or min(after, 1))
+        part = at[i] - begin
+        row, share = begin + int(part), part - int(part)
+        if share == 0.0 or within == 0:
+            for c in range(len(found)):
+                found[c, i] = columns[c, row]
+                if share > 0.0:
+                    found[c, i] = (1.0 - share) * columns[c, row] + share * columns[c, row + 1]
+            continue
+        for k in range(SAMPLES + 1):
+            weights[k] = 0.0
+            for power in range(SAMPLES, -1, -1):
+                weights[k] = weights[k] * (part / HALF - 1.0) + COEFFICIENTS[power][k]
+        for c in range(len(found)):
+            found[c, i] = 0.0
+            for k in range(SAMPLES + 1):
+                found[c, i] += weights[k] * columns[c, min(begin + k, last)]
+
+
 #: What stands in place of which function.
 IN_PLACE: Mapping[Any, Any] = {
     calls.evaluate: evaluate,
     calls.first_of: first_of,
     calls.moved: moved,
+    recording.at_rows: at_rows,
     steppers.begin: order_eight.begin,
     steppers.attempt: order_eight.attempt,
     steppers.reach: order_eight.reach,

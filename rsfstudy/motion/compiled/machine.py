@@ -130,6 +130,13 @@ def _of_floats(function: Function, *lengths: int) -> Any:
         raise refused(error) from error
 
 
+@cache
+def of_arrays(function: Function, *dimensions: int) -> Any:
+    """A function of arrays of so many dimensions, compiled."""
+    kinds = (types.Array(types.float64, count, "C") for count in dimensions)
+    return called_from_python(function, tuple(kinds))
+
+
 def addresses(equations: Equations) -> tuple[int, ...]:
     """Addresses of the compiled functions of a system of equations, in the order of `Filling`.
 
