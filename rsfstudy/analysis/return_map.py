@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from rsfstudy.analysis.cycles import NUMBERS, Cycle, cycles
 from rsfstudy.motion.accuracy import Accuracy
@@ -303,8 +304,8 @@ class ReturnMap:
                 return None
             off = section(events[-1].end) - at
             if move is not None:
-                jacobian += np.outer(off, move) / (move @ move)
-            move = -np.linalg.solve(jacobian, off)
+                jacobian += off[:, None] * move / (move @ move)
+            move = -dgesv(jacobian, off)[2]
             size = max(map(abs, move.tolist()))
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:

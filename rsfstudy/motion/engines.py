@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.parts import Numbers
+
+if TYPE_CHECKING:
+    import numpy as np
 
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
 ENGINES = (SCIPY, PYTHON, COMPILED)
