@@ -317,8 +317,13 @@ def _steady(scene: Scene) -> _Steady:
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
-    critical = stability.critical_stiffness(scene, load)
-    margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
+    law = scene.parts.law
+    at_every_rate = orbits_may_close(scene) and law.scale_free and not law.regularised
+    if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
+        margin = ratio_after(scene) - 1.0
+    else:
+        critical = stability.critical_stiffness(scene, load)
+        margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
     if margin < -_NEUTRAL and scene.states > 1 and _decays(scene):
         margin = -margin
     return _Steady(**vars(sliding), margin=margin)

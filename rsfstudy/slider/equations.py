@@ -177,9 +177,9 @@ def log_slip_rate_at(scene: Scene, spring_stress: float, psi: float) -> float:
     """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
     there is no pore pressure.
     """
-    massless = scene.dynamics if scene.dynamics.rupture_rate is None else QuasiStatic()
+    forms = functions(scene, QuasiStatic()) if scene.has_mass else scene.functions
     psis = (psi, *(0.0,) * (scene.states - 1))
-    return float(functions(scene, massless).balance(spring_stress, psis, scene.numbers)[0])
+    return float(forms.balance(spring_stress, psis, scene.numbers)[0])
 
 
 def evolution_of(scene: Scene) -> Callable[[float, float], float]:
