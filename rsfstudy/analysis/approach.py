@@ -13,11 +13,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import sub
 
 import numpy as np
 
 from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events
-from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, image_of, section
+from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -61,14 +62,15 @@ class Approach:
         self._noise = accuracy.solver * scene.a
         self._work = 0
         self.seen: list[Cycle] = []
-        #: Derivatives of the section at the end of a cycle, and of its numbers below that, by the
-        #: section at its beginning; and whether they are known.
-        self._slopes, self._known = np.zeros((2 + NUMBERS, 2)), False
+        #: Derivatives of the section at the end of a cycle, and of its numbers behind that, by
+        #: spring stress and by state where it begins; and whether they are known.
+        self._slopes, self._known = 2 * ((2 + NUMBERS) * (0.0,),), False
         #: Section where the last cycle begins, its image, and by how much that has changed.
-        self._before = np.zeros(2), np.zeros(2 + NUMBERS)
-        self._changes = np.zeros(2 + NUMBERS)
-        #: From the section where the last cycle begins to that of the limit cycle.
-        self._ahead = np.zeros(2)
+        self._begin, self._image = (0.0, 0.0), (2 + NUMBERS) * (0.0,)
+        self._changes = self._image
+        #: From the section where the last cycle begins to that of the limit cycle, and what that
+        #: changes of the image.
+        self._ahead, self._implied = self._begin, self._image
         #: What was left to go along the map where the motion leapt last.
         self._left_at_leap = np.inf
 
@@ -97,21 +99,21 @@ class Approach:
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
                     self._left_at_leap = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
-                    start = self._by.point(section(cycle.begin) + self._ahead)
+                    start = self._by.point(section(cycle.begin) + np.array(self._ahead))
                     break
 
     @property
     def orbit(self) -> Orbit:
         """The last cycle, and what it implies of the limit cycle."""
-        last = self.seen[-1:]
-        return Orbit(tuple(last), (self._slopes,), self._ahead, self._accuracy, self._work)
+        last, slopes = self.seen[-1:], np.array(self._slopes).T
+        return Orbit(tuple(last), (slopes,), np.array(self._ahead), self._accuracy, self._work)
 
     @property
     def _return(self) -> float:
         """Part of its distance to the limit cycle that a cycle keeps: the trace of the derivative
         A of the map, whose other eigenvalue is zero, because the motion forgets one direction.
         """
-        return float(self._slopes[0, 0] + self._slopes[1, 1])
+        return self._slopes[0][0] + self._slopes[1][1]
 
     def _learn(self) -> None:
         """Take the derivatives from the last two cycles, as long as numerical errors allow, and
@@ -121,35 +123,44 @@ class Approach:
         ``(1 - A)^-1 (P(s) - s)``, is ``[1 + A/(1 - tr A)] (P(s) - s)``.
         """
         last = self.seen[-1]
-        begin, image = section(last.begin), image_of(last)
+        begin, end = last.begin, last.end
+        section = begin.spring_stress, begin.psi
+        image = end.spring_stress, end.psi, *last.numbers()
+        changes = tuple(map(sub, image, self._image))
         if len(self.seen) > 1:
-            apart = begin - self._before[0]
-            if abs(apart[0]) > (1000.0 if self._known else 1.0) * self._noise:
+            by_stress, by_state = map(sub, section, self._begin)
+            if abs(by_stress) > (1000.0 if self._known else 1.0) * self._noise:
                 self._known = True
                 # the motion passes a section without a change of spring stress
-                (_none, way), passed = self._by.along(last.begin)
-                self._slopes[:, 1] = passed / way
-                changes = image - self._before[1] - apart[1] * self._slopes[:, 1]
-                self._slopes[:, 0] = changes / apart[0]
-        self._changes, self._before = image - self._before[1], (begin, image)
-        off = image[:2] - begin
-        self._ahead = off + self._slopes[:2] @ off / (1.0 - min(self._return, _DIVERGES))
+                (_none, way), passed = self._by.along(begin)
+                along = tuple((passed / way).tolist())
+                left = (x - by_state * y for x, y in zip(changes, along, strict=True))
+                self._slopes = tuple(x / by_stress for x in left), along
+        self._begin, self._image, self._changes = section, image, changes
+        off, kept = tuple(map(sub, image, section)), 1.0 - min(self._return, _DIVERGES)
+        returned = self._by_slopes(off)
+        self._ahead = off[0] + returned[0] / kept, off[1] + returned[1] / kept
+        self._implied = self._by_slopes(self._ahead)
+
+    def _by_slopes(self, move: tuple[float, ...]) -> tuple[float, ...]:
+        """What a move of the section where a cycle begins changes of the image."""
+        by_stress, by_state = move
+        return tuple(x * by_stress + y * by_state for x, y in zip(*self._slopes, strict=True))
 
     def _repeats(self) -> bool:
         """True if the next cycles would all be the same: as the derivatives say, or because the
         last two are.
         """
-        allowed = 0.3 * self._accuracy.rtol * np.abs(self._before[1][2:])
-        attracts = self._known and self._return < _DIVERGES
-        if attracts and (np.abs(self._slopes[2:] @ self._ahead) <= allowed).all():
+        allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
+        if self._known and self._return < _DIVERGES and _within(self._implied[2:], allowed):
             return True
         if len(self.seen) < 2 or self.seen[-2].end != self.seen[-1].begin:
             return False
         if self._wavers():
             return True
-        change = np.abs(self._changes[2:])
         left = min(max(self._return, 0.0), _DIVERGES)
-        return bool((change * max(1.0, left / (1.0 - left)) <= allowed).all())
+        left = max(1.0, left / (1.0 - left))
+        return _within([change * left for change in self._changes[2:]], allowed)
 
     def _wavers(self) -> bool:
         """True if the last two cycles go to and fro, as near the limit cycle as it is ever closed:
@@ -173,8 +184,13 @@ class Approach:
             return False
         if not _SLOW_APPROACH < self._return < _DIVERGES:
             return False
-        slowest, fastest = (self._slopes[2:] @ self._ahead)[-2:] * LN10
-        return bool(abs(fastest - slowest) < _NEAR * cycle.swing)
+        slowest, fastest = self._implied[-2:]
+        return LN10 * abs(fastest - slowest) < _NEAR * cycle.swing
+
+
+def _within(changes: Sequence[float], allowed: Sequence[float]) -> bool:
+    """True if none of some changes is larger than is allowed."""
+    return all(abs(change) <= most for change, most in zip(changes, allowed, strict=True))
 
 
 @dataclass(frozen=True)

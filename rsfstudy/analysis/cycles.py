@@ -151,9 +151,11 @@ def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) ->
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    ends = in_units_of(scene, np.array([row(0.0, 0.0, begin, 0), row(passed, slip, end, 0)]))
+    last = in_units_of(scene, np.array(row(passed, slip, end, 0)))
+    if recording is None:
+        return np.stack([in_units_of(scene, np.array(row(0.0, 0.0, begin, 0))), last])
     # the last step goes beyond the end
-    return ends if recording is None else up_to(recording.seen(scene), ends[-1])
+    return up_to(recording.seen(scene), last)
 
 
 @lru_cache(maxsize=256)
@@ -202,7 +204,9 @@ def _cycle(begin: Point, begun: float, seen: Sequence[Event]) -> Cycle:
 
 def _landed(seen: Sequence[Event]) -> Point | None:
     """Point where slip is below V_0 after the rupture, and friction balances the spring."""
-    for fallen, event in enumerate(seen):
-        if event.kind is Kind.FALL:
-            return next((e.point for e in seen[fallen:] if e.regime != IN_RUPTURE), None)
+    fallen = False
+    for event in seen:
+        fallen = fallen or event.kind is Kind.FALL
+        if fallen and event.regime != IN_RUPTURE:
+            return event.point
     return None
