@@ -36,6 +36,9 @@ from rsfstudy.slider.scene import Scene
 LN10 = math.log(10.0)
 #: How many headline numbers a cycle has.
 NUMBERS = 5
+#: Kinds of events, of which names take as long to look up as all else that an event asks for.
+_START, _RISE, _FALL = Kind.START, Kind.RISE, Kind.FALL
+_SEGMENT, _SETTLED = Kind.SEGMENT, Kind.SETTLED
 _LOG_RATE, _SPRING = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
@@ -111,18 +114,19 @@ def cycles(
     swings, asked = list[float](), _asked(scene.log_load_rate)
     motion = follow(scene, accuracy, meter, asked, start=start, clock=True, recording=recording)
     for event in motion:
-        if event.kind is Kind.SEGMENT:
+        kind = event.kind
+        if kind is _SEGMENT:
             begin, fallen, seen, ahead = None, True, [], ahead - 1
         if ahead:
             continue
-        if event.kind is Kind.SETTLED:
+        if kind is _SETTLED:
             yield None
             return
-        if event.kind is Kind.START and start is not None:
+        if kind is _START and start is not None:
             begin = event.point
-        fallen = fallen or event.kind is Kind.FALL
+        fallen = fallen or kind is _FALL
         seen.append(event)
-        if event.kind is not Kind.RISE or not fallen:
+        if kind is not _RISE or not fallen:
             continue
         if begin is not None:
             cycle = _cycle(begin, begun, seen)
@@ -206,7 +210,7 @@ def _landed(seen: Sequence[Event]) -> Point | None:
     """Point where slip is below V_0 after the rupture, and friction balances the spring."""
     fallen = False
     for event in seen:
-        fallen = fallen or event.kind is Kind.FALL
+        fallen = fallen or event.kind is _FALL
         if fallen and event.regime != IN_RUPTURE:
             return event.point
     return None

@@ -81,7 +81,7 @@ def follow(
         asked = specs if goes_on else _without_settling(specs)
         table = _up_to(table, until)
         end = float(table[-1, ENDS_AT])
-        for last in runner_of(acting, meter.engine, clock=clock).run(
+        motion = runner_of(acting, meter.engine, clock=clock).run(
             start,
             meter,
             asked,
@@ -91,7 +91,11 @@ def follow(
             recording=recording,
             kinks=(table[1:], told),
             imposed=acting.numbers[LOADING + 2] if acting.parts.loading.displaces else None,
-        ):
+        )
+        if before is None and end == math.inf:  # it has all there is to tell
+            yield from motion
+            return
+        for last in motion:
             if before is not None and last.kind is Kind.START:
                 for event in _begun(last, before, acting, asked):
                     yield event

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rsfstudy.slider.derived import derived
 from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
 from rsfstudy.slider.parts import number
 
@@ -50,7 +51,7 @@ class Step(AtVelocity):
     def imposes(self) -> bool:
         return self.normal_stress_step != 0.0
 
-    @property
+    @derived
     def segments(self) -> tuple[Segment, ...]:
         """The step, and what follows it."""
         moved, pressed = self.displacement_step, self.normal_stress_step
