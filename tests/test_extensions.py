@@ -7,6 +7,7 @@ import json
 import math
 import pickle
 import shutil
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -31,6 +32,7 @@ from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parts import flag, number
+from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
 #: Fields of every scene; others are among its values only if they are stated.
@@ -320,10 +322,14 @@ def test_scenes_that_are_refused(given, rule):
         Scene(**given)
 
 
+def linear(x, state, p):
+    return -(state + p[LAW] * x)
+
+
 def made(base=laws.Law, frozen=True, **body):
     """A class of a law, or of what is none."""
     annotations = {name: float for name, value in body.items() if hasattr(value, "metadata")}
-    stated = {"name": "made", "evolution": staticmethod(lambda x, state, p: -x), **body}
+    stated = {"name": "made", "evolution": staticmethod(linear), **body}
     kind = type("Made", (base,), {**stated, "__annotations__": annotations})
     return dataclass(frozen=frozen, kw_only=True)(kind) if frozen else kind
 
@@ -348,6 +354,28 @@ def test_classes_that_fill_no_slot(rule):
     for body in NO_LAW[rule]:
         with pytest.raises(InvalidValue, match=f"(?s){rule}"):
             Scene(law=made(**body))
+
+
+@pytest.mark.parametrize(
+    ("body", "complaint"),
+    [
+        ({}, r"changes by .* per D_c in steady sliding.*Write steady_states\("),
+        ({"steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,)}, ""),
+        (
+            {
+                "evolution": lambda x, state, p: -(state - 0.1 * p[LAW] + p[LAW] * x),
+                "steady_states": lambda x, shift, p: (shift + p[LAW] * (0.1 - x),),
+            },
+            "has states that add up to 0.*at V_[*]",
+        ),
+    ],
+)
+def test_a_law_rests_in_its_steady_states(body, complaint):
+    """Weakening by 0.9 b, whose steady states are not the usual ones."""
+    functions = {"evolution": lambda x, state, p: -(state + 0.9 * p[LAW] * x), **body}
+    functions = {name: staticmethod(function) for name, function in functions.items()}
+    with pytest.raises(InvalidValue, match=complaint) if complaint else nullcontext():
+        Scene(law=made(name="weaker", **functions), b_over_a=2.0)
 
 
 def test_members_may_bear_their_former_names():

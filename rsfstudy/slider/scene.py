@@ -31,6 +31,7 @@ from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.states import check_steady_states
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
 _KEPT = 4096
@@ -165,6 +166,8 @@ class Scene(Assembled):
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
+        if parts.law.name not in laws.PARTS:
+            check_steady_states(self)
 
     if TYPE_CHECKING:
         mu_star: float

@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from functools import cache
 
-from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.places import A, B
+
+#: ln(V/V_*) at which a law must rest in its steady states, and the change of a state per slip of
+#: D_c, over a, that is still rest: far above rounding.
+_RATES, _AT_REST = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
@@ -143,3 +148,21 @@ def states_at_of(count: int) -> Function:
         return (strength - p[A] * log_slip_rate - sum_of_others(others), *others)
 
     return left_by_others
+
+
+def check_steady_states(scene: Scene) -> None:
+    """Raise InvalidValue where the law of a scene still changes in the states that it states, or is
+    given, as those of steady sliding: critical stiffness and cycles would contradict each other.
+    """
+    law, p, still = scene.parts.law, scene.numbers, _AT_REST * scene.a
+    evolutions = law.evolutions or only(law.evolution)
+    for rate in _RATES:
+        psis = (law.steady_states or usual_steady_state)(rate, 0.0, p)
+        change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
+        if not change <= still:
+            rule = f"changes by {change:.3g} per D_c in steady sliding at ln(V/V_*) = {rate:g}"
+            remedy = "Write steady_states(log_slip_rate, shift, p) for it."
+            raise InvalidValue("law", law.name, rule, remedy=remedy)
+        if rate == 0.0 and not abs(sum(psis)) <= still:
+            rule = f"has states that add up to {sum(psis):.3g} at V_*, where friction is mu_*"
+            raise InvalidValue("law", law.name, rule, remedy="Measure them from V_*.")

@@ -55,7 +55,8 @@ class LawOfStates(Part):
     A law states ``evolution(log_slip_rate, state, p)``: the change of its state variable per unit
     of slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
     states ``steady_states(log_slip_rate, shift, p)``: the states Psi of steady sliding, of which
-    stress has taken `shift`. At V_* they add up to nothing, because friction is mu_* there.
+    stress has taken `shift`. At V_* they add up to nothing, because friction is mu_* there. A scene
+    refuses a law that changes where it says that it rests.
 
     A law of several states says how many (``states = 3``), and states ``evolutions(log_slip_rate,
     psis, shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
