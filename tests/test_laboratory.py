@@ -11,7 +11,7 @@ from running import call, called, run
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.plots._motion import picture
 from rsfstudy.slider.loading import Segment
@@ -226,6 +226,14 @@ def test_the_picture_of_a_motion(laboratory, against):
     expected = scene.mu_star + (scene.a - scene.b) * np.log(np.asarray(rates))
     np.testing.assert_allclose(friction, expected, rtol=1e-12)
     assert np.asarray(path.get_xdata()).max() > 2.5
+
+
+def test_the_picture_of_steady_sliding_has_limits_about_its_slip_rate():
+    """Without them matplotlib warns, which is an error here."""
+    with pytest.warns(NoAnswer, match="nothing is stepped"):
+        motion = simulate(RIG.scene(**LAW), duration=1.0)
+    low, high = picture(motion, RIG).axes[1].get_ylim()
+    assert low < 1.0 < high  # um/s, which is V_*
 
 
 def test_the_command_simulates_a_rig(tmp_path):

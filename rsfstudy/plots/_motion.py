@@ -110,6 +110,8 @@ def _rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
     """Slip rate in the units of the rig, or its logarithm over V_*."""
     if "slip_rate" in shown:
         axes.plot(shown[against], shown["slip_rate"])
+        if np.ptp(ends := axes.dataLim.intervaly) < _ROUNDING * ends[1]:  # it slides steadily
+            axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         log_scale(axes, "y")
         axes.set_ylabel(f"Slip rate ({_written(shown['slip_rate'].attrs['units'])})")
     else:

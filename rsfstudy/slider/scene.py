@@ -166,7 +166,7 @@ class Scene(Assembled):
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
-        if parts.law.name not in laws.PARTS:
+        if self.parts.law.name not in laws.PARTS:
             check_steady_states(self)
 
     if TYPE_CHECKING:
