@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 
 #: Most values of a list that are shown.
 _MOST_SHOWN = 8
+#: Numbers of more digits than a reader wants.
+_LONG = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
 def is_list(value: Any) -> bool:
@@ -19,17 +22,23 @@ def is_list(value: Any) -> bool:
 
 
 def settings(overrides: Mapping[str, Any]) -> str:
-    """Overrides as one types them, long lists cut short."""
+    """Overrides as one types them, long lists and numbers cut short."""
     texts = {
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
-    return ", ".join(f"{name}={listed(values)}" for name, values in texts.items())
+    told = ", ".join(f"{name}={listed(values)}" for name, values in texts.items())
+    return _LONG.sub(lambda found: short(float(found[0])), told)
 
 
 def listed(values: Sequence[Any], between: str = ",") -> str:
     """Values one after the other, long lists cut short."""
     shown = [short(value) for value in values]
     return between.join(shown if len(shown) <= _MOST_SHOWN else [*shown[:3], "...", shown[-1]])
+
+
+def counted(count: int, noun: str) -> str:
+    """How many there are, as in "1 cell"."""
+    return f"{count:,} {noun}{'s' * (count != 1)}"
 
 
 def short(value: Any) -> str:

@@ -78,12 +78,13 @@ def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
     ],
 )
 def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_path):
-    """Where no claim applies, `run` says so, and `check`, which then checks nothing, fails."""
+    """Both say how many claims were checked; where none is, `check` fails."""
     ran = call("run", NAME, "--serial", *settings, "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
     checked = call("check", NAME, "--output", tmp_path)
-    nothing = "no claim applies" in ran.stdout
-    assert nothing == ("nothing was checked: of 6 claims none applies" in checked.stdout)
+    counted = next(line for line in checked.stdout.splitlines() if " of 6 claims checked" in line)
+    assert counted in ran.stdout
+    nothing = counted == "0 of 6 claims checked: 6 not applicable"
     assert checked.returncode == int(nothing), checked.stderr
     drawn = call("plot", NAME, "--output", tmp_path)
     assert drawn.returncode == 0, drawn.stderr
@@ -91,6 +92,21 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     assert settings[1].split("=")[0] in ran.stdout
     # a slope needs more than one point
     assert ("no zeta: among these cells" in ran.stdout) == (settings[1] == "b_over_a=1.5")
+
+
+def test_a_claim_that_is_named_must_apply(tmp_path):
+    """Of claim C6 the slope is left out with cells of its support, the value at b/a = 2 is not."""
+    dataset = rsfstudy.run(NAME, workers=0, output=None, progress=False, b_over_a=[2, 3])
+    store.write(dataset, tmp_path / "few.nc")
+    everything = call("check", tmp_path / "few.nc")
+    assert everything.returncode == 0
+    assert "2 of 6 claims checked: 2 reproduced, 4 not applicable" in everything.stdout
+    named = call("check", tmp_path / "few.nc", "--claim", "C6")
+    assert named.returncode == 1
+    assert "1 of 2 claims checked" in named.stdout
+    unknown = call("check", tmp_path / "few.nc", "--claim", "C99")
+    assert unknown.returncode == 2
+    assert "C6, C7" in " ".join(unknown.stderr.split())
 
 
 def test_list_and_show():

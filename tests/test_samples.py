@@ -8,14 +8,15 @@ import pandas as pd
 import pytest
 import xarray as xr
 from rsfstudy.named_studies import uncertain_recurrence
-from running import run
+from running import run, study_of
 from scipy.stats import lognorm, norm, truncnorm, uniform
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study, plots
 from rsfstudy.compute import cells
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import restore
+from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import (
     Mean,
@@ -264,6 +265,14 @@ def test_failed_samples_are_refused_and_shares_tell_of_them():
     assert float(reduced(lattice, kinds, despite_failures=True)["mean"]) > 0.0
     lattice["status"][0] = Status.PENDING
     assert np.isnan(reduced(lattice, kinds)["share"]).all()
+
+
+def test_a_run_warns_of_what_reductions_refuse():
+    axis = Axis.samples({"b_over_a": norm(2.0, 0.1)}, 2, seed=1)
+    means = (Mean("middle", "critical_displacement"),)
+    study = study_of("few", CriticalStep("displacement_step"), axis, base=BASE, reductions=means)
+    with pytest.warns(Incomplete, match="2 of 2 cells failed: .*; no middle: samples failed or ar"):
+        rsfstudy.run(study, workers=0, output=None, progress=False, budget=60, keep_going=True)
 
 
 def test_too_few_samples_for_a_quantile():

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.api import exchange
+from rsfstudy.api import exchange, tables
 from rsfstudy.api.progress import compile_with_notice, shown
 from rsfstudy.compute import provenance, runner
 from rsfstudy.compute.cells import Task, sendable, serial
@@ -126,7 +126,8 @@ def run(
     Warns
     -----
     Incomplete
-        Where cells failed: how many, and with which status.
+        Where cells failed: how many, and with which status; and where a reduction refused to draw
+        on its cells, with the reason.
     """
     declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = Keeping(
@@ -139,11 +140,13 @@ def run(
     )
     with Workers(workers, client, time_limit) as where:
         results = prepared(declared, keeping, where, progress)()
+    told = [f"no {name}: {why}" for name, why in tables.refused(results).items()]
     if failed := runner.failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
-        text = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
-        text += "; dataset.rsf.failures() lists them"
-        warnings.warn(text, Incomplete, stacklevel=outside())
+        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        told = [first, *told, "dataset.rsf.failures() lists them"]
+    if told:
+        warnings.warn("; ".join(told), Incomplete, stacklevel=outside())
     return results
 
 

@@ -14,11 +14,12 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
+from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
-from rsfstudy.wording import listed, short, stated
+from rsfstudy.wording import counted, listed, short, stated
 
 #: Most cells of a lattice that are shown, and most that failed.
 MOST_CELLS, _MOST_FAILURES = 24, 20
@@ -162,11 +163,24 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(rows(dataset, dims, columns), prose={"problem", "cheapest"})
 
 
-def unreduced(dataset: xr.Dataset) -> list[str]:
-    """Names of the reductions that found no cells that they are for."""
-    declared = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
-    there = tuple(map(str, dataset.data_vars))
-    return [name for name in declared if not any(n.startswith(name) for n in there)]
+def refused(dataset: xr.Dataset) -> dict[str, str]:
+    """Why reductions refuse to draw on cells, by their names."""
+    named = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    results = {name: dataset[name].attrs for name in named if name in dataset}
+    return {name: str(about["refused"]) for name, about in results.items() if "refused" in about}
+
+
+def unreduced(dataset: xr.Dataset) -> dict[str, str]:
+    """Why reductions have no results, by their names."""
+    found, there = refused(dataset), tuple(map(str, dataset.data_vars))
+    for stated_as in contents.declaration(dataset).reductions:
+        about: Mapping[str, Any] = {**stated_as}
+        if not any(name.startswith(about["name"]) for name in there):
+            least, most = map(short, about.get("within") or ("", ""))
+            on = with_units(dataset[about["on"]]) if most else ""
+            span = f", with {least} <= {on} <= {most}" if most else ""
+            found[about["name"]] = f"among these cells are none, or too few, to draw on{span}"
+    return found
 
 
 def _slopes(dataset: xr.Dataset) -> list[str]:
@@ -196,13 +210,18 @@ def claims(frame: pd.DataFrame) -> Table:
     )
 
 
+def verdicts_of(found: pd.DataFrame) -> str:
+    """How many claims have which verdict."""
+    given = list(found.get("verdict", ()))
+    return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
+
+
 def ended(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
     """How many claims have which verdict, and what went wrong, in words."""
     wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
-    if not len(found):
-        return "", wrong
-    wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
-    return ", ".join(f"{n} {v}" for v, n in found["verdict"].value_counts().items()), wrong
+    if len(found):
+        wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
+    return verdicts_of(found), wrong
 
 
 def cells(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
@@ -224,7 +243,7 @@ def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
         {"cell": stated(place), "status": label, "message": message}
         for place, label, message in zip(places, first["status"], first["message"], strict=True)
     ]
-    caption = f"{len(found)} cells failed"
+    caption = f"{counted(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
     return Table(rows, caption, prose={"cell", "message"}), places

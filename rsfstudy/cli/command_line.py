@@ -173,10 +173,18 @@ def run() -> None:
 @cli.command()
 @options.named
 @options.output
+@click.option(
+    "--claim",
+    "claims",
+    multiple=True,
+    metavar="ID",
+    help="Only this claim, as in C6, which must then apply to the results.",
+)
 def check() -> None:
     """Hold results against published values.
 
-    Those of a named study, or of a results file. Fails where a verdict is not the one expected.
+    Those of a named study, or of a results file. Fails where a verdict is not the one expected, a
+    cell failed, or no claim applies.
     """
 
 

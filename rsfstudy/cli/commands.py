@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import xarray as xr
 
 from rsfstudy import plots
@@ -21,6 +22,7 @@ from rsfstudy.api import exchange, runs
 from rsfstudy.api import report as reports
 from rsfstudy.cli import assignments, terminal
 from rsfstudy.cli.console import console, stderr
+from rsfstudy.cli.cost import clock
 from rsfstudy.cli.options import Given
 from rsfstudy.cli.terminal import FAILED, OK, Ended
 from rsfstudy.compute.clusters import existing_cluster
@@ -31,6 +33,7 @@ from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
+from rsfstudy.files.comparison import cell_number
 from rsfstudy.motion.engines import lacking
 from rsfstudy.rig.quantities import STATED
 from rsfstudy.rig.units import number
@@ -55,23 +58,16 @@ def run(given: Given) -> int:
     studies = [_declared(name, given) for name in _names(given)]
     left_out = _left_out(studies) if given.every and given.engine is None else []
     studies = [study for study in studies if study.name not in {end.study for end in left_out}]
-    keeping = Keeping(
-        output=given.output,
-        format=given.format,
-        fresh=given.fresh,
-        keep_going=given.keep_going,
-        despite_failures=given.despite_failures,
-        command=given.command,
-    )
+    kept = given.only("output", "format", "fresh", "keep_going", "despite_failures", "command")
     log = given.output / "workers.log" if given.every else None
     with _workers(given, log) as where:
-        ready = [(s, runs.prepared(s, keeping, where, not given.quiet)) for s in studies]
+        ready = [(s, runs.prepared(s, Keeping(**kept), where, not given.quiet)) for s in studies]
         advice = not (given.every or given.quiet)
         for study in studies:
             terminal.announce(study, given.output, given.rtol is not None, advice)
         if given.every:
             return _run_all(ready, given, left_out)
-        return FAILED if _run(*ready[0], given).wrong else OK
+        return FAILED if _run(*ready[0], given).colour == "red" else OK
 
 
 def _run(study: Study, compute: Callable[[], xr.Dataset], given: Given) -> Ended:
@@ -88,10 +84,12 @@ def _run(study: Study, compute: Callable[[], xr.Dataset], given: Given) -> Ended
 
 def _left_out(studies: Sequence[Study]) -> list[Ended]:
     """Name the studies whose engine is not installed."""
-    lacked = {study.name: lacking(study.accuracy.engine) for study in studies}
-    ends = [Ended(name, 0.0, left_out=why) for name, why in lacked.items() if why]
-    for end in ends:
-        console.print(f"{end.study}: left out: {end.left_out}", style="yellow")
+    ends = []
+    for study in studies:
+        if why := lacking(study.accuracy.engine):
+            console.print(f"{study.name}: left out: {why}", style="yellow")
+            text = f"left out: {why.partition(' (')[0]}"
+            ends.append(Ended(study.name, "-", text, colour="yellow"))
     return ends
 
 
@@ -111,10 +109,10 @@ def _run_all(
                 raise
             except RsfStudyError as error:
                 stderr.print(f"error: {error}")
-                ends.append(Ended(study.name, time.monotonic() - began, "not finished"))
+                ends.append(Ended(study.name, clock(time.monotonic() - began), "not finished"))
     finally:
         terminal.summary([*ends, *left_out])
-    return FAILED if any(end.wrong for end in ends) else OK
+    return FAILED if any(end.colour == "red" for end in ends) else OK
 
 
 def rerun(given: Given) -> int:
@@ -129,17 +127,13 @@ def rerun(given: Given) -> int:
         except Exception:  # it fails as it fails
             traceback.print_exc()
             return FAILED
-        return terminal.outcome(scene, outcome, [str(warning.message) for warning in caught])
+        results = runs.open(given.file)
+        index = np.unravel_index(cell_number(results, place), results["status"].shape)
+        there = results.isel(dict(zip(results["status"].dims, index, strict=True)))
+        return terminal.outcome(scene, outcome, there, [str(one.message) for one in caught])
     with _workers(given) as where:
-        table = runs.rerun(
-            given.file,
-            study=given.study,
-            workers=where.processes,
-            client=where.client,
-            output=given.output,
-            progress=not given.quiet,
-            time_limit=where.time_limit,
-        )
+        asked = given.only("study", "output", "time_limit") | {"progress": not given.quiet}
+        table = runs.rerun(given.file, workers=where.processes, client=where.client, **asked)
     return terminal.agreement(table)
 
 
@@ -161,18 +155,16 @@ def compare(given: Given) -> int:
 
 def check(given: Given) -> int:
     """Hold results against published values."""
-    if not given.every:
-        return terminal.checked(runs.open(_names(given)[0], given.output))
     status, datasets = OK, []
     for name in _names(given):
-        if (given.output / f"{name}.nc").exists():
+        if not given.every or (given.output / f"{name}.nc").exists():
             datasets.append(runs.open(name, given.output))
         elif why := lacking(catalogue.load(name).accuracy.engine):
             console.print(f"{name}: left out: {why}", style="yellow")
         else:
             console.print(f"{name}: not run yet", style="red")
             status = FAILED
-    return max([status, terminal.all_claims(datasets), *map(terminal.failures, datasets)])
+    return max(status, terminal.checked(datasets, given.claims)) if datasets else status
 
 
 def plot(given: Given) -> int:
@@ -245,9 +237,7 @@ def _declared(name: str, given: Given) -> Study:
     in_si = {"load_velocity": "m/s", **{name: about.units for name, about in STATED.items()}}
     texts = {n: t if number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignments.overrides(study, given.settings)
-    return runs.declaration(
-        study, changes, rtol=given.rtol, engine=given.engine, budget=given.budget
-    )
+    return runs.declaration(study, changes, **given.only("rtol", "engine", "budget"))
 
 
 @contextlib.contextmanager

@@ -40,13 +40,8 @@ def simulate(given: Given) -> int:
     """Follow one motion, draw it and write it."""
     _check_replaceable(given.output.with_suffix(".nc"), told.is_motion, "motion")
     scene, laboratory = _stated(given)
-    motion = simulated(
-        scene,
-        duration=_duration(given.duration, laboratory),
-        rtol=given.rtol,
-        budget=given.budget,
-        engine=given.engine,
-    )
+    duration, accuracy = _duration(given.duration, laboratory), ("rtol", "budget", "engine")
+    motion = simulated(scene, duration=duration, **given.only(*accuracy))
     motion = motion.assign_attrs(provenance.attributes(given.command))
     _write(motion, laboratory, given)
     if motion.attrs["status"] != Status.OK.label:
@@ -109,7 +104,7 @@ def fit(given: Given) -> int:
         records,
         steps=[_number(text) for text in given.steps],
         command=given.command,
-        **{name: getattr(given, name) for name in _TAKEN},
+        **given.only(*_TAKEN),
         **assignments.fields(given.settings),
     )
     dataset = store.write(dataset, data)

@@ -34,6 +34,10 @@ class Given(SimpleNamespace):
         """What was typed."""
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
+    def only(self, *names: str) -> dict[str, Any]:
+        """Those of some names."""
+        return {name: getattr(self, name) for name in names}
+
     @property
     def rig(self) -> dict[str, str]:
         """What is stated of a rig."""

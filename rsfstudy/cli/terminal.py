@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -17,7 +18,7 @@ from rsfstudy.cli.console import console, stderr
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.declare.study import Study
-from rsfstudy.errors import DataError, brief
+from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.files import contents
 from rsfstudy.files.comparison import Comparison
 from rsfstudy.measures import Outcome
@@ -26,7 +27,7 @@ from rsfstudy.rig.quantities import STATED
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage
-from rsfstudy.wording import listed, settings, short, stated
+from rsfstudy.wording import counted, listed, settings, short, stated
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure
@@ -92,44 +93,43 @@ def announce(study: Study, output: Path, accuracy: bool, advice: bool) -> None:
 
 @dataclass(frozen=True)
 class Ended:
-    """End of the run of a study.
+    """End of the run of a study, as the summary tells it.
 
     Parameters
     ----------
     study : str
-    seconds : float
+    time : str
         Time it took.
-    wrong : str
-        What went wrong; empty if nothing did.
+    status : str
+        "ok", or what went wrong.
     verdicts : str
         How many claims had which verdict.
-    left_out : str
-        Why it was not run, if it was left out.
+    colour : str
+        Of its status; "red" if anything went wrong.
     """
 
     study: str
-    seconds: float
-    wrong: str = ""
-    verdicts: str = ""
-    left_out: str = ""
+    time: str
+    status: str = "ok"
+    verdicts: str = "-"
+    colour: str = "red"
 
 
 def ended(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> Ended:
     """End of a run, in few words."""
     verdicts, wrong = tables.ended(dataset, runs.check(dataset))
-    wrong += [] if drawn else ["no figure"]
-    return Ended(name, seconds, ", ".join(wrong), verdicts)
+    text = ", ".join([*wrong, *["no figure"] * (not drawn)])
+    colour = "red" if text else "green"
+    return Ended(name, cost.clock(seconds), text or "ok", verdicts or "-", colour)
 
 
 def report(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
     """Print what a run ends with: slopes, claims, failures and where the files are."""
     for table in tables.reductions(dataset):
         layout.show(table)
-    if lacking := tables.unreduced(dataset):
-        console.print(
-            f"no {', '.join(lacking)}: among these cells are none, or too few, to draw on"
-        )
-    claims(dataset)
+    for name, why in tables.unreduced(dataset).items():
+        console.print(f"no {name}: {why}")
+    _verdicts(_claims([dataset]))
     failures(dataset, str(files[0]))
     console.print(f"{end.study}: {tables.tally(dataset)}")
     console.print(f"wrote {' and '.join(map(str, files))}", soft_wrap=True)
@@ -144,8 +144,8 @@ def in_short(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
     for line in (
         *([f"not as declared: {settings(overrides)}"] if overrides else []),
         *tables.in_short(dataset),
-        f"claims: {end.verdicts or 'none applies'}",
-        f"in {cost.clock(end.seconds)}, wrote {' and '.join(map(str, files))}",
+        f"claims: {end.verdicts}",
+        f"in {end.time}, wrote {' and '.join(map(str, files))}",
     ):
         console.print(f"  {line}", soft_wrap=True)
     _moved(runs.check(dataset))
@@ -154,14 +154,8 @@ def in_short(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
 
 def summary(ends: Sequence[Ended]) -> None:
     """Print how several runs ended."""
-    rows, colours = [], []
-    for end in ends:
-        left_out = f"left out: {end.left_out.partition(' (')[0]}" if end.left_out else ""
-        time = "-" if left_out else cost.clock(end.seconds)
-        status = left_out or end.wrong or "ok"
-        row = {"study": end.study, "time": time, "verdicts": end.verdicts or "-", "status": status}
-        rows.append(row)
-        colours.append("yellow" if left_out else "red" if end.wrong else "green")
+    rows = [{n: getattr(end, n) for n in ("study", "time", "verdicts", "status")} for end in ends]
+    colours = [end.colour for end in ends]
     layout.show(Table(rows, prose={"verdicts", "status"}, colours=colours))
 
 
@@ -195,7 +189,7 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
     """Print the cells that failed, and how to reproduce one alone; FAILED if there are any."""
     if undone := tables.undone(dataset):
         size = dataset["status"].size
-        console.print(f"{undone} of {size} cells are not computed yet", style="red")
+        console.print(f"{undone} of {counted(size, 'cell')} not computed yet", style="red")
     failed, places = tables.failures(dataset)
     layout.show(failed)
     if places and file:
@@ -205,16 +199,35 @@ def failures(dataset: xr.Dataset, file: str = "") -> int:
     return FAILED if undone or places else OK
 
 
-def outcome(scene: Scene, ending: Outcome, warned: Sequence[str] = ()) -> int:
-    """Print one cell: warnings, its scene, its numbers and how it ended."""
+def outcome(scene: Scene, ending: Outcome, there: xr.Dataset, warned: Sequence[str] = ()) -> int:
+    """Print one cell: warnings, its scene, its numbers beside those of its file, and how it ended;
+    of an array how many values it has, and their range.
+    """
     for text in warned:
         console.print(text, style="yellow")
-    console.print(stated(scene.as_dict()))
+    console.print(f"{stated(scene.as_dict())}\n")
+    rows = []
     for name, value in ending.values.items():
-        console.print(f"{name} = {value!r}")
+        same = np.array_equal(value, there[name], equal_nan=True)
+        rows.append(
+            {
+                "number": name,
+                "now": _brief(value),
+                "in the file": "same" if same else _brief(there[name]),
+            }
+        )
+    layout.show(Table(rows))
     text = f"{ending.status.label}{': ' * bool(ending.message)}{ending.message}"
     console.print(f"{text} ({ending.rhs_evaluations:,} right-hand sides)")
     return OK if ending.status.is_answer else FAILED
+
+
+def _brief(value: Any) -> str:
+    """A number with all its digits, or how many there are and their range."""
+    finite = np.asarray(value, dtype=float)[np.isfinite(np.asarray(value, dtype=float))]
+    if not np.ndim(value) or not finite.size:
+        return str(value)
+    return f"{np.size(value)} values, {finite.min():.6g} to {finite.max():.6g}"
 
 
 def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
@@ -231,43 +244,53 @@ def write_figure(drawn: Figure, path: Path, style: str | None = None) -> None:
 # ---- verdicts -----------------------------------------------------------------------------------
 
 
-def checked(dataset: xr.Dataset) -> int:
-    """Print the claims and the failed cells; FAILED where a verdict is not the expected one, a cell
-    failed, or none of the study's claims could be held against anything.
+def checked(datasets: Sequence[xr.Dataset], named: Sequence[str] = ()) -> int:
+    """Print the claims and the failed cells of studies; FAILED where a verdict is not the expected
+    one, a cell failed, or what was to be checked could not be.
+
+    Parameters
+    ----------
+    datasets : sequence of xarray.Dataset
+    named : sequence of str
+        Identifiers of claims; all of them must then apply. Else one of all claims must.
     """
-    status = max(claims(dataset), failures(dataset))
-    verdicts = runs.check(dataset)
-    if verdicts.empty or not verdicts["verdict"].eq(NOT_APPLICABLE).all():
-        return status
-    console.print(f"nothing was checked: of {len(verdicts)} claims none applies", style="red")
-    return FAILED
+    found = _claims(datasets)
+    for claim in named:
+        if claim not in (choices := list(dict.fromkeys(found.get("id", ())))):
+            raise InvalidValue("--claim", claim, "is no claim of these results", choices=choices)
+    found = found[found["id"].isin(named)] if named else found
+    others = found[found["verdict"].eq(NOT_APPLICABLE)] if len(found) else found
+    lacking = len(others) if named else len(others) == len(found) > 0
+    return max(_verdicts(found), *map(failures, datasets), FAILED if lacking else OK)
 
 
-def claims(dataset: xr.Dataset) -> int:
-    """Print the claims; FAILED where a verdict is not the expected one."""
-    found = runs.check(dataset)
-    console.print(f"{dataset.attrs['id']} ({dataset.attrs['completeness']})", style="bold")
-    if overrides := contents.declaration(dataset).overrides:
-        console.print(f"not as declared: {settings(overrides)}")
-    nothing = found.empty or found["verdict"].eq(NOT_APPLICABLE).all()
-    if nothing and not tables.undone(dataset):
-        console.print("no claim applies")
-        return OK
-    layout.show(tables.claims(found))
-    return _moved(found)
-
-
-def all_claims(datasets: Sequence[xr.Dataset]) -> int:
-    """Print the claims of several studies in one table, in the order of their identifiers."""
+def _claims(datasets: Sequence[xr.Dataset]) -> pd.DataFrame:
+    """The claims of a study, under what is not as it declares; or those of several studies in the
+    order of their identifiers.
+    """
+    if len(datasets) == 1:
+        about = datasets[0].attrs
+        console.print(f"{about['id']} ({about['completeness']})", style="bold")
+        if overrides := contents.declaration(datasets[0]).overrides:
+            console.print(f"not as declared: {settings(overrides)}")
+        return runs.check(datasets[0])
     frames = [runs.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
     together = pd.concat([frame for frame in frames if len(frame)] or [pd.DataFrame()])
     if together.empty:
-        return OK
+        return together
     number = together["id"].str.extract(r"(\d+)", expand=False).astype(float)
-    ordered = together.assign(number=number).sort_values("number", kind="stable")
-    layout.show(tables.claims(ordered))
-    status, counts = _moved(ordered), ordered["verdict"].value_counts()
-    console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    return together.assign(number=number).sort_values("number", kind="stable")
+
+
+def _verdicts(found: pd.DataFrame) -> int:
+    """Print claims and how many were checked; FAILED where a verdict is not the expected one."""
+    verdicts = found.get("verdict", pd.Series(dtype=str))
+    applies = verdicts.ne(NOT_APPLICABLE)
+    if applies.any():
+        layout.show(tables.claims(found))
+    status = _moved(found)
+    of_each = f": {tables.verdicts_of(found)}" * len(found[:1])
+    console.print(f"{applies.sum()} of {counted(len(found), 'claim')} checked{of_each}")
     return status
 
 
@@ -307,7 +330,7 @@ def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Com
         rows = [(n, *(brief(short(v), _MOST_CHARACTERS) for v in ab)) for n, ab in pairs.items()]
         layout.show(Table([dict(zip(heads, row, strict=True)) for row in rows], prose=heads))
     both, first, second = found.cells
-    console.print(f"{both:,} cells in both, {first:,} only in A, {second:,} only in B")
+    console.print(f"{counted(both, 'cell')} in both, {first:,} only in A, {second:,} only in B")
     for axis, alone in found.points.items():
         for letter, points in zip("AB", alone, strict=True):
             if points:
@@ -320,7 +343,7 @@ def comparison(files: Sequence[Path], datasets: Sequence[xr.Dataset], found: Com
         names = [name for name, reason in found.left_out.items() if reason == why]
         console.print(f"not compared, because {why}: {', '.join(names)}")
     wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
-    wrong += [f"{len(found.statuses)} cells ended otherwise"] * bool(len(found.statuses))
+    wrong += [f"{counted(len(found.statuses), 'cell')} ended otherwise"] * bool(len(found.statuses))
     verdict = "; ".join(wrong) or "nothing differs beyond error estimates"
     if not both:
         verdict = "nothing to compare: no finished cell is in both"

@@ -23,6 +23,7 @@ REPRODUCED = "reproduced"
 DIFFERS = "differs"
 UNDECIDED = "undecided"
 NOT_APPLICABLE = "not applicable"
+VERDICTS = (REPRODUCED, DIFFERS, UNDECIDED, NOT_APPLICABLE)
 
 RELATIONS = ("equals", "below", "above")
 #: Reason of a tolerance of zero where more cannot be asked for.
