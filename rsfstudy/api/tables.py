@@ -212,15 +212,14 @@ def claims(frame: pd.DataFrame) -> Table:
 
 def verdicts_of(found: pd.DataFrame) -> str:
     """How many claims have which verdict."""
-    given = list(found.get("verdict", ()))
+    given = list(found["verdict"])
     return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
 
 
 def ended(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
     """How many claims have which verdict, and what went wrong, in words."""
     wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
-    if len(found):
-        wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
+    wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
     return verdicts_of(found), wrong
 
 

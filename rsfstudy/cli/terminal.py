@@ -256,12 +256,18 @@ def checked(datasets: Sequence[xr.Dataset], named: Sequence[str] = ()) -> int:
     """
     found = _claims(datasets)
     for claim in named:
-        if claim not in (choices := list(dict.fromkeys(found.get("id", ())))):
+        if claim not in (choices := list(dict.fromkeys(found["id"]))):
             raise InvalidValue("--claim", claim, "is no claim of these results", choices=choices)
     found = found[found["id"].isin(named)] if named else found
-    others = found[found["verdict"].eq(NOT_APPLICABLE)] if len(found) else found
-    lacking = len(others) if named else len(others) == len(found) > 0
-    return max(_verdicts(found), *map(failures, datasets), FAILED if lacking else OK)
+    others = found["id"][found["verdict"] == NOT_APPLICABLE]
+    status = max(_verdicts(found), *map(failures, datasets))
+    if len(others) and (named or len(others) == len(found)):
+        which = ", ".join(dict.fromkeys(others))
+        console.print(
+            f"not checked, because they do not apply to these results: {which}", style="red"
+        )
+        return FAILED
+    return status
 
 
 def _claims(datasets: Sequence[xr.Dataset]) -> pd.DataFrame:
@@ -275,28 +281,25 @@ def _claims(datasets: Sequence[xr.Dataset]) -> pd.DataFrame:
             console.print(f"not as declared: {settings(overrides)}")
         return runs.check(datasets[0])
     frames = [runs.check(dataset).assign(study=dataset.attrs["id"]) for dataset in datasets]
-    together = pd.concat([frame for frame in frames if len(frame)] or [pd.DataFrame()])
-    if together.empty:
-        return together
-    number = together["id"].str.extract(r"(\d+)", expand=False).astype(float)
+    together = pd.concat(frames)
+    number = together["id"].astype(str).str.extract(r"(\d+)", expand=False).astype(float)
     return together.assign(number=number).sort_values("number", kind="stable")
 
 
 def _verdicts(found: pd.DataFrame) -> int:
     """Print claims and how many were checked; FAILED where a verdict is not the expected one."""
-    verdicts = found.get("verdict", pd.Series(dtype=str))
-    applies = verdicts.ne(NOT_APPLICABLE)
-    if applies.any():
+    checked = int((found["verdict"] != NOT_APPLICABLE).sum())
+    if checked:
         layout.show(tables.claims(found))
     status = _moved(found)
-    of_each = f": {tables.verdicts_of(found)}" * len(found[:1])
-    console.print(f"{applies.sum()} of {counted(len(found), 'claim')} checked{of_each}")
+    line = f"{checked} of {counted(len(found), 'claim')} checked: {tables.verdicts_of(found)}"
+    console.print(line if len(found) else "no claims")
     return status
 
 
 def _moved(found: pd.DataFrame) -> int:
     """Print the verdicts that are not the expected ones; FAILED if there are any."""
-    others = found[found["moved"]] if len(found) else found
+    others = found[found["moved"]]
     for row in others.itertuples(index=False):
         console.print(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
     return FAILED if len(others) else OK

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from rsfstudy.declare.verdicts import Verdicts
@@ -26,6 +27,11 @@ NOT_APPLICABLE = "not applicable"
 VERDICTS = (REPRODUCED, DIFFERS, UNDECIDED, NOT_APPLICABLE)
 
 RELATIONS = ("equals", "below", "above")
+#: Of a table of claims.
+_COLUMNS = (
+    *("id", "claim", "source", "relation", "published", "ours"),
+    *("tolerance", "reason", "verdict", "expected", "because", "moved"),
+)
 #: Reason of a tolerance of zero where more cannot be asked for.
 INEQUALITY = "an inequality"
 _EXPECTED = (REPRODUCED, DIFFERS)
@@ -176,23 +182,11 @@ def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, A
         ours, verdict = claim.verdict(dataset)
         if moved_base or not _keeps(dataset, claim.variable, overrides):
             verdict = NOT_APPLICABLE
-        rows.append(
-            {
-                "id": claim.id,
-                "claim": claim.statement,
-                "source": claim.source,
-                "relation": claim.relation,
-                "published": claim.published,
-                "ours": ours,
-                "tolerance": claim.tolerance,
-                "reason": claim.reason,
-                "verdict": verdict,
-                "expected": claim.expected,
-                "because": claim.because,
-                "moved": verdict not in (claim.expected, NOT_APPLICABLE),
-            }
-        )
-    return Verdicts(rows)
+        moved = verdict not in (claim.expected, NOT_APPLICABLE)
+        about = claim.id, claim.statement, claim.source, claim.relation, claim.published, ours
+        why = claim.tolerance, claim.reason, verdict, claim.expected, claim.because, moved
+        rows.append((*about, *why))
+    return Verdicts(pd.DataFrame(rows, columns=_COLUMNS).astype({"moved": bool}))
 
 
 def _is_number(value: object) -> bool:
