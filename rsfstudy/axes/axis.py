@@ -74,7 +74,8 @@ class Axis:
             rows = tuple({dimension: plain(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
                 raise InvalidValue(dimension, None, "must be a value on an axis")
-        held = (dimension, rows, labels, units or {}, drawn or {})
+        beside = ({} if mapping is None else mapping for mapping in (units, drawn))
+        held = (dimension, rows, labels, *beside)
         for name, value in zip(self.__dataclass_fields__, held, strict=True):
             object.__setattr__(self, name, value)
         self._check()

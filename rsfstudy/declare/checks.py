@@ -40,7 +40,7 @@ def parts(study: Study) -> None:
         if name in _LISTS and not isinstance(given, list | tuple):
             raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
         for value in given if name in _LISTS else [given]:
-            if not isinstance(value, kind) and (name, value) != ("laboratory", None):
+            if not isinstance(value, kind) and not (name == "laboratory" and value is None):
                 raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
     if not study.axes:
         raise InvalidValue("axes", study.axes, "must hold at least one axis")
