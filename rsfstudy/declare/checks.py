@@ -22,7 +22,7 @@ from rsfstudy.slider.registry import FIELDS, SLOT_NAMES, by_class
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.synonyms import instead_of_field
 from rsfstudy.vocabulary import QUANTITIES
-from rsfstudy.wording import short
+from rsfstudy.wording import listed, short
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -126,10 +126,10 @@ def override(study: Study, axis: Axis, name: str, value: Any) -> None:
         held = by_class({**study.base.as_dict(), **row}, parts)
         if name in row or not held.get(name) or name in without_meaning(held, parts.values()):
             continue
-        some = ", ".join(stating)
+        some = listed(stating, ", ")
         rule = f"is stated by some points of {axis.dimension} alone ({some}), and that of {point} "
         rule += f"is {short(held[name])}: it would stay"
-        remedy = f"Select points of one kind too, as in {axis.dimension}={some}."
+        remedy = f"Select points of one kind too, as in '{axis.dimension}={stating[0]}'."
         raise InvalidValue(name, value, rule, remedy=remedy)
 
 
