@@ -246,7 +246,7 @@ def kinds(rows: Sequence[Row]) -> np.ndarray:
     return np.array([known.setdefault(_kind(row), len(known)) for row in rows])
 
 
-def alike(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+def places_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
     """Rows on each axis that are of one kind, for each combination of kinds."""
     every = [kinds(axis.rows) for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
@@ -308,7 +308,7 @@ def select(axis: Axis, points: Sequence[Any]) -> Axis:
     return axis.with_rows([rows[number] for number in points], axis.units, drawn)
 
 
-def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
     """An axis of several fields whose points that use one of them take new values of it; the
     others stay. Numbered points take one value, and are drawn no more.
     """
@@ -318,22 +318,22 @@ def spread(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             raise InvalidValue(name, values, rule, remedy="Give one value.")
         return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
-    spread: dict[str, Row] = {}
+    points: dict[str, Row] = {}
     for label, row in zip(axis.labels, axis.rows, strict=True):
         if name not in row:
-            spread[label] = row
+            points[label] = row
             continue
         for value in values:
             changed = {**row, name: plain(name, value)}
-            if changed in spread.values():
+            if changed in points.values():
                 continue
             new = f"{name} = {value}"
             if changed == row:
                 new = label
-            elif new in spread or new in axis.labels:
+            elif new in points or new in axis.labels:
                 new = f"{label}, {new}"
-            spread[new] = changed
-    return Axis(axis.dimension, spread, axis.units)
+            points[new] = changed
+    return Axis(axis.dimension, points, axis.units)
 
 
 def check_text(name: str, text: object) -> None:

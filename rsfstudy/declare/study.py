@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, spread
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, with_values
 from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
@@ -27,7 +27,7 @@ from rsfstudy.motion.engines import own_stepper
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig.axes import axis as axis_in_units
-from rsfstudy.rig.axes import in_units, named, numbers_in, si_units
+from rsfstudy.rig.axes import in_units, name_on_axis, numbers_in, si_units
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.lattice import Cells
 from rsfstudy.rig.quantities import ALSO
@@ -302,7 +302,7 @@ class Study:
     def _override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list(value) else [value]
         of_rig = self.laboratory is not None and bool(values)
-        name = named(name, values[0]) if of_rig else name
+        name = name_on_axis(name, values[0]) if of_rig else name
         for index, axis in enumerate(self.axes):
             if changed := self._changed(axis, name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
@@ -328,7 +328,7 @@ class Study:
             return self._axis(name, values, units) if axis.is_plain else select(axis, values)
         if name in axis.fields:
             checks.override(self, axis, name, values)
-            return spread(axis, name, numbers_in(name, values, units) if units else values)
+            return with_values(axis, name, numbers_in(name, values, units) if units else values)
         if ALSO.get(name) not in axis.fields:
             return None
         if axis.labels is not None:

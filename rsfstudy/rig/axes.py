@@ -10,7 +10,7 @@ from rsfstudy.axes.axis import Axis, Row, plain
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.rig.quantities import FULL, OF_AXIS, ON_AXIS, STATED, UNITS, is_friction, units_of
-from rsfstudy.rig.units import exact, factor, parted, spaced
+from rsfstudy.rig.units import exact, factor, number_and_units, spaced
 from rsfstudy.wording import is_list
 
 
@@ -78,7 +78,7 @@ def _converted(
     for row, new in zip(rows, found, strict=True):
         for given, value in row.items():
             example = rows[0][given] if by_column else value
-            name = named(given, example)
+            name = name_on_axis(given, example)
             si = si_units(name, example)
             new[name if si else given] = value
             if si:
@@ -86,7 +86,7 @@ def _converted(
                 ours = _stated_units(value) if by_column else ""
                 stated.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
-                size(given, units[given])  # which refuses what is none of a rig
+                factor_to_si(given, units[given])  # which refuses what is none of a rig
     for name, held in quantities.items():
         numbers = numbers_in(name, [value for _row, value in held], stated[name])
         for (row, _value), number in zip(held, numbers, strict=True):
@@ -96,16 +96,18 @@ def _converted(
 
 def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
     """Values of a quantity in some units, which those have that are plain numbers."""
-    scale, found = size(name, units), []
+    scale, found = factor_to_si(name, units), []
     kind = "1/m" if name == "stiffness" and is_friction(f"1 {units}") else si_units(name, "1")
     for value in values:
-        number, written = parted(value) if isinstance(value, str) else (plain(name, value), units)
+        number, written = (
+            number_and_units(value) if isinstance(value, str) else (plain(name, value), units)
+        )
         if isinstance(number, float) and written == units:
             found.append(number)
         else:
             found.append(float(exact(name, value, str(kind)) / scale))
     wrong = [
-        value for number, value in zip(found, values, strict=True) if not _is_meant(name, number)
+        value for number, value in zip(found, values, strict=True) if not _is_possible(name, number)
     ]
     if wrong:
         of = f", and {len(wrong)} of {len(found)} are not" if len(found) > 1 else ""
@@ -113,14 +115,14 @@ def numbers_in(name: str, values: Sequence[Any], units: str) -> list[float]:
     return found
 
 
-def _is_meant(name: str, number: Any) -> bool:
+def _is_possible(name: str, number: Any) -> bool:
     """False of a quantity of a rig that is not positive."""
     return name not in OF_AXIS or (isinstance(number, float) and number > 0.0)
 
 
-def named(name: str, value: Any) -> str:
+def name_on_axis(name: str, value: Any) -> str:
     """The name on an axis of what bears another in a rig or, as a ratio, in a scene."""
-    quantity = not isinstance(value, str) or parted(value)[0] is not None
+    quantity = not isinstance(value, str) or number_and_units(value)[0] is not None
     if name in ON_AXIS and quantity:
         return ON_AXIS[name]
     if not is_name(name):
@@ -141,10 +143,10 @@ def si_units(name: str, value: Any) -> str | None:
 
 
 def _stated_units(value: Any) -> str:
-    return parted(value)[1] if isinstance(value, str) else ""
+    return number_and_units(value)[1] if isinstance(value, str) else ""
 
 
-def size(name: str, units: str) -> Fraction:
+def factor_to_si(name: str, units: str) -> Fraction:
     """Factor to SI units; of a stiffness that is friction over displacement to 1/m."""
     if name == "stiffness" and is_friction(f"1 {units}"):
         return factor(name, units, "1/m")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, alike
+from rsfstudy.axes.axis import Axis, Row, places_by_kind
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.axes import size
+from rsfstudy.rig.axes import factor_to_si
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.quantities import (
     FIELDS,
@@ -78,7 +78,7 @@ class Cells:
         found, units = dict(self.laboratory.as_dict()), self.units
         for name in OF_AXIS:
             if name in units and row.get(name) is not None:
-                found[OF_AXIS[name]] = times(row[name], size(name, units[name]))
+                found[OF_AXIS[name]] = times(row[name], factor_to_si(name, units[name]))
         in_friction = is_friction(f"1 {units.get('stiffness', '')}")
         if row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
@@ -104,7 +104,7 @@ class Cells:
                 found[name] = value
             elif name not in OF_AXIS:
                 scale = FIELDS[field].scale
-                in_si = times(value, size(name, units[name]))
+                in_si = times(value, factor_to_si(name, units[name]))
                 found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
@@ -134,7 +134,7 @@ class Cells:
         along = [_doubled(a) if a.dimension in alone else a for a in self.axes if a.units]
         shape = tuple(len(axis) for axis in along)
         found: dict[str, np.ndarray] = {}
-        for rows in alike(along):
+        for rows in places_by_kind(along):
             numbers: dict[str, Any] = {}
             for place, axis in enumerate(along):
                 shaped = [-1 if p == place else 1 for p in range(len(along))]

@@ -63,7 +63,7 @@ def number(text: str) -> float | None:
     return float(text) if _NUMBER.fullmatch(text.strip()) else None
 
 
-def parted(text: str) -> tuple[float | None, str]:
+def number_and_units(text: str) -> tuple[float | None, str]:
     """The number that a text begins with, if it does, and the units that follow."""
     match = _NUMBER.match(text.strip())
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
