@@ -127,17 +127,24 @@ class VelocityStep(Recorded):
             raise InvalidValue("record", self.record, "must be at least 1 D_c, and finite")
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Frictions themselves, and a for their differences, here over ln r; slip distances end
-        where friction falls by 1/e of the evolution over D_c.
+        """The numbers themselves, and what a change of friction by a makes of them."""
+        slopes = self._by_friction(self._step(scene).ratio, values)
+        return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
+
+    def _by_friction(self, ratio: float, values: Mapping[str, Any]) -> dict[str, float]:
+        """Change of each number by that of the friction it is read from.
+
+        It is 1/ln r of a, b and a - b. Where an exponential has 1/e left, b ln r, friction falls by
+        b ln r/(e D_c) per displacement.
         """
-        ratio = abs(self._step(scene).ratio)
-        sizes = {about.name: abs(values[about.name]) for about in self.outputs if about.error}
-        for name in ("apparent_a", "apparent_b", "apparent_a_minus_b"):
-            sizes[name] += scene.a / ratio
-        evolution = abs(values["apparent_b"]) * ratio
-        for name in ("apparent_slip_distance", "corrected_slip_distance"):
-            sizes[name] *= 1.0 + math.e * scene.a / evolution
-        return sizes
+        evolved = values["apparent_b"] * ratio
+        over_friction = math.e / evolved if evolved else math.nan
+        return {
+            **dict.fromkeys(self.estimated, 1.0),
+            **dict.fromkeys(("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / ratio),
+            "apparent_slip_distance": over_friction * values["apparent_slip_distance"],
+            "corrected_slip_distance": over_friction * values["corrected_slip_distance"],
+        }
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Numbers read off a motion, and off that from its peak on to where 1/e is left; and once
@@ -147,7 +154,7 @@ class VelocityStep(Recorded):
         step = self._step(scene)
         records = [self._follow(scene, step, a, meter) for a in (accuracy, accuracy.refined())]
         (record, values), (_again, again) = records
-        errors = errors_of(values, again, _by_friction(step, values), scene, accuracy)
+        errors = errors_of(values, again, self._by_friction(step.ratio, values), scene, accuracy)
         found = {**values, **errors, **self._shown(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"
@@ -231,18 +238,6 @@ class VelocityStep(Recorded):
             "load_point_displacement": step.after * path.pop("time"),
             **path,
         }
-
-
-def _by_friction(step: _Step, values: Mapping[str, float]) -> dict[str, float]:
-    """Change of each number by that of the friction it is read from.
-
-    Where an exponential has 1/e left, b ln r, it falls by b ln r/(e D_c) per displacement.
-    """
-    effects = dict.fromkeys(("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / step.ratio)
-    evolved = values["apparent_b"] * step.ratio
-    over_friction = math.e / evolved if evolved else math.nan
-    distances = ("apparent_slip_distance", "corrected_slip_distance")
-    return dict.fromkeys(values, 1.0) | effects | {n: over_friction * values[n] for n in distances}
 
 
 def _departure(scene: Scene, step: _Step, record: Record) -> float:
