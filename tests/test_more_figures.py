@@ -9,7 +9,8 @@ import rsfstudy
 from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.plots import _text
+from rsfstudy.plots import _text, lines
+from rsfstudy.status import Status
 
 
 def test_the_picture_of_a_motion_is_printable():
@@ -70,6 +71,38 @@ def test_nothing_is_drawn_where_nothing_came_out():
     assert len(plots.figure(dataset, panels).axes) == 2
     dataset["status"] = dataset["status"].where(~failed, np.int8(20))
     assert len(plots.figure(dataset, panels).axes) == 1
+
+
+def test_where_nothing_was_measured_the_statuses_are_drawn():
+    dataset = stiffnesses()
+    numbers = [n for n, values in dataset.data_vars.items() if values.dtype.kind == "f"]
+    nothing = dataset.assign({n: dataset[n] * np.nan for n in numbers})
+    nothing["status"] = dataset["status"].copy(data=np.full((2, 2), int(Status.NO_STEADY_STATE)))
+    nothing["status"].attrs = dataset["status"].attrs
+    (axes,) = plots.figure(nothing).axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["no steady state"]
+
+
+def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
+    """Three fifths of the figure are the panel's, where a legend as wide as all leaves it less than
+    half.
+    """
+    axes = [
+        Axis("law", ["slip", "slowness"]),
+        Axis("phi", np.linspace(50.0, 65.0, 8)),
+        Axis("alpha", np.linspace(0.0, 0.5, 9)),
+        Axis("normal_stress", ["constant", "variable", "imposed"]),
+    ]
+    dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
+    drawn = plots.figure(dataset, plots.Declared(lines.panels(dataset, "critical_stiffness")))
+    assert drawn.axes[0].get_position().width > 0.55
+
+
+def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
+    dataset, _path = named_results("uncertain_recurrence", tmp_path_factory)
+    drawn = plots.figure(dataset, variable="recurrence_interval_error")
+    checks.assert_printable(drawn)
+    assert drawn.axes[1].get_ylabel().startswith("error of\nrecurrence")
 
 
 def test_errors_too_small_to_show_are_left_out():

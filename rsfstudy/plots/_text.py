@@ -90,8 +90,10 @@ def _is_math(text: str) -> bool:
 
 def wrapped(text: str, width: int) -> str:
     """Text in lines of `width` characters at most, never broken within a formula, nor within
-    ``x = 2 y``.
+    ``x = 2 y``; its own lines stay apart.
     """
+    if "\n" in text:
+        return "\n".join(wrapped(line, width) for line in text.split("\n"))
     words: list[str] = []
     for word in _WORD.findall(text):
         last = words[-1].split()[-2:] if words else [""]

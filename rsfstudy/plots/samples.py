@@ -56,8 +56,9 @@ def _fields(dataset: xr.Dataset) -> dict[str, list[str]]:
 
 def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
     by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
+    few_ticks = partial(_few_ticks, _TICKS - x.endswith("_error"))
     if x == y:
-        marks: list[Draw] = [partial(histogram, x, list(by)), _few_ticks]
+        marks: list[Draw] = [partial(histogram, x, list(by)), few_ticks]
         return Panel(marks=marks, x_label=_label(dataset, x), y_label="Number", title="")
     return Panel(
         x=x,
@@ -65,7 +66,7 @@ def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
         by=list(by),
         points=True,
         style=_POINTS,
-        marks=[_few_ticks],
+        marks=[few_ticks],
         title="",
         x_label=_label(dataset, x),
         y_label=_label(dataset, y),
@@ -73,17 +74,19 @@ def _panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
 
 
 def _label(dataset: xr.Dataset, name: str) -> str:
-    """Symbol and units, in short lines: panels are small."""
+    """Symbol and units, in short lines: panels are small, and the power of ten of the numbers along
+    an axis stands beside the first line.
+    """
     about = quantity(name.removesuffix("_error"), stated_by(dataset))
-    error = "error of " * name.endswith("_error")
     units = "" if about.units in ("", "1") or about.scale else f" ({with_powers(about.units)})"
-    return wrapped(f"{error}{symbol(about)}{units}", _WIDTH)
+    text = wrapped(f"{symbol(about)}{units}", _WIDTH)
+    return f"error of\n{text}" if name.endswith("_error") else text
 
 
-def _few_ticks(_dataset: xr.Dataset, axes: Axes) -> None:
-    """A mark: ticks that do not touch each other."""
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(_TICKS))
+def _few_ticks(along_x: int, _dataset: xr.Dataset, axes: Axes) -> None:
+    """A mark: ticks that do not touch each other; errors have long numbers."""
+    axes.xaxis.set_major_locator(MaxNLocator(along_x))
+    axes.yaxis.set_major_locator(MaxNLocator(_TICKS))
 
 
 def histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
