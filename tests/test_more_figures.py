@@ -10,6 +10,7 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text, lines
+from rsfstudy.rig.scales import Scale, scaled
 from rsfstudy.status import Status
 
 
@@ -96,6 +97,22 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
     drawn = plots.figure(dataset, plots.Declared(lines.panels(dataset, "critical_stiffness")))
     assert drawn.axes[0].get_position().width > 0.55
+
+
+def test_more_panels_than_can_be_read_are_lines_or_maps():
+    """Seven panels, at each of two points of an axis that they do not know."""
+    many = plots.Declared([Panel(x="weakening", y="critical_stiffness", by=["phi"])] * 7)
+    dataset = run(stiffnesses().rsf.study.with_(alpha=[0.2, 0.5]))
+    assert len(plots.figure(dataset.isel(alpha=[0]), many).axes) == 7
+    assert len(plots.figure(dataset, many).axes) < 7
+
+
+def test_what_is_in_units_is_called_no_ratio():
+    held = {"scale": "D_c", "units": "1", "long_name": "load point displacement"}
+    ratio = xr.Dataset({"moved": ((), 2.0, {**held, "symbol": r"$\delta_0/D_c$"})})
+    scales = {"D_c": Scale(10.0, "um"), "V_*": Scale(1.0, "um s-1")}
+    moved = scaled(ratio, scales)["moved"]
+    assert moved.attrs == {"units": "um", "long_name": "load point displacement"}
 
 
 def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
