@@ -82,18 +82,16 @@ class Cheapest(Reduction):
         cheapest = xr.DataArray(names, dims="n")[work.fillna(np.inf).argmin("integrator")]
         by_default = work.sel(default, drop=True)
         result = {
-            "integrator": cheapest.where(work.notnull().any("integrator"), "none"),
-            "work": least,
-            "default_work": by_default,
-            "default_time": time.sel(default, drop=True),
-            "default_request": asked.sel(default, drop=True),
-            "ratio": by_default / least,
-            "relative": work / by_default,
+            "_integrator": cheapest.where(work.notnull().any("integrator"), "none"),
+            "_work": least,
+            "_default_work": by_default,
+            "_default_time": time.sel(default, drop=True),
+            "_default_request": asked.sel(default, drop=True),
+            "_ratio": by_default / least,
+            "_relative": work / by_default,
         }
         note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"
-        return xr.Dataset(
-            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in result.items()}
-        )
+        return self.results(note, result)
 
 
 def _at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:

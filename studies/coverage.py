@@ -199,15 +199,12 @@ class Covered(Reduction):
         with np.errstate(divide="ignore"):
             tightness = (1.0 / ratios).median(over)
         statistics = {
-            "share": (ratios <= 1.0).sum(over) / numbers.where(numbers > 0),
-            "worst": ratios.max(over),
-            "typical": tightness,
-            "numbers": numbers,
+            "_share": (ratios <= 1.0).sum(over) / numbers.where(numbers > 0),
+            "_worst": ratios.max(over),
+            "_typical": tightness,
+            "_numbers": numbers,
         }
-        note = f"{self.of} over {', '.join(map(str, over))}"
-        return xr.Dataset(
-            {f"{self.name}_{k}": v.assign_attrs(comment=note) for k, v in statistics.items()}
-        )
+        return self.results(f"{self.of} over {', '.join(map(str, over))}", statistics)
 
 
 #: Errors this far below and above their estimates are drawn there.

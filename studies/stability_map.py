@@ -111,21 +111,19 @@ class CyclingEdge(Reduction):
         along = [d for d in dataset[self.across].dims if d in linear.dims]
         whole = ~lost.any(along)
         made = {
-            self.name: edge,
-            f"{self.name}_error": 0.5 * width.where(crossings == 1),
-            f"{self.name}_stable": stable,
-            f"{self.name}_unstable": unstable,
-            f"{self.name}_crossings": crossings,
-            f"{self.name}_linear": linear,
-            f"{self.name}_farthest": (abs(edge - linear) / width).max(along).where(whole),
-            f"{self.name}_misplaced": misplaced.sum([dimension, *along]).where(whole),
+            "": edge,
+            "_error": 0.5 * width.where(crossings == 1),
+            "_stable": stable,
+            "_unstable": unstable,
+            "_crossings": crossings,
+            "_linear": linear,
+            "_farthest": (abs(edge - linear) / width).max(along).where(whole),
+            "_misplaced": misplaced.sum([dimension, *along]).where(whole),
         }
         note = f"between cells with a number and without one in {self.of}, along {_STIFFNESS}"
         if bool(failed(dataset["status"]).any()):
             note += "; cells along it failed or are missing"
-        return xr.Dataset(
-            {name: values.assign_attrs(comment=note) for name, values in made.items()}
-        )
+        return self.results(note, made)
 
 
 def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray | None:

@@ -58,6 +58,11 @@ class Reduction:
         """The new variables."""
         raise TypeError(f"{type(self).__name__} reduces nothing")
 
+    def results(self, comment: str, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
+        """The new variables, by what follows `name` in their names, with how they came about."""
+        described = {end: found.assign_attrs(comment=comment) for end, found in values.items()}
+        return xr.Dataset({f"{self.name}{end}": found for end, found in described.items()})
+
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """The worst status among the cells that each result draws on, from the status of all cells;
         `worst` removes the dimensions that the results do not have.

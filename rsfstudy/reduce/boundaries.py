@@ -59,18 +59,14 @@ class Boundary(Reduction):
         stable, unstable, crossings = self.bracketed(values)
         once = crossings == 1
         note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
-        result = xr.Dataset(
-            {
-                self.name: (0.5 * (stable + unstable)).where(once),
-                f"{self.name}_error": (0.5 * abs(unstable - stable)).where(once),
-                f"{self.name}_stable": stable,
-                f"{self.name}_unstable": unstable,
-                f"{self.name}_crossings": crossings,
-            }
-        )
-        for name in result:
-            result[name].attrs["comment"] = note
-        return result
+        found = {
+            "": (0.5 * (stable + unstable)).where(once),
+            "_error": (0.5 * abs(unstable - stable)).where(once),
+            "_stable": stable,
+            "_unstable": unstable,
+            "_crossings": crossings,
+        }
+        return self.results(note, found)
 
     def bracketed(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
         """The cells that say no and yes next to the first change of the answer along `on`, and how

@@ -69,19 +69,16 @@ class LinearFit(Reduction):
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
         known = (count >= self.unknowns) & ~refused(support, self.of, dimension)
-        result = xr.Dataset(
-            {
-                self.name: slope.where(known),
-                f"{self.name}_stderr": error.where(known),
-                f"{self.name}_misfit": largest.where(known),
-                f"{self.name}_points": count.astype("int32"),
-            }
-        )
+        found = {
+            "": slope.where(known),
+            "_stderr": error.where(known),
+            "_misfit": largest.where(known),
+            "_points": count.astype("int32"),
+        }
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
         law = self.law.format(**vars(self))
-        for name in result:
-            result[name].attrs["comment"] = f"least squares of {law} over {span}"
+        result = self.results(f"least squares of {law} over {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
