@@ -74,14 +74,6 @@ def mark_reversed(_dataset: xr.Dataset, axes: Axes) -> None:
     """
     lowest, highest = axes.get_ylim()
     if lowest < 0.0:
-        axes.axhspan(
-            lowest,
-            0.0,
-            facecolor="0.95",
-            edgecolor="0.6",
-            linewidth=0.0,
-            hatch="////",
-            zorder=0,
-            label="below 0: stress reversed",
-        )
+        grey = {"facecolor": "0.95", "edgecolor": "0.6", "linewidth": 0.0, "zorder": 0}
+        axes.axhspan(lowest, 0.0, hatch="////", label="below 0: stress reversed", **grey)
         axes.set_ylim(lowest, highest)

@@ -66,15 +66,10 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     for number, process in enumerate(dataset["process"].values):
         for prefix, fill in (("", "full"), ("naive_", "none")):
             share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
-            axes.plot(
-                places + 0.15 * (number - 0.5 * (dataset.sizes["process"] - 1)),
-                share,
-                marker=marker(number),
-                color=look(number)["color"],
-                linestyle="",
-                fillstyle=fill,
-                label=f"{process}{', naive' * bool(prefix)}",
-            )
+            beside = 0.15 * (number - 0.5 * (dataset.sizes["process"] - 1))
+            style = {"color": look(number)["color"], "linestyle": "", "fillstyle": fill}
+            text = f"{process}{', naive' * bool(prefix)}"
+            axes.plot(places + beside, share, marker=marker(number), label=text, **style)
     axes.axhline(100.0 * ONE, color="0.4", linestyle="--", linewidth=0.8)
     names = [MODEL[str(name)].symbol or str(name) for name in dataset["parameter"].values]
     axes.set_xticks(places, names)

@@ -193,10 +193,7 @@ study = Study(
             "slip", 0.56, 1.0, 3e-5, "a finite norm leaves exp(-10.9 (b/a - 1)/(q k^)) = 3e-5 of it"
         ),
         closed_form("slowness", 0.56, 0.25, 2e-9, EXACT),
-        limit("slip", IMPOSED),
-        limit("slip", STRONG),
-        limit("slowness", IMPOSED),
-        limit("slowness", STRONG),
+        *(limit(law, case) for law in EXPONENTS for case in (IMPOSED, STRONG)),
         Claim(
             id="N2",
             statement="slip law, imposed, alpha = 0.56: how that limit is left, by k/k_cr",
@@ -207,8 +204,7 @@ study = Study(
             tolerance=0.02 * TAKEN * base.a / (2.0 * FRICTION**2),
             reason="the third order, over stiffnesses up to 0.5 k_cr",
         ),
-        weaker("slip"),
-        weaker("slowness"),
+        *map(weaker, EXPONENTS),
         Claim(
             id="N4",
             statement="slip law, imposed, alpha = 0, k = k_cr: Coulomb stress is exact, mu' = mu_*",

@@ -91,15 +91,15 @@ def at_threshold(law: str, phase: float) -> Claim:
     )
 
 
-def on_the_flank(law: str, period: float) -> Claim:
+def on_the_flank(law: str) -> Claim:
     """W3: strong waves, which raise Coulomb stress faster than the load point does."""
     return Claim(
         id="W3",
-        statement=f"{words(law, period, 0.9)}, A = {LARGEST:g}: triggered where Coulomb stress "
+        statement=f"{words(law, WAVES, 0.9)}, A = {LARGEST:g}: triggered where Coulomb stress "
         "reaches its threshold, to within the time of nucleation",
         source="K V_0 (t - t_1) = mu dsigma/sigma_*",
         variable="coulomb_ratio",
-        where=place(law, period, LARGEST, 0.9),
+        where=place(law, WAVES, LARGEST, 0.9),
         published=1.0,
         tolerance=NUCLEATION / 5.0,
         reason="a sigma/(k V_0) over a clock advance of 5 D_c/V_*",
@@ -188,9 +188,9 @@ study = Study(
         ),
         *(is_linear(law, FAST_WAVES, 0.9) for law in LAWS),
         *(at_threshold(law, 0.5) for law in LAWS),
-        *(on_the_flank(law, period) for law in LAWS for period in (WAVES,)),
-        *(forgets(amplitude) for amplitude in AMPLITUDES),
-        *(misleads(law) for law in LAWS),
+        *map(on_the_flank, LAWS),
+        *map(forgets, AMPLITUDES),
+        *map(misleads, LAWS),
     ],
     plot=figure,
     references=[
