@@ -13,6 +13,7 @@ from running import call, run, same_numbers
 
 import rsfstudy
 from rsfstudy.compute import provenance
+from rsfstudy.declare import catalogue
 from rsfstudy.files import contents
 from rsfstudy.status import Status
 
@@ -40,6 +41,17 @@ def test_results_open_check_and_plot(name, older, tmp_path):
     assert (drawn.returncode, drawn.stderr) == (0, "")
     assert call("show", older / name).returncode == (name == "displacement_boundary.nc")
     assert rsfstudy.compare(dataset, dataset).agrees
+
+
+def test_a_range_was_a_spread():
+    narrow = {"law": "slip", "normal_stress": "constant", "load_velocity_ratio": [0.5, 2.0]}
+    dataset = run(catalogue.load("rigid_response").with_(**narrow), rtol=1e-3)
+    ranged = dataset.rsf.study.reductions
+    described = json.loads(dataset.attrs["declaration"])
+    spread = described["reductions"][1]
+    spread |= {"kind": "spread", "on": spread.pop("over")}
+    again = dataset.assign_attrs(declaration=json.dumps(described))
+    assert again.rsf.study.reductions == ranged
 
 
 def test_they_hold_what_they_held(older):

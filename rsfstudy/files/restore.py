@@ -189,6 +189,8 @@ def measure(described: PlainMeasure, path: str) -> Measure:
 
 def _reduction(described: PlainReduction, path: str) -> Reduction:
     values: dict[str, Any] = dict(described)
+    if values["kind"] == "spread":  # what a range of a part of a coordinate was called
+        values |= {"kind": "range", "over": values.pop("on", "")}
     kind = _kind("reduction", Reduction, reduce, values.pop("kind"))
     made: Reduction = restored(values, kind, path)
     return made
