@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any
@@ -24,6 +26,10 @@ from rsfstudy.slider.scene import Scene
 _ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
 _LIMITS = types.UniTuple(types.float64, len(Limits._fields))
 _PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY, _ARRAY))
+
+
+#: The many objects of a compiler take a third of a second to be looked through as a process ends.
+atexit.register(gc.freeze)
 
 
 class Compiled:
