@@ -101,10 +101,11 @@ def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
         top = _top_of_closed_orbit(scene, accuracy, meter)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
-    first = _orbit(scene, steady, None, accuracy, meter)
+    first = _orbit(scene, steady, None, accuracy, meter, heavy=heavy)
     reached = first.reached
     if first.slow_growth_at is not None:
-        reached = _grows_to_the_norm(scene, steady, first.slow_growth_at, accuracy, meter)
+        at = first.slow_growth_at
+        reached = _grows_to_the_norm(scene, steady, at, accuracy, meter, heavy=heavy)
     excess = _excess(first, norm, heavy=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
@@ -195,13 +196,13 @@ def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool
 
 
 def _grows_to_the_norm(
-    scene: Scene, steady: _Steady, at: Point, accuracy: Accuracy, meter: Meter
+    scene: Scene, steady: _Steady, at: Point, accuracy: Accuracy, meter: Meter, *, heavy: bool
 ) -> bool:
     """Leap from a slowly growing orbit to larger ones, until one shrinks or grows up to the norm.
 
     An orbit counts as grown to the norm only if its first peak was below it.
     """
-    if not mass_acts(scene, accuracy) and _shrinks_at_the_norm(scene, accuracy, meter):
+    if not heavy and _shrinks_at_the_norm(scene, accuracy, meter):
         return False
     leap = _LEAP
     while True:
@@ -212,7 +213,7 @@ def _grows_to_the_norm(
             )
         )
         beyond = on_slow_manifold(scene, spring_stress, tuple(psis))
-        orbit = _orbit(scene, steady, beyond, accuracy, meter)
+        orbit = _orbit(scene, steady, beyond, accuracy, meter, heavy=heavy)
         if orbit.reached and len(orbit.peaks) == 1 and leap > _SHORTEST_LEAP:
             leap = math.sqrt(leap)
         elif orbit.slow_growth_at is None:
@@ -222,12 +223,18 @@ def _grows_to_the_norm(
 
 
 def _orbit(
-    scene: Scene, steady: _Steady, start: Point | None, accuracy: Accuracy, meter: Meter
+    scene: Scene,
+    steady: _Steady,
+    start: Point | None,
+    accuracy: Accuracy,
+    meter: Meter,
+    *,
+    heavy: bool,
 ) -> _Orbit:
     """Follow one orbit until it is certain how it goes on, or found to grow too slowly to
     follow.
     """
-    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
+    norm = scene.log_norm_rate
     specs = [_TOP] if heavy else [_TOP, rise("log_slip_rate", norm)]
     levels = levels_of_rise(scene) if steady.stable else []
     specs += [settling(_CLOSE), *levels] if steady.stable else []
