@@ -243,10 +243,9 @@ def _scales(orbit: Orbit) -> np.ndarray:
 
     Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
     """
-    numbers = orbit.numbers
-    scales = np.abs(numbers)
-    scales[-2:] = np.maximum(scales[-2:], 0.5 * (numbers[-1] - numbers[-2]))
-    return np.asarray(scales)
+    *others, slowest, fastest = orbit.numbers.tolist()
+    half = 0.5 * (fastest - slowest)
+    return np.array([*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)])
 
 
 def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:

@@ -139,7 +139,7 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Rows up to one within a step, or at its end, evenly spaced in what is left of the step, whose
     rows in the table they replace. Its time tells where in the step it is.
     """
-    after = int(np.searchsorted(table[:, 0], last[0]))
+    after = int(table[:, 0].searchsorted(last[0]))
     place = int(table[after, PLACE]) if after < len(table) else 0
     begin = after - place
     if not place or begin + SAMPLES >= len(table):  # nothing was recorded beyond it
@@ -150,10 +150,10 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
         sides = (place - 1.0) / HALF - 1.0, place / HALF - 1.0
         if _polynomial(sides[0], late) < 0.0 < _polynomial(sides[1], late):
             part = HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
-    within = part / SAMPLES * np.arange(1.0, SAMPLES)
+    within = part / SAMPLES * _PLACES[1:-1]
     step = table[begin + 1 : begin + SAMPLES + 1]
     step[:-1], step[-1] = _weights(within).T @ table[begin : begin + SAMPLES + 1], last
-    step[:, REGIME], step[:, PLACE] = last[REGIME], range(1, SAMPLES + 1)
+    step[:, REGIME], step[:, PLACE] = last[REGIME], _PLACES[1:]
     return table[: begin + SAMPLES + 1]
 
 
@@ -261,7 +261,7 @@ def at_rows(columns: np.ndarray, at: np.ndarray, found: np.ndarray) -> None:
     begin = after - within
     part = at - begin
     columns = columns[: len(found)]
-    around = columns.take(begin + np.arange(SAMPLES + 1)[:, None], axis=1, mode="clip")
+    around = columns.take(begin + _PLACES[:, None], axis=1, mode="clip")
     np.einsum("kp,ckp->cp", _weights(part), around, out=found)
     at_a_row = np.flatnonzero(part == np.rint(part))
     found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
@@ -273,7 +273,7 @@ def at_rows(columns: np.ndarray, at: np.ndarray, found: np.ndarray) -> None:
 _PATH = tuple(OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_stress"))
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
-HALF = 0.5 * SAMPLES
+HALF, _PLACES = 0.5 * SAMPLES, np.arange(SAMPLES + 1)
 _INVERSE = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
 COEFFICIENTS = tuple(tuple(row) for row in _INVERSE.tolist())
 
@@ -288,7 +288,4 @@ def _polynomial(at: float, coefficients: Sequence[float]) -> float:
 
 def _weights(parts: np.ndarray) -> np.ndarray:
     """Weights of the values at the places of a step, a row each, at parts of it in places."""
-    powers, from_middle = np.ones((SAMPLES + 1, len(parts))), parts / HALF - 1.0
-    for power in range(SAMPLES):
-        np.multiply(powers[power], from_middle, out=powers[power + 1])
-    return np.asarray(_INVERSE.T @ powers)
+    return np.asarray(_INVERSE.T @ (parts / HALF - 1.0) ** _PLACES[:, None])
