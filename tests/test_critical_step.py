@@ -20,11 +20,12 @@ from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.engines import COMPILED, SCIPY, of_floats
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.regimes import error_of_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
+from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT, FALL = "load_velocity_ratio", "displacement_step", "normal_stress_step"
@@ -370,6 +371,23 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
     point = system.at(start)
     assert point.log_slip_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
     assert point.growth == pytest.approx(0.0, abs=1e-11)
+
+
+@pytest.mark.parametrize("normal_stress", ["constant", "variable"])
+@pytest.mark.parametrize("law", ["slip", "slowness"])
+def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_stress):
+    """The engine that compiles compiles what the search evaluates; sums may be rounded together
+    there, which the state, a difference of numbers below ten, shows.
+    """
+    for load in (1e-3, 1.5, 40.0):
+        scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
+        paths = [CriticalPath.of(scene, engine) for engine in (SCIPY, COMPILED)]
+        plain, compiled = (path.tangency for path in paths)
+        assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
+        begin = (0.01, -0.02), paths[0].p
+        at = [of_floats(path.point_of, path.engine, *begin)(*begin) for path in paths]
+        assert all(isinstance(point, Point) for point in at)
+        assert np.hstack(at[1]) == pytest.approx(np.hstack(at[0]), rel=1e-11, abs=1e-14)
 
 
 def test_a_root_is_that_of_the_same_method_elsewhere():

@@ -11,7 +11,6 @@ from scipy.optimize import newton
 
 from rsfstudy.motion import handover
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.meter import Halt
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
@@ -116,14 +115,9 @@ def at_rate(scene: Scene, point: Point, log_slip_rate: float) -> Point:
     return point._replace(log_slip_rate=log_slip_rate, friction=friction)
 
 
-def on_slow_manifold(
-    scene: Scene, spring_stress: float, psis: Numbers, engine: str = SCIPY
-) -> Point:
+def on_slow_manifold(scene: Scene, spring_stress: float, psis: Numbers) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
-    slow = between_ruptures(scene, clock=False)
-    given = (spring_stress, *psis), slow.p
-    now: Point = of_floats(point_of(slow.rate, slow.point), engine, *given)(*given)
-    return now
+    return between_ruptures(scene, clock=False).at((spring_stress, *psis))
 
 
 @cache
