@@ -218,7 +218,7 @@ def spread_along_path(  # type: ignore[no-untyped-def]
 def put_nearest(at: Any, place: float) -> None:
     """Put a place among others that rise where the nearest of those between the ends is."""
     nearest = 1
-    while nearest < len(at) - 2 and abs(at[nearest + 1] - place) < abs(at[nearest] - place):
+    while nearest < len(at) - 2 and abs(at[nearest + 1] - place) <= abs(at[nearest] - place):
         nearest += 1
     if nearest < len(at) - 1:
         at[nearest] = place

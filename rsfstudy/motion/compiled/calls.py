@@ -73,6 +73,9 @@ def at_rows(columns, at, found):
     """Fill in values of columns between rows (see `recording.at_rows`)."""
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES + 1)
     for i in range(len(at)):
+        if not 0.0 <= at[i] <= last:  # of a record that is not finite
+            found[:, i] = math.nan
+            continue
         after = math.ceil(at[i])
         within = int(columns[PLACE, after])
         begin = after - (within or min(after, 1))
