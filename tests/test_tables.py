@@ -1,15 +1,19 @@
 """Tables that commands print break no number, name or heading, however narrow the terminal."""
 
+import numpy as np
 import pytest
 import xarray as xr
 from running import call, named_results
 from test_shown import rows as of_html
 
 import rsfstudy
+from rsfstudy import Scene
 from rsfstudy.api import runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import layout, terminal
 from rsfstudy.declare import catalogue, names
+from rsfstudy.declare.wording import settings
+from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
 WIDTHS = (40, 80)
@@ -102,3 +106,20 @@ def test_notebooks_show_the_same_claims(tmp_path_factory):
     told = tables.claims(found).rows
     assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
     assert call("check", _path).returncode == 0
+
+
+def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printed):
+    orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
+    there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
+    now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
+    told = printed(80, terminal.outcome, Scene(), now, there)
+    lines = [" ".join(line.split()) for line in told]
+    assert "interval 1.5 same" in lines
+    assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines
+
+
+def test_overrides_are_told_with_the_digits_a_reader_wants():
+    """Labels and names with digits stay as they are."""
+    given = {"hold_time": ["464.15888336127773 s", "1e4 s"], "case": "alpha = 0.56", "a": 0.01}
+    told = "hold_time=464.159 s,1e4 s, case=alpha = 0.56, a=0.01"
+    assert settings(given) == told
