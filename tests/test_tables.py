@@ -12,9 +12,9 @@ from rsfstudy.api import runs, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import layout, terminal
 from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.wording import settings
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
+from rsfstudy.wording import settings
 
 WIDTHS = (40, 80)
 
