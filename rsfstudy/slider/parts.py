@@ -61,6 +61,10 @@ class Part:
     #: hold those: a part with one of them of its own inherits no conclusion from another's.
     conclusions: ClassVar[tuple[str, ...]] = ()
     equations: ClassVar[frozenset[str]] = frozenset()
+    #: Unknowns of a fluid or a loading, and the functions of them (see `fluid.Fluid`).
+    unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    auxiliary_rates: ClassVar[Function | None] = None
+    auxiliary_steady_states: ClassVar[Function | None] = None
     #: Where values of other parts of the slot have no meaning, and what would give them one.
     no_meaning: ClassVar[tuple[str, str]] = ("", "")
 
@@ -93,7 +97,7 @@ class Part:
     @classmethod
     def functions(cls) -> tuple[str, ...]:
         """Names of the functions that the part must state."""
-        return ()
+        return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider.parts import Function, Numbers, Part, found_in
+from rsfstudy.slider.parts import Numbers, Part, found_in
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,9 +25,6 @@ class Fluid(Part):
 
     conclusions = ("highest_pressure",)
     equations = frozenset({"auxiliary_rates", "numbers"})
-    unknowns: ClassVar[tuple[Quantity, ...]] = ()
-    auxiliary_rates: ClassVar[Function | None] = None
-    auxiliary_steady_states: ClassVar[Function | None] = None
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite
@@ -43,10 +38,6 @@ class Fluid(Part):
             The unknowns of the fluid now.
         """
         return math.inf
-
-    @classmethod
-    def functions(cls) -> tuple[str, ...]:
-        return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
 
 PARTS = found_in(__name__, __path__)

@@ -10,16 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider.parts import (
-    NOT_NEGATIVE,
-    Function,
-    Numbers,
-    Part,
-    Scene,
-    found_in,
-    number,
-)
+from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Part, Scene, found_in, number
 
 
 class Segment(NamedTuple):
@@ -75,19 +66,12 @@ class Loading(Part):
     and is what the last one does. Others are without unknowns.
     """
 
-    unknowns: ClassVar[tuple[Quantity, ...]] = ()
     #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
     #: motion, less what stands as third of its numbers.
     displaces: ClassVar[bool] = False
     #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
-    auxiliary_rates: ClassVar[Function | None] = None
-    auxiliary_steady_states: ClassVar[Function | None] = None
-
-    @classmethod
-    def functions(cls) -> tuple[str, ...]:
-        return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
     def begins(self, scene: Scene) -> Numbers:
         """Initial values of its unknowns."""
