@@ -5,7 +5,6 @@ What is tried is drawn from signatures, options and the parts of a dataset, with
 is tried too.
 """
 
-import bdb
 import contextlib
 import inspect
 import io
@@ -29,7 +28,6 @@ from rsfstudy import Axis, Laboratory, Scene, Study, read_record
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.cli import command_line
 from rsfstudy.declare.claims import Claim
-from rsfstudy.doors import door
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.files import journal
 from rsfstudy.measures.linear_stability import LinearStability
@@ -375,11 +373,3 @@ def test_an_error_is_one_line_whatever_it_shows():
     error = InvalidValue("name\n\x1b[31m", "value\r\0" * 10**6, "must be\nshort")
     assert str(error).isprintable()
     assert len(str(error)) < 6000
-
-
-def test_who_quits_a_debugger_leaves():
-    def quits():
-        raise bdb.BdbQuit
-
-    with pytest.raises(bdb.BdbQuit):
-        door(quits)()

@@ -280,6 +280,15 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     assert 1.0 < fit.autocorrelation_time < 20.0
 
 
+def test_a_chain_that_is_too_short_is_refused() -> None:
+    one, options = record(seed=4, count=200), {"laws": ["slowness"], **OPTIONS}
+    enough = int(rsfstudy.fit(one, **options).rhs_evaluations.item()) + 20_000
+    with pytest.warns(Incomplete):
+        fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
+    assert fit.rsf.table().status.item() == "work_budget_spent"
+    assert np.isnan(fit.posterior).all()
+
+
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
     with pytest.raises(InvalidValue, match=r"needs emcee.*pip install 'rsfstudy\[posterior\]'"):
