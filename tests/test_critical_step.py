@@ -159,7 +159,8 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
         value, exact = loose.values[name], tight.values[name]
         allowed = loose.values[f"{name}_error"] + tight.values[f"{name}_error"]
         assert abs(value - exact) <= allowed
-        assert loose.values[f"{name}_stable"] < value < loose.values[f"{name}_unstable"]
+        # all three are one where the jump of slip rate at the step itself is critical
+        assert loose.values[f"{name}_stable"] <= value <= loose.values[f"{name}_unstable"]
 
 
 # ---- a second formulation
