@@ -162,8 +162,9 @@ def _cycle(
         return None
     start = ReturnMap(free, accuracy, meter).point(approach.orbit.begin)
     motion = follow(free, accuracy, meter, _watches(free), start=start, clock=True)
+    begin = next(motion).point  # all of it
     first, second = _events(motion, 2)
-    return start, (first, second)
+    return begin, (first, second)
 
 
 def _watches(scene: Scene) -> list[EventSpecification]:
