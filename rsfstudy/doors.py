@@ -1,5 +1,7 @@
-"""The doors of rsfstudy: whatever goes wrong behind one, and is no error of ours yet, becomes one
-that says what was asked, what went wrong and what to do.
+"""Error boundary of public functions: what they raise is an error of rsfstudy.
+
+Each is a door: whatever goes wrong behind one, and is no error of ours yet, becomes one that says
+what was asked, what went wrong and what to do.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Values as they are given, and as a reader wants them: in tables, titles and messages."""
+"""Formatting of numbers, lists and settings as text, for tables, titles and messages."""
 
 from __future__ import annotations
 

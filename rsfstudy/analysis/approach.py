@@ -5,6 +5,20 @@ state goes with it, and what a departure along the motion changes is forgotten. 
 row tell the derivative of the map from one rise to the next, and where cycles come closer slowly,
 the motion leaps to the fixed point which that implies.
 
+The section of a motion where V rises through V_0 is s = (f, Psi), and P(s) is its image: the
+section a cycle later, and behind it the headline numbers of that cycle. The derivative P' has a
+column b by f, and a column c by Psi. Spring stress is highest at a section, so that the motion
+passes it along (0, dPsi/dt): to begin a time dt later makes the cycle shorter by dt, and changes
+nothing else. So c is -1/(dPsi/dt) in the recurrence interval, and 0 in all other rows. Where the
+sections of two cycles differ by (df, dPsi), and their images by dP,
+
+    b = (dP - c dPsi)/df.
+
+The first two rows of P', the derivative A of the next section, have c = 0: A has rank one, and its
+trace is the eigenvalue that is not 0. So A**2 = (tr A) A, and from s to the fixed point it is
+
+    (1 - A)^-1 (P(s) - s) = P(s) - s + A (P(s) - s)/(1 - tr A).
+
 With several states a motion is followed event by event: after how many it repeats itself, if ever.
 """
 
@@ -62,14 +76,14 @@ class Approach:
         self._noise = accuracy.solver * scene.a
         self._work = 0
         self.seen: list[Cycle] = []
-        #: Derivatives of the section at the end of a cycle, and of its numbers behind that, by
-        #: spring stress and by state where it begins; and whether they are known.
+        #: The columns b and c of P', derivatives of the image by spring stress and by state; and
+        #: whether they are known.
         self._slopes, self._known = 2 * ((2 + NUMBERS) * (0.0,),), False
-        #: Section where the last cycle begins, its image, and by how much that has changed.
+        #: The section s where the last cycle begins, its image P(s), and dP, by how much that
+        #: differs from the image before.
         self._begin, self._image = (0.0, 0.0), (2 + NUMBERS) * (0.0,)
         self._changes = self._image
-        #: From the section where the last cycle begins to that of the limit cycle, and what that
-        #: changes of the image.
+        #: What is left from s to the fixed point, and P' times that: what it changes of the image.
         self._ahead, self._implied = self._begin, self._image
         #: What was left to go along the map where the motion leapt last.
         self._left_at_leap = np.inf
@@ -117,10 +131,7 @@ class Approach:
 
     def _learn(self) -> None:
         """Take the derivatives from the last two cycles, as long as numerical errors allow, and
-        what is ahead from the last.
-
-        A has rank one, so that what is left to the fixed point of ``s -> P(s)``,
-        ``(1 - A)^-1 (P(s) - s)``, is ``[1 + A/(1 - tr A)] (P(s) - s)``.
+        what is ahead from the last (the formulas are those of the module).
         """
         last = self.seen[-1]
         begin, end = last.begin, last.end

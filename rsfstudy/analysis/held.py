@@ -1,4 +1,4 @@
-"""Highest slip rate of a motion under a load point at rest.
+"""Highest slip rate of a motion under a load point at rest, as after a step of displacement.
 
 Spring stress can only fall there. With one state the first peak of ln V is the last: where ln V is
 stationary slip weakens, and goes on to weaken less, so that ln V has no minimum. Several states may

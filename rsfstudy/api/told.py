@@ -1,5 +1,5 @@
-"""What is told of a dataset, whatever it is of: tables, lists and sentences, which a terminal
-prints, and a page or a notebook shows.
+"""Summary of a dataset, whatever it is of: tables, lists and sentences, which a terminal prints,
+and a page or a notebook shows.
 """
 
 from __future__ import annotations

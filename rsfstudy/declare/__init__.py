@@ -1,1 +1,1 @@
-"""Declaration of studies: labelled axes over a scene, a measure, reductions, published values."""
+"""Declaration of studies, which runs nothing: axes over a scene, a measure, reductions, claims."""

@@ -1,4 +1,4 @@
-"""Places of results: the directory of a run, and the file or store of a study."""
+"""Paths of results: the directory of a run, and the file or store of a study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Events of a motion: a table in order, each with its time, slip and point.
+"""Kinds of events of a motion, and rows of their table; `within_steps` finds and locates them.
+
+The table has them in order, each with its time, slip and point.
 
 Who measures a motion asks to be told of
 

@@ -1,4 +1,41 @@
-"""Layout of the numbers of the loop of motions: the state of a motion, and its tables."""
+"""Layout of the numbers of the loop of motions: the state of a motion, and its tables.
+
+Who writes the fields of the state of a motion (`MOTION`), and when:
+
+    lasts, time, slip, spring_stress     running.Runner.run as it starts; loop.turn at each kink
+    tolerance, finer, direction,
+    budget, records, reported            running.Runner.run as it starts
+    kinks                                the same; loop.turn, one less at each kink
+    reverses, terminates, has_mass,
+    has_clock, limits_steps,
+    slip_is_clock, unknowns,
+    unknowns_fast, states, behind        running.Runner as it is made, for all its motions
+    at_point                             the same; loop.begin_at clears it
+    regime                               loop.begin_at as it starts and at kinks; loop.advance where
+                                         the regime changes
+    begins                               running.Runner (BEGIN), loop.advance (CHANGE), loop.turn
+                                         (KINK); loop.through_regime clears it once told
+    started                              loop.through_regime where a regime ends; loop.turn, 0
+    clock                                the stepper as it begins, 0; loop.move_on after each step
+    end, taken                           the stepper by each step; steps.cut brings the end forward
+    length                               the stepper, for the next step; steps.halve_unresolved;
+                                         0 by loop.advance and loop.turn where none is known
+    pace                                 the stepper by each step; 0 by loop.through_regime
+    is_dense                             steppers.order_eight: cleared by a step, set by the first
+                                         look into it
+    resolved                             loop.through_regime as a regime begins; then
+                                         steps.halve_unresolved
+    steps                                steps.take_step
+    spent_slow, spent_fast               workspace.spend at each right-hand side
+    jacobians                            steppers.scipy
+    target                               who looks for a time, before that: loop.cut_short,
+                                         within_steps.record_asked
+    events, recorded                     within_steps.add_event and record_point, by each row;
+                                         loop.advance, 0 by each call
+    sampled                              within_steps.record_asked
+    urgent                               loop.through_regime at a kink; loop.advance clears it
+    termination, stress                  loop.goes_on by each step, where the motion may end so
+"""
 
 from __future__ import annotations
 

@@ -3,8 +3,13 @@
 Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
 or not, with whatever stepper, events are found here. `running` calls it.
 
-To follow a rupture with a debugger: `engine="python"`, a breakpoint at the call of `move_on` in
-`through_regime` where ``motion.regime == FAST``, and one in `enter` for its end.
+To follow a rupture with a debugger, simulate a scene with ``inertia=True``, because without mass
+there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
+Each step passes `cut_short` once: a breakpoint there with the condition ``motion.regime == 1``
+(`FAST`) stops at each step of a rupture, of which ``space.before`` and ``space.after`` are the
+points at both ends (columns in the order of `layout.LOG_RATE` and so on). The line ``return
+CHANGES`` of `through_regime` is its end with the same condition, and its beginning with
+``motion.regime == 0`` (`SLOW`). `layout` says who writes which field of ``motion``.
 """
 
 from __future__ import annotations

@@ -183,8 +183,8 @@ def report_beginning(motion, space, last, events):
 
 
 def between(spec: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
-    """True if what is watched for happens where a motion jumps from the last point of one regime or
-    segment to the first of another: `NOWHERE`, or at the more extreme one, or the first beyond the
+    """Where what is watched for happens as a motion jumps from the last point of one regime or
+    segment to the first of another: `NOWHERE`; or at the more extreme one, or the first beyond the
     level, which is `BEFORE` or `AFTER` the jump.
     """
     if spec[KIND] == SETTLED:

@@ -1,1 +1,1 @@
-"""The referee: problems of a spring-slider with answers, against which any code can be checked."""
+"""Checks of other codes: problems of a spring-slider with known answers, and verdicts on theirs."""

@@ -8,9 +8,19 @@ parts a scene has; `equations` gives what an integrator takes. Their numbers sta
 says. `steady` asks the same relation for steady sliding and its stability. `closed_forms` are what
 others have published.
 
-From a motion to a law: `motion.loop` takes a step with the rates of a scene's `equations`; they
-are made in `system` (against displacement, or in a rupture), which asks `states` for the changes of
-each state, and those ask the `evolution` of the file in `laws`.
+From a law to a motion, each hop a function that the next one holds:
+
+1. ``evolution`` of a file in `laws`: the change of the state per unit slip.
+2. `states.only` makes ``evolutions`` of it, which has a tuple of states for an argument and returns
+   one; a law of several states states that itself. `system.functions` chooses between them.
+3. `friction.friction_of` adds the unknowns of a fluid or a loading behind those of the law:
+   ``Friction.evolutions``.
+4. `system` makes rates of it: `system.against_displacement` between ruptures, and of a rigid slider
+   `system.rate_of_rigid`. In a rupture `dynamics.inertia.rupture_rate` calls it; between ruptures
+   with mass, `dynamics.inertia.slip_rate` as well.
+5. `equations` puts the rates of a scene, its unknowns and its numbers together.
+6. `motion.columns` makes functions of them that fill arrays; a stepper calls these (the one of
+   SciPy calls ``Equations.rate`` itself), and `motion.loop` the stepper, step by step.
 
 Where the equations of the paper are:
 

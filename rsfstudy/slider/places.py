@@ -1,5 +1,5 @@
-"""Places of the numbers of a scene in the flat tuple ``p`` that the functions of its equations
-read, and bounds of what they compute.
+"""Indices of the numbers of a scene in the flat tuple ``p``, which its equations read; and bounds
+of what these compute.
 
 Those that every scene has come first. Each slot has places of its own behind them: a law reads
 ``p[LAW]``, ``p[LAW + 1]``, ... The law stands last, and may have any number of them.

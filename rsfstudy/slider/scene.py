@@ -60,16 +60,17 @@ class Scene(Assembled):
     stress_dependence : float
         c of Nagata et al. (2012): shear stress lowers the state variable by c dtau/sigma; 0.
     normal_stress : {"constant", "imposed", "variable"}, or type
-        Constant; what the loading imposes; or coupled to shear stress by a driving stress inclined
-        at `phi`; or a class of your own.
+        Constant; what the loading imposes; or, by default ("variable"), coupled to shear stress by
+        a driving stress inclined at `phi`; or a class of your own.
     fluid : {"drained", "dilatant"}, or type
-        Pore pressure that never changes, or that falls where pores open with slip rate; or a class
-        of your own. Stress is in units of the effective normal stress of steady sliding at V_*, so
-        that pore pressure is counted from that of the surroundings, where it begins; a history of
-        pore pressure changes that of the surroundings.
+        Pore pressure that never changes ("drained", the default), or that falls where pores open
+        with slip rate; or a class of your own. Stress is in units of the effective normal stress of
+        steady sliding at V_*, so that pore pressure is counted from that of the surroundings, where
+        it begins; a history of pore pressure changes that of the surroundings.
     dynamics, loading : type, optional
-        A class of your own in these slots, which other fields fill without it; or, as loading, what
-        `rsfstudy.protocol` or `rsfstudy.history` made.
+        A class of your own in these slots; or, as loading, what `rsfstudy.protocol` or
+        `rsfstudy.history` made. Without them other fields fill these slots: by default motion is
+        quasi-static, and the loading a single step, of nothing.
     alpha : float, optional
         Strength of the normal stress effect on the state variable (not at constant normal stress;
         0.56). Zero leaves the effect out.
@@ -80,15 +81,16 @@ class Scene(Assembled):
         eps/(beta sigma_*), by which undrained pore pressure falls for each unit of ln V, and rate
         c* D_c/V_* at which it drains (dilatant fluid only; 0.01 and 1).
     a, b_over_a : float
-        Direct effect, and evolution effect over direct effect. Rate weakening is b > a; without it
-        there is no critical stiffness, and `stiffness` must be given.
+        Direct effect, and evolution effect over direct effect; 0.0145 and 2. Rate weakening is b >
+        a; without it there is no critical stiffness, and `stiffness` must be given.
     regularised : bool
-        Whether slip reverses with shear stress (arcsinh form; quasi-static motion only).
+        Whether slip reverses with shear stress (arcsinh form; quasi-static motion only); false.
     b1_over_a, b2_over_a, length_ratio : float, optional
         The same for each of two states (laws of two states only, instead of `b_over_a`), and the
-        slip distance of the second over D_c, which is that of the first. Negative b are allowed.
+        slip distance of the second over D_c, which is that of the first; 1, 0.84 and 1/0.048.
+        Negative b are allowed.
     mu_star : float
-        Steady-state friction coefficient at V_*.
+        Steady-state friction coefficient at V_*; 0.76.
     stiffness_ratio : float, optional
         Stiffness over the critical stiffness at V_* without radiation damping. Above it steady
         sliding is stable; with damping also a little below. Default: 1. With several states a ratio
@@ -99,49 +101,49 @@ class Scene(Assembled):
         Load point velocity over V_* after the step. Default: 1, or 0 after a step of displacement
         or of normal stress.
     displacement_step : float
-        Instantaneous displacement of the load point in D_c.
+        Instantaneous displacement of the load point in D_c; 0.
     normal_stress_step : float
         Sudden change of imposed normal stress over sigma_* (not at constant normal stress); that of
-        sigma_3 where a driving stress is inclined.
+        sigma_3 where a driving stress is inclined; 0.
     oscillation_amplitude, oscillation_period : float
         Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
         that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
-        stress; that of sigma_3 where a driving stress is inclined). Zero is none.
+        stress; that of sigma_3 where a driving stress is inclined); 0, which is none, and 10.
     oscillation_begin, oscillation_phase, oscillation_cycles : float, optional
         Time in D_c/V_* at which an oscillation begins, of normal stress or of the load point, angle
         in degrees by which it is ahead of a sine then, and number of cycles after which it ends,
         whole or not. Default: it begins at once, as a sine, and goes on for ever.
     velocity_oscillation : float, optional
         Amplitude of an oscillation of load point velocity, over its mean at `load_velocity_ratio`,
-        of the period, begin, phase and number of cycles above.
+        of the period, begin, phase and number of cycles above; none.
     normal_stress_ramp, ramp_duration : float
         Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
         takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of
-        sigma_3 where a driving stress is inclined). Zero is none.
+        sigma_3 where a driving stress is inclined); 0, which is none, and 1.
     hold_time : float
         Time in D_c/V_* for which the load point is held, before it moves on at
-        `load_velocity_ratio`. Zero is no hold.
+        `load_velocity_ratio`; 0, which is no hold.
     velocity_steps, velocity_ratio, displacement_between_steps : float
         How many steps of load point velocity there are, from V_* to `velocity_ratio` V_* and back
-        in turn, and how far in D_c it moves from one to the next (10; 20). Zero is no step.
+        in turn, and how far in D_c it moves from one to the next; 0, which is no step, 10 and 20.
     velocity_ramp, velocity_ramp_duration, velocity_ramp_stairs : float
         Change of load point velocity over V_* at a steady rate, time in D_c/V_* that it takes, and
-        number of stairs that stand for it (10; 64). Zero is none.
+        number of stairs that stand for it; 0, which is none, 10 and 64.
     inertia : bool
-        Whether the slider has mass.
+        Whether the slider has mass; false.
     radiation_damping : float
         eta V_*/sigma_*: stress that waves carry away at V_* (quasi-dynamic motion, instead of
-        mass); T V_*/(2 pi D_c) times the stiffness is the impedance of spring and mass.
+        mass); T V_*/(2 pi D_c) times the stiffness is the impedance of spring and mass. Default: 0.
     period : float
         Period of free oscillation T in s; with `reference_rate` it sets inertia and the instability
-        norm.
+        norm; 5.
     reference_rate : float
-        V_*/D_c in 1/s.
+        V_*/D_c in 1/s; 1.17e-8.
     instability_norm : float
-        A motion counts as unstable once V T/(2 pi D_c) reaches this norm.
+        A motion counts as unstable once V T/(2 pi D_c) reaches this norm; 5e-4.
     initial_stress, initial_state : float
         Shear stress over sigma_* above that of steady sliding at V_*, and state variable Theta,
-        with which the slider begins, before the first step. Zero: it slides steadily at V_*.
+        with which the slider begins, before the first step. Default: 0, steady sliding at V_*.
 
     Attributes
     ----------

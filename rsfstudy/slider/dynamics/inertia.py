@@ -32,11 +32,27 @@ LEAST, MOST = 1e-60, 1e40
 def slip_rate(friction: Friction) -> tuple[Function, Function]:
     """Slip rate on the slow manifold, and its derivative.
 
-    Friction has the stress of the spring less what accelerates the mass, ``K w (w + w_0) dx`` with
-    dx the growth of ln V per unit of combined displacement (slip and load point), w = V T/(2 pi
-    D_c) and w_0 the same of the load point velocity. The slip rate that trails by that of
-    quasi-static growth is right to first order in w**2, and with its growth friction is to second:
-    the error is of order w**6.
+    Friction g has the stress f of the spring less what accelerates the mass. With x = ln(V/V_*) and
+    displacement s (slip and load point together), the full equations read
+
+        f - g = r = a W(x) dx/ds,    a x = strength(f - r) - Psi,
+
+    in which W(x) = (K/a) w (w + w_0) is the weight of mass, w = V T/(2 pi D_c), and w_0 the same of
+    the load point velocity. Where W is small, so is r. The series in W begins with motion without
+    mass, x_0, whose derivative along a motion at slip rate x is G(x):
+
+        x_0 = [strength(f) - Psi]/a,    G(x) = [strength'(f) df/ds(x) - dPsi/ds(x)]/a;
+
+        first order:   r_1 = a W(x_0) G(x_0),    x_1 = x_0 - strength'(f) r_1/a;
+        second order:  r_2 = a W(x_1) [G(x_1) - d(x_0 - x_1)/ds],
+                       x_2 = [strength(f - r_2) - Psi]/a.
+
+    The error of r_2 and x_2 is of order W**3, that is w**6. In the code `without_mass` gives x_0,
+    G(x_0), strength'(f) and W(x_0). In `resistance`, which is r_2, `first` is r_1, `trails` is x_0
+    - x_1, `slowed` is x_1, `changes` are dPsi/ds(x_1) at the shift of f - r_1, `growing` is G(x_1),
+    and d(x_0 - x_1)/ds is a difference over `AHEAD`. `balance` gives x_2 and f - r_2; `trailing` is
+    x_2 - x_0, by the slope of strength halfway; `growth` is dx_2/ds, of G along the motion and a
+    difference of `trailing`. With pore pressure `contribution` stands for dPsi/ds in G.
     """
     strength, state_sum, evolutions = friction.strength, friction.state_sum, friction.evolutions
     contribution, ahead = friction.contribution, moved(friction.states)

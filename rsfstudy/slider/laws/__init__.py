@@ -63,6 +63,11 @@ class LawOfStates(Part):
     `steady_states`. Both say how much of the shift each state has; the parts add up to all of it.
     What the states together have for b it says as `b_over_a`, a field or a property;
     `two_slip_states` is an example.
+
+    Any unknown that friction depends on may be such a state, temperature for one, written as what
+    it adds to friction. Its change may read slip rate, the states and the numbers of the law, and
+    with them friction of slip forward, ``mu_* + a ln(V/V_*)`` and the sum of the states. It cannot
+    read normal stress or pore pressure, which evolutions are not given.
     """
 
     stress_dependence: float = number(
