@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from running import begun
 
 from rsfstudy import Scene
-from rsfstudy.motion.regimes import starting
+from rsfstudy.motion.starting import starting
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
 

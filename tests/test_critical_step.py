@@ -21,8 +21,8 @@ from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, of_floats
+from rsfstudy.motion.handover import error_of_slow_manifold
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.regimes import error_of_slow_manifold
 from rsfstudy.motion.roots import root_of
 from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
 from rsfstudy.slider.point import Point

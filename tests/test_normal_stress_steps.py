@@ -14,7 +14,7 @@ from rsfstudy import Scene
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.regimes import starting
+from rsfstudy.motion.starting import starting
 
 
 @given(

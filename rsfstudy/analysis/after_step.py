@@ -12,8 +12,9 @@ from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import along, follow
 from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
+from rsfstudy.motion.handover import mass_acts
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import mass_acts, on_slow_manifold, starting
+from rsfstudy.motion.starting import on_slow_manifold, starting
 from rsfstudy.slider import stability, steady
 from rsfstudy.slider.equations import IN_RUPTURE, without_mass
 from rsfstudy.slider.point import Point

@@ -13,8 +13,8 @@ from rsfstudy.analysis.after_step import stability_margin
 from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.analysis.search_of_steps import LOOSE, Steps
 from rsfstudy.motion.accuracy import Accuracy, error_between
+from rsfstudy.motion.handover import error_of_slow_manifold
 from rsfstudy.motion.meter import TIGHTEST, Meter
-from rsfstudy.motion.regimes import error_of_slow_manifold
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _BY_CHANCE = 0.004

@@ -25,9 +25,9 @@ from typing import NamedTuple
 from rsfstudy.motion.engines import SCIPY, of_floats
 from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import point_of
 from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.running import Runner
+from rsfstudy.motion.starting import point_of
 from rsfstudy.slider.equations import between_ruptures
 from rsfstudy.slider.friction import Friction
 from rsfstudy.slider.parts import Function, Numbers

@@ -13,8 +13,8 @@ import math
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise
+from rsfstudy.motion.handover import mass_acts
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.slider.equations import IN_RUPTURE, evolutions_of, relation_of, steady_states_of
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene

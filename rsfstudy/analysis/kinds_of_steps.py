@@ -27,7 +27,7 @@ from rsfstudy.analysis.search_of_steps import (
 )
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import on_slow_manifold
+from rsfstudy.motion.starting import on_slow_manifold
 from rsfstudy.slider import steady
 from rsfstudy.slider.closed_forms import effective_friction
 from rsfstudy.slider.equations import log_slip_rate_at, steady_states_of

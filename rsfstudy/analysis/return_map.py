@@ -35,7 +35,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regimes import at_rate, beginning, check_start
+from rsfstudy.motion.starting import at_rate, beginning, check_start
 from rsfstudy.slider.equations import without_mass
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene

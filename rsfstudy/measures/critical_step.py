@@ -27,8 +27,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step
 from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
+from rsfstudy.motion.handover import mass_acts
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.regimes import mass_acts
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status

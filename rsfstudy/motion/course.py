@@ -12,9 +12,9 @@ from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.handover import limits
 from rsfstudy.motion.meter import Meter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regimes import jumped, starting
 from rsfstudy.motion.running import along as along
 from rsfstudy.motion.running import happening, runner_of
+from rsfstudy.motion.starting import jumped, starting
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import BEGINS, ENDS_AT, LOADING, LOG_LOAD_RATE, LOG_VELOCITY
 from rsfstudy.slider.point import Point

@@ -1,6 +1,6 @@
 """When to change between the slow manifold and the full equations, and where motions end.
 
-Plain functions of floats, which every engine calls.
+Most are plain functions of floats, which every engine calls.
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ import math
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import Halt
 from rsfstudy.slider.derived import once
 from rsfstudy.slider.places import LARGEST_LOG_SLIP_RATE
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.system import SLOWEST
+from rsfstudy.status import Status
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
 LOST, LOCKED = 1e-9, 1e6
@@ -69,6 +71,23 @@ def limits(scene: Scene, accuracy: Accuracy) -> Limits:
         scene.a,
         scene.inertial_time,
     )
+
+
+def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
+    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
+    it.
+    """
+    return scene.has_mass and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
+
+
+def error_of_slow_manifold(scene: Scene) -> float:
+    """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
+    ``3 [(K/a) w**2]**2``.
+
+    Mass moves a boundary in proportion to (K/a) w**2, by up to 0.8 of it where the norm is a slip
+    rate of a few V_*; the slow manifold leaves up to 0.9 of its square (the tests measure it).
+    """
+    return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2
 
 
 def norm_at(log_slip_rate: float, given: Limits) -> float:
@@ -159,3 +178,15 @@ def margin(log_slip_rate: float, normal_stress: float, load_velocity: float) -> 
     stress = math.log(max(normal_stress, LEAST_STRESS))
     left = min(stress - math.log(LOST), math.log(LOCKED) - stress, UNBOUNDED - log_slip_rate)
     return min(left, log_slip_rate - SLOWEST) if load_velocity == 0.0 else left
+
+
+def halted(end: int, normal_stress: float) -> Halt:
+    """The end of a motion, by its termination status (see `termination_of`)."""
+    if end == IS_LOST:
+        return Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+    if end == IS_LOCKED:
+        text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
+        return Halt(Status.LOCKED, text)
+    if end == HAS_STOPPED:
+        return Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
+    return Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")

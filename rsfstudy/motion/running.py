@@ -14,11 +14,10 @@ from rsfstudy.motion import layout, workspace
 from rsfstudy.motion.columns import filling
 from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
 from rsfstudy.motion.events import Event, EventSpecification, Kind
-from rsfstudy.motion.handover import NO_MASS, Limits
+from rsfstudy.motion.handover import NO_MASS, Limits, halted
 from rsfstudy.motion.loop import advance
 from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
 from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
-from rsfstudy.motion.regimes import halted
 from rsfstudy.motion.within_steps import BEFORE, NOWHERE, between
 from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture

@@ -22,7 +22,7 @@ from rsfstudy.doors import check_file, in_words
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Halt
-from rsfstudy.motion.regimes import at_rate, on_slow_manifold
+from rsfstudy.motion.starting import at_rate, on_slow_manifold
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider import registry

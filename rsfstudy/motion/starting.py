@@ -1,5 +1,6 @@
-"""The motion of a scene after its step: quasi-static where mass does not act, inertial only where
-it does.
+"""Starting points of motions: of the first, and after each jump of the loading.
+
+When motions change between their regimes is for `handover` to say.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from functools import cache
 from scipy.optimize import newton
 
 from rsfstudy.motion import handover
-from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
@@ -131,23 +131,6 @@ def point_of(rate: Function, point: Function) -> Function:
     return at
 
 
-def mass_acts(scene: Scene, accuracy: Accuracy) -> bool:
-    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
-    it.
-    """
-    return scene.has_mass and error_of_slow_manifold(scene) > 0.1 * accuracy.rtol
-
-
-def error_of_slow_manifold(scene: Scene) -> float:
-    """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
-    ``3 [(K/a) w**2]**2``.
-
-    Mass moves a boundary in proportion to (K/a) w**2, by up to 0.8 of it where the norm is a slip
-    rate of a few V_*; the slow manifold leaves up to 0.9 of its square (the tests measure it).
-    """
-    return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2
-
-
 def check_start(scene: Scene, start: Point | None = None) -> None:
     """Refuse a displacement step that leaves no friction of forward slip to integrate; it is that
     of the beginning, or leads to a point.
@@ -168,15 +151,3 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     if scene.load_velocity == 0.0:
         text = f"{text}, where slip backwards dies out under a load point at rest"
         raise Halt(Status.SHEAR_STRESS_REVERSED, text)
-
-
-def halted(end: int, normal_stress: float) -> Halt:
-    """The end of a motion, by its termination status (`handover.termination_of`)."""
-    if end == handover.IS_LOST:
-        return Halt(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
-    if end == handover.IS_LOCKED:
-        text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
-        return Halt(Status.LOCKED, text)
-    if end == handover.HAS_STOPPED:
-        return Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
-    return Halt(Status.SLIP_RATE_UNBOUNDED, "slip rate grew beyond 10^120 V_* without mass")
