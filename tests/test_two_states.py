@@ -143,13 +143,13 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
 # ---- three states --------------------------------------------------------------------------------
 
 
-def evolutions(log_slip_rate, psis, shift, share, p):
+def evolutions(log_slip_rate, psis, shift, fraction, p):
     """Three states, each with its share of b; the second and third over lengths of their own."""
     b = p[LAW]
     return (
-        -share * (psis[0] - 0.5 * shift + 0.5 * b * log_slip_rate),
-        -share * p[LAW + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_slip_rate),
-        -share * p[LAW + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_slip_rate),
+        -fraction * (psis[0] - 0.5 * shift + 0.5 * b * log_slip_rate),
+        -fraction * p[LAW + 1] * (psis[1] - 0.2 * shift + 0.2 * b * log_slip_rate),
+        -fraction * p[LAW + 2] * (psis[2] - 0.3 * shift + 0.3 * b * log_slip_rate),
     )
 
 

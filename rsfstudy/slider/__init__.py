@@ -11,8 +11,8 @@ others have published.
 From a law to a motion, each hop a function that the next one holds:
 
 1. ``evolution`` of a file in `laws`: the change of the state per unit slip.
-2. `states.only` makes ``evolutions`` of it, which has a tuple of states for an argument and returns
-   one; a law of several states states that itself. `system.functions` chooses between them.
+2. `states.evolutions_of_one_state` makes ``evolutions`` of it, which takes a tuple of states and
+   returns one; a law of several states states that itself. `system.functions` chooses.
 3. `friction.friction_of` adds the unknowns of a fluid or a loading behind those of the law:
    ``Friction.evolutions``.
 4. `system` makes rates of it: `system.against_displacement` between ruptures, and of a rigid slider

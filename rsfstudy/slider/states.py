@@ -18,7 +18,7 @@ _RATES, _AT_REST = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
-def only(evolution: Function) -> Function:
+def evolutions_of_one_state(evolution: Function) -> Function:
     """``dPsi/d(delta)`` times a fraction, of a law of one state."""
 
     def evolutions(
@@ -155,7 +155,7 @@ def check_steady_states(scene: Scene) -> None:
     given, as those of steady sliding: critical stiffness and cycles would contradict each other.
     """
     law, p, still = scene.parts.law, scene.numbers, _AT_REST * scene.a
-    evolutions = law.evolutions or only(law.evolution)
+    evolutions = law.evolutions or evolutions_of_one_state(law.evolution)
     for rate in _RATES:
         psis = (law.steady_states or usual_steady_state)(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))

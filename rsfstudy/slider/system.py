@@ -33,7 +33,7 @@ from rsfstudy.slider.friction import Friction, friction_of
 from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, STIFFNESS, A
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.states import only, scaled, usual_steady_state
+from rsfstudy.slider.states import evolutions_of_one_state, scaled, usual_steady_state
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
@@ -342,7 +342,7 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
     acting = scene.dynamics if dynamics is None else dynamics
     parts = friction.Parts(
         states=law.states,
-        evolutions=law.evolutions or only(law.evolution),
+        evolutions=law.evolutions or evolutions_of_one_state(law.evolution),
         steady_states=law.steady_states or usual_steady_state,
         state_effects=tuple(effect for effect in effects if effect is not None),
         regularised=law.regularised,

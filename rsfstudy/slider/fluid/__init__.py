@@ -18,8 +18,8 @@ class Fluid(Part):
 
     A case with unknowns of its own says what they are, pore pressure P last, and states
 
-    - ``auxiliary_rates(log_slip_rate, states, share, p)``: their changes per unit slip in D_c,
-      times a share;
+    - ``auxiliary_rates(log_slip_rate, states, fraction, p)``: their changes per unit slip in D_c,
+      times a fraction;
     - ``auxiliary_steady_states(log_slip_rate, p)``: what they are in steady sliding, where P is 0.
     """
 

@@ -24,10 +24,12 @@ def with_surroundings(rates: Function) -> Function:
     ``dP/dt = c* (R - P) - (dphi/dt)/beta``; what it says of the changes holds for P itself.
     """
 
-    def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-        time = share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    def auxiliary_rates(
+        log_slip_rate: float, states: Numbers, fraction: float, p: Numbers
+    ) -> Numbers:
+        time = fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
         own = (*states[1:-1], states[-1] - states[0])
-        return (-p[RECHARGE] * time, *rates(log_slip_rate, own, share, p))
+        return (-p[RECHARGE] * time, *rates(log_slip_rate, own, fraction, p))
 
     return auxiliary_rates
 

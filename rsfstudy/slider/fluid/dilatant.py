@@ -14,8 +14,8 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-    """Changes of porosity and of pore pressure per unit slip in D_c, times a share.
+def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+    """Changes of porosity and of pore pressure per unit slip in D_c, times a fraction.
 
     ``D_c dphi/d(delta) = -(phi - phi_0 - eps ln(V/V_*))`` and ``dp/dt = c* (p_inf - p) -
     (dphi/dt)/beta``, with dt = d(delta)/V; porosity is in units of beta sigma_*.
@@ -26,7 +26,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numb
         ln(V/V_*).
     states : tuple of float
         Porosity (phi - phi_0)/(beta sigma_*), and pore pressure P.
-    share : float
+    fraction : float
         What the changes are multiplied by: zero times infinity, where slip stops, has a limit.
     p : tuple of float
         Dilatancy eps/(beta sigma_*) at FLUID, and drainage c* D_c/V_* behind it.
@@ -36,8 +36,8 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numb
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     porosity, pressure = states
-    opening = share * (p[FLUID] * log_slip_rate - porosity)
-    time = share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    opening = fraction * (p[FLUID] * log_slip_rate - porosity)
+    time = fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 

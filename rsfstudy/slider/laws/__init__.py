@@ -59,10 +59,10 @@ class LawOfStates(Part):
     refuses a law that changes where it says that it rests.
 
     A law of several states says how many (``states = 3``), and states ``evolutions(log_slip_rate,
-    psis, shift, share, p)`` instead, a tuple of the change of each, all of them times a share, and
-    `steady_states`. Both say how much of the shift each state has; the parts add up to all of it.
-    What the states together have for b it says as `b_over_a`, a field or a property;
-    `two_slip_states` is an example.
+    psis, shift, fraction, p)`` instead, a tuple of the change of each, all of them times the
+    fraction that slip has in what the clock counts, and `steady_states`. Both say how much of the
+    shift each state has; the parts add up to all of it. What the states together have for b it says
+    as `b_over_a`, a field or a property; `two_slip_states` is an example.
 
     Any unknown that friction depends on may be such a state, temperature for one, written as what
     it adds to friction. Its change may read slip rate, the states and the numbers of the law, and

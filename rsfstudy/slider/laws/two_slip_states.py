@@ -9,9 +9,9 @@ from rsfstudy.slider.parts import Numbers
 
 
 def evolutions(
-    log_slip_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+    log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
 ) -> Numbers:
-    """Evolution of the two states per unit slip at constant normal stress, times a share.
+    """Evolution of the two states per unit slip at constant normal stress, times a fraction.
 
     ``L_i dTheta_i/d(delta) = -(Theta_i + b_i ln(V/V_*))``
 
@@ -23,7 +23,7 @@ def evolutions(
         States freed of stress.
     shift : float
         What stress has taken from both together.
-    share : float
+    fraction : float
         Slip over what the clock counts.
     p : tuple of float
         Numbers of the law, from `LAW` on.
@@ -31,11 +31,11 @@ def evolutions(
     Returns
     -------
     tuple of float
-        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
+        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
     """
     first = psis[0] - p[OF_FIRST] * shift + p[FIRST] * log_slip_rate
     second = psis[1] - p[OF_SECOND] * shift + p[SECOND] * log_slip_rate
-    return -share * first, -share * p[OVER] * second
+    return -fraction * first, -fraction * p[OVER] * second
 
 
 @dataclass(frozen=True, kw_only=True)

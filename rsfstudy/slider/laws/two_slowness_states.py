@@ -11,9 +11,9 @@ from rsfstudy.slider.parts import Numbers, Scene
 
 
 def evolutions(
-    log_slip_rate: float, psis: Numbers, shift: float, share: float, p: Numbers
+    log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
 ) -> Numbers:
-    """Evolution of the two states per unit slip at constant normal stress, times a share.
+    """Evolution of the two states per unit slip at constant normal stress, times a fraction.
 
     ``dtheta_i/dt = 1 - theta_i V/L_i`` with ``Theta_i = b_i ln(theta_i V_*/L_i)`` reads, per unit
     slip, ``L_i dTheta_i/d(delta) = b_i expm1(-(Theta_i/b_i + ln(V/V_*)))``.
@@ -26,7 +26,7 @@ def evolutions(
         States freed of stress.
     shift : float
         What stress has taken from both together.
-    share : float
+    fraction : float
         Slip over what the clock counts.
     p : tuple of float
         Numbers of the law, from `LAW` on.
@@ -34,13 +34,13 @@ def evolutions(
     Returns
     -------
     tuple of float
-        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the share.
+        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
     """
     first = (psis[0] - p[OF_FIRST] * shift) / p[FIRST] + log_slip_rate
     second = (psis[1] - p[OF_SECOND] * shift) / p[SECOND] + log_slip_rate
     return (
-        share * p[FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
-        share * p[OVER] * p[SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
+        fraction * p[FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
+        fraction * p[OVER] * p[SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
     )
 
 

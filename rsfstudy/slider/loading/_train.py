@@ -13,8 +13,8 @@ from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a share: ``dy/dt = omega P``
+def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a fraction: ``dy/dt = omega P``
     and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
 
     What numerical errors make of the amplitude decays in a period: to both is added ``(omega/2) [1
@@ -26,13 +26,13 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numb
         ln(V/V_*).
     states : tuple of float
         y and P.
-    share : float
+    fraction : float
         What the changes are multiplied by (see `fluid.dilatant.auxiliary_rates`).
     p : tuple of float
         omega D_c/V_* at LOADING, and A behind it.
     """
     ahead, relief = states
-    turn = p[LOADING] * share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    turn = p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)

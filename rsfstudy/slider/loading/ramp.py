@@ -11,9 +11,9 @@ from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numbers) -> Numbers:
-    """Change of P per unit slip in D_c, times a share: at a steady rate in time, by which it goes
-    to 0 from all that normal stress is yet to change by, ``dP/dt = -Delta_sigma/t_r``.
+def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+    """Change of P per unit slip in D_c, times a fraction: at a steady rate in time, by which it
+    goes to 0 from all that normal stress is yet to change by, ``dP/dt = -Delta_sigma/t_r``.
 
     Parameters
     ----------
@@ -21,12 +21,12 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, share: float, p: Numb
         ln(V/V_*).
     states : tuple of float
         P.
-    share : float
+    fraction : float
         What the change is multiplied by (see `fluid.dilatant.auxiliary_rates`).
     p : tuple of float
         Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
     """
-    return (-p[LOADING] * share * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS)),)
+    return (-p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS)),)
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
