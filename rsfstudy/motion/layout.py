@@ -117,8 +117,9 @@ BEGIN, CHANGE, END, SAMPLED, KINK = -1, -2, -3, -4, -5
 LOG_RATE, GROWTH, SPRING, FRICTION, PSI, STATE, IMBALANCE, DISTANCE, COEFFICIENT, RATIO = range(10)
 READING, READING_GROWTH, PSIS = 10, 11, 12
 
-#: Why a call returns: to hand over what it has told; because the motion has ended; because the
-#: regime changes; because it cannot go on; or because the loading has a kink.
-HANDS_OVER, ENDED, CHANGES, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH, KINKS = range(8)
+#: Why a call returns: to be called again once its tables are read; because the motion has ended;
+#: because its regime ends; because it cannot go on; or because its segment of loading ends. (The
+#: change of regimes has a file, `handover`; `CHANGE` and `KINK` above are what is told of both.)
+PAUSES, ENDED, REGIME_ENDS, HALTED, BUDGET_SPENT, NO_STEP, NO_LENGTH, SEGMENT_ENDS = range(8)
 #: What `steps.take_step` returns where it has taken one.
 TAKEN = -1

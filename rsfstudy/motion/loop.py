@@ -1,4 +1,4 @@
-"""The loop of all motions: step by step through their regimes, until it is time to hand over.
+"""The loop of all motions: step by step through their regimes, until there is something to tell.
 
 Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
 or not, with whatever stepper, events are found here. `running` calls it.
@@ -8,7 +8,7 @@ there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see
 Each step passes `cut_short` once: a breakpoint there with the condition ``motion.regime == 1``
 (`FAST`) stops at each step of a rupture, of which ``space.before`` and ``space.after`` are the
 points at both ends (columns in the order of `layout.LOG_RATE` and so on). The line ``return
-CHANGES`` of `through_regime` is its end with the same condition, and its beginning with
+REGIME_ENDS`` of `through_regime` is its end with the same condition, and its beginning with
 ``motion.regime == 0`` (`SLOW`). `layout` says who writes which field of ``motion``.
 """
 
@@ -29,7 +29,6 @@ from rsfstudy.motion.handover import (
 from rsfstudy.motion.layout import (
     BEGIN,
     CHANGE,
-    CHANGES,
     END,
     ENDED,
     FAST,
@@ -37,14 +36,15 @@ from rsfstudy.motion.layout import (
     FUNCTIONS,
     GROWTH,
     HALTED,
-    HANDS_OVER,
     KINK,
-    KINKS,
     LOG_RATE,
     NO_LENGTH,
+    PAUSES,
     PSIS,
     RATIO,
+    REGIME_ENDS,
     SAMPLED,
+    SEGMENT_ENDS,
     SLOW,
     SPECIFIED,
     SPRING,
@@ -138,25 +138,26 @@ def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, s
     given = first_of(specs), len(specs) // len(SPECIFIED), p, p_before, limits, stepper
     if motion.at_point:
         begin_at(motion, y, last, functions, block, limits, p)
-    end = CHANGES
-    while end == CHANGES:
+    end = REGIME_ENDS
+    while end == REGIME_ENDS:
         unknowns, first = motion.unknowns, 0
         if motion.regime == FAST:
             unknowns, first = motion.unknowns_fast, motion.unknowns
         own, equations = moved(scales, first), functions[motion.regime]
         space = workspace(block, y, unknowns, own, motion.states, equations, given)
         end = through_regime(motion, space, last, samples, events, rows)
-        if end == CHANGES:
-            motion.regime, motion.begins, motion.length = FAST - motion.regime, CHANGE, 0.0
+        if end == REGIME_ENDS:
+            motion.regime = SLOW if motion.regime == FAST else FAST
+            motion.begins, motion.length = CHANGE, 0.0
             enter(motion, y, last)
-        elif end == KINKS:
-            regime, end = motion.regime, CHANGES
+        elif end == SEGMENT_ENDS:
+            regime, end = motion.regime, REGIME_ENDS
             turn(motion, space, last, kinks, rows)
             begin_at(motion, y, last, functions, block, limits, p)
             if motion.regime != regime:
                 motion.length = 0.0
-        if end == CHANGES and (motion.urgent or is_full(motion, space.specified, events, rows)):
-            motion.urgent, end = 0, HANDS_OVER
+        if end == REGIME_ENDS and (motion.urgent or is_full(motion, space.specified, events, rows)):
+            motion.urgent, end = 0, PAUSES
     return end
 
 
@@ -251,20 +252,20 @@ def through_regime(motion, space, last, samples, events, rows):
             report_end(motion, space, events, SAMPLED)
         if over and motion.kinks > 0:
             motion.urgent = int(urgent == 2)
-            return KINKS
+            return SEGMENT_ENDS
         if over:
             report_end(motion, space, events, END)
             return ENDED
         if leaves or returns(motion, space):
             motion.started = passed_at_end(motion, space)
             copy(space.after, last, PSIS + motion.states)
-            return CHANGES
+            return REGIME_ENDS
         if motion.terminates and motion.termination != GOES_ON:
             return HALTED
         move_on(motion, space)
         if urgent == 2 or is_full(motion, space.specified, events, rows):
             copy(space.rates, moved(space.y, space.unknowns), space.unknowns)
-            return HANDS_OVER
+            return PAUSES
 
 
 def goes_on(motion, space):

@@ -223,8 +223,8 @@ class Runner:
             stepper,
         )
         regimes, psis = self._regimes, layout.POINT + layout.PSIS
-        run, end, known = machine.advance(), layout.HANDS_OVER, (0, 0, 0, 0)
-        while end == layout.HANDS_OVER:
+        run, end, known = machine.advance(), layout.PAUSES, (0, 0, 0, 0)
+        while end == layout.PAUSES:
             end = run(state.memory, *arguments)
             slow, fast, steps, happened, recorded, jacobians = state.says()
             known, settled = (slow, fast, steps, jacobians), known
