@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import ROUNDING, Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event
 from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.readings import friction_of
+from rsfstudy.motion.readings import friction_coefficient_of
 from rsfstudy.motion.recording import OBSERVED, READ, Recording, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
@@ -87,7 +87,7 @@ class _Record(NamedTuple):
     @property
     def after(self) -> float:
         """Friction at the end of the record."""
-        return float(friction_of(self.rows[-1:])[0])
+        return float(friction_coefficient_of(self.rows[-1:])[0])
 
     def left(self, slip: float) -> float:
         """Transient of friction that is left after so much slip."""
@@ -266,7 +266,7 @@ class NormalStressTransient(Recorded):
         """Change of friction at once, whether it has settled, its departure from that of a stiff
         slider, and the record itself.
         """
-        rows, friction = record.rows, friction_of(record.rows)
+        rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record
         path = along_path(rows, self.phases, READ)
         return {
@@ -294,7 +294,7 @@ class NormalStressTransient(Recorded):
         # without b there is no alpha either, and nothing evolves
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
-        seen = friction_of(record.rows[read]) - scene.mu_star
+        seen = friction_coefficient_of(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 
 

@@ -135,11 +135,11 @@ class Approach:
         """
         last = self.seen[-1]
         begin, end = last.begin, last.end
-        section = begin.spring_stress, begin.psi
+        start = begin.spring_stress, begin.psi
         image = end.spring_stress, end.psi, *last.numbers()
         changes = tuple(map(sub, image, self._image))
         if len(self.seen) > 1:
-            by_stress, by_state = map(sub, section, self._begin)
+            by_stress, by_state = map(sub, start, self._begin)
             if abs(by_stress) > (1000.0 if self._known else 1.0) * self._noise:
                 self._known = True
                 # the motion passes a section without a change of spring stress
@@ -147,8 +147,8 @@ class Approach:
                 along = tuple((passed / way).tolist())
                 left = (x - by_state * y for x, y in zip(changes, along, strict=True))
                 self._slopes = tuple(x / by_stress for x in left), along
-        self._begin, self._image, self._changes = section, image, changes
-        off, kept = tuple(map(sub, image, section)), 1.0 - min(self._return, _DIVERGES)
+        self._begin, self._image, self._changes = start, image, changes
+        off, kept = tuple(map(sub, image, start)), 1.0 - min(self._return, _DIVERGES)
         returned = self._by_slopes(off)
         self._ahead = off[0] + returned[0] / kept, off[1] + returned[1] / kept
         self._implied = self._by_slopes(self._ahead)

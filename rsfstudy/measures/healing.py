@@ -15,7 +15,7 @@ from rsfstudy.measures._records import Record, Recorded, errors_of, followed, re
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import Event, maximum, settling
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.readings import friction_of, load_point_of, unsteady, watched
+from rsfstudy.motion.readings import friction_coefficient_of, load_point_of, unsteady, watched
 from rsfstudy.motion.recording import READ, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
@@ -109,7 +109,7 @@ class Healing(Recorded):
         turning = 1.0 / (scene.a * first.peak.point.growth) if first.peak.point.growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
         errors = errors_of(values, refined, by_friction, scene, accuracy)
-        above = again.peak.point.reading - float(friction_of(again.rows)[-1])
+        above = again.peak.point.reading - float(friction_coefficient_of(again.rows)[-1])
         # beside steady sliding friction turns within the tolerance, where two runs may agree
         if above <= max(errors["healing_error"], _TURNS * accuracy.refined().solver):
             return peakless

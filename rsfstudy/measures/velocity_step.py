@@ -17,7 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, fall, maximum, minimum, rise
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.readings import friction_of, unsteady, watched
+from rsfstudy.motion.readings import friction_coefficient_of, unsteady, watched
 from rsfstudy.motion.recording import OBSERVED, READ, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
@@ -225,7 +225,7 @@ class VelocityStep(Recorded):
         """True if friction has settled, how far it departs from that of a stiff slider, and the
         record itself.
         """
-        rows, friction = record.rows, friction_of(record.rows)
+        rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = record.end.time - _LAST * step.duration
         # there may be few samples, in long steps
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
@@ -255,7 +255,7 @@ def _departure(scene: Scene, step: _Step, record: Record) -> float:
     later = record.rows[:, 0] >= record.peak.time
     left = np.array([relaxation(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
     expected = steady + scene.b * left
-    seen = (friction_of(record.rows) - record.begin.point.reading)[later]
+    seen = (friction_coefficient_of(record.rows) - record.begin.point.reading)[later]
     return float(np.abs(seen - expected).max())
 
 

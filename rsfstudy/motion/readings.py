@@ -34,7 +34,7 @@ def watched(scene: Scene) -> tuple[str, float]:
     return "reading", 0.0
 
 
-def friction_of(table: np.ndarray) -> np.ndarray:
+def friction_coefficient_of(table: np.ndarray) -> np.ndarray:
     """The friction coefficient along a recorded motion."""
     return table[:, READ.index("friction_coefficient")]
 

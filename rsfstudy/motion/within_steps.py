@@ -46,8 +46,7 @@ from rsfstudy.motion.layout import (
     WAITS,
     WITHIN_STEPS,
 )
-from rsfstudy.motion.recording import PLACE, SAMPLES, STATES
-from rsfstudy.motion.recording import REGIME as ROW_REGIME
+from rsfstudy.motion.recording import PLACE, ROW_REGIME, SAMPLES, STATES
 from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.steppers import unknowns_at
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within

@@ -13,7 +13,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.readings import friction_of
+from rsfstudy.motion.readings import friction_coefficient_of
 from rsfstudy.motion.recording import Recording
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider import assembly
@@ -210,7 +210,7 @@ class Model:
             return nothing
         finally:
             self.meter.budget = budget
-        found = friction_of(recording.seen(scene))
+        found = friction_coefficient_of(recording.seen(scene))
         return found if len(found) == len(self.time) else nothing
 
     def trend(self, values: Values) -> np.ndarray:
