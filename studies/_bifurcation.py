@@ -185,7 +185,7 @@ def _of_one_event(
     one = _cycle_of_one_event(ReturnMap(scene, accuracy, meter), motion.seen)
     if one is None:
         return Status.OK, "", {}
-    again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.events[0].swing)
+    again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.cycles[0].swing)
     if again is None:
         return Status.OK, "", {}
     (first, *_), (same, *_) = one.multipliers, again.multipliers

@@ -84,13 +84,13 @@ def test_periods(ratio, period):
     orbit = came_to(scene).orbit.from_largest
     assert orbit.period == period
     assert orbit.attracts
-    begin, end = map(section, (orbit.events[0].begin, orbit.events[-1].end))
+    begin, end = map(section, (orbit.cycles[0].begin, orbit.cycles[-1].end))
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # the orbit is that of the whole period, and the numbers are those of its largest event
     assert found.values["time"][-1] == pytest.approx(
-        sum(cycle.interval for cycle in orbit.events), rel=1e-6
+        sum(cycle.interval for cycle in orbit.cycles), rel=1e-6
     )
-    largest = orbit.events[0]
+    largest = orbit.cycles[0]
     assert found.values["max_log10_slip_rate"] == pytest.approx(
         largest.fastest / math.log(10.0), abs=1e-6
     )
@@ -99,7 +99,7 @@ def test_periods(ratio, period):
     # slip over the period is that of the load point; over an event, less what the spring keeps
     slips = [
         cycle.interval - (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
-        for cycle in orbit.events
+        for cycle in orbit.cycles
     ]
     assert found.values["slip_per_event"] == pytest.approx(slips[0], rel=1e-6)
     assert found.values["slip"][-1] == pytest.approx(sum(slips), rel=1e-6)

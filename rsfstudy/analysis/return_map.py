@@ -1,18 +1,19 @@
-"""Cycles that close, as fixed points of a map from one event of a motion to the next.
+"""Periodic orbits, as fixed points of the map from one stick-slip cycle of a motion to the next.
 
-An event runs from where V rises through V_0 to the next such instant. Spring stress and states say
-all there is to say there, because V is known: with mass, the spring carries what accelerates the
-slider besides what friction does. So a motion is a map of spring stress and states from one such
-section to the next, and a cycle of n events is a fixed point of its n-th power. The eigenvalues of
-the derivative there are its Floquet multipliers: what becomes of a small departure once around.
-Beyond 1 in size, the cycle repels; at -1, one of twice as many events comes off it.
+A cycle (an event of `measures.limit_cycle`) runs from where V rises through V_0 to the next such
+instant. Spring stress and states say all there is to say there, because V is known: with mass, the
+spring carries what accelerates the slider besides what friction does. So a motion is a map of
+spring stress and states from one such section to the next, and an orbit of n cycles is a fixed
+point of its n-th power. The eigenvalues of the derivative there are its Floquet multipliers: what
+becomes of a small departure once around. Beyond 1 in size, the orbit repels; at -1, one of twice as
+many cycles comes off it.
 
 There is one unknown more than a departure can have directions, as long as mass hardly acts: the
 motion forgets one along itself, which is a change of states at the same spring stress, because
 spring stress is highest there.
 
 Sections are arrays (f, Psi_1, ...) of shape (1 + states,): spring stress over sigma_*, and states.
-With P the map of n events, a cycle solves P(s) - s = 0 by Newton's method, whose Jacobian dP - 1
+With P the map of n cycles, an orbit solves P(s) - s = 0 by Newton's method, whose Jacobian dP - 1
 comes from differences of order four, and is corrected by what each step finds (Broyden).
 
 References
@@ -45,35 +46,35 @@ from rsfstudy.status import Status
 #: bend over a hundredth of a swing.
 STEP = 1e-4
 _WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
-#: How far off a cycle is looked for, over how far ln V swings, and most steps to it.
+#: How far off an orbit is looked for, over how far ln V swings, and most steps to it.
 _NEAR, _TRIES = 0.1, 12
-#: How nearly its events must close a cycle, in the accuracy asked for: what they do not is
+#: How nearly its cycles must close an orbit, in the accuracy asked for: what they do not is
 #: corrected to first order.
 CLOSED = 0.3
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """A cycle that closes after some events.
+    """A motion that closes after some cycles.
 
     Attributes
     ----------
-    events : tuple of Cycle
+    cycles : tuple of Cycle
         One after the other.
     slopes : tuple of ndarray
-        Of each event, the derivatives of the section at its end, and of its numbers below that, by
+        Of each cycle, the derivatives of the section at its end, and of its numbers below that, by
         the section at its beginning: of shape (1 + states + numbers, 1 + states).
     ahead : ndarray
-        From the section where the events begin to that of the cycle which they imply.
+        From the section where the cycles begin to that of the orbit which they imply.
     accuracy : Accuracy
-        With which the events were followed.
+        With which the cycles were followed.
     work : int
         Right-hand sides that took.
     recording : Recording or None
-        What was recorded along the events, and beyond.
+        What was recorded along the cycles, and beyond.
     """
 
-    events: tuple[Cycle, ...]
+    cycles: tuple[Cycle, ...]
     slopes: tuple[np.ndarray, ...]
     ahead: np.ndarray
     accuracy: Accuracy
@@ -82,23 +83,23 @@ class Orbit:
 
     @property
     def period(self) -> int:
-        """Number of its events."""
-        return len(self.events)
+        """Number of its cycles."""
+        return len(self.cycles)
 
     @property
     def begin(self) -> np.ndarray:
-        """The section where the cycle begins."""
-        return np.asarray(section(self.events[0].begin) + self.ahead)
+        """The section where the orbit begins."""
+        return np.asarray(section(self.cycles[0].begin) + self.ahead)
 
     @cached_property
     def implied(self) -> np.ndarray:
-        """Corrections of the numbers of its first event, because its events do not close."""
+        """Corrections of the numbers of its first cycle, because its cycles do not close."""
         return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
 
     @cached_property
     def numbers(self) -> np.ndarray:
-        """The headline numbers of its first event, had its events closed."""
-        return np.asarray(np.array(self.events[0].numbers()) + self.implied)
+        """The headline numbers of its first cycle, had its cycles closed."""
+        return np.asarray(np.array(self.cycles[0].numbers()) + self.implied)
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -113,13 +114,13 @@ class Orbit:
 
     @property
     def from_largest(self) -> Orbit:
-        """This course, beginning with the event that has the fastest peak."""
-        at = max(range(self.period), key=lambda place: self.events[place].fastest)
+        """This orbit, beginning with the cycle that has the fastest peak."""
+        at = max(range(self.period), key=lambda place: self.cycles[place].fastest)
         if not at:
             return self
         return replace(
             self,
-            events=self.events[at:] + self.events[:at],
+            cycles=self.cycles[at:] + self.cycles[:at],
             slopes=self.slopes[at:] + self.slopes[:at],
             ahead=product(self.slopes[:at]) @ self.ahead,
         )
@@ -131,12 +132,12 @@ def section(point: Point) -> np.ndarray:
 
 
 def image_of(cycle: Cycle) -> np.ndarray:
-    """The section at the end of an event, and its numbers below that."""
+    """The section at the end of a cycle, and its numbers below that."""
     return np.array((cycle.end.spring_stress, *cycle.end.psis, *cycle.numbers()))
 
 
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
-    """The derivative of the section over several events, one after the other: the product of
+    """The derivative of the section over several cycles, one after the other: the product of
     theirs, of shape (1 + states, 1 + states).
     """
     size = slopes[0].shape[1]
@@ -157,7 +158,7 @@ class ReturnMap:
     meter : Meter
         Charged with the motions.
     recorded : bool
-        Whether to keep what the motions along a cycle do, besides its ends.
+        Whether to keep what the motions along an orbit do, besides its ends.
     """
 
     def __init__(
@@ -189,10 +190,10 @@ class ReturnMap:
         given = limits(self.scene, self.accuracy)
         return weight_of_mass(point.log_slip_rate, inertial_stress, given) >= 1.0
 
-    def events(
+    def cycles(
         self, start: np.ndarray, count: int, recording: Recording | None = None
     ) -> list[Cycle]:
-        """So many events from a section on; fewer where the motion settles or cannot go on."""
+        """So many cycles from a section on; fewer where the motion settles or cannot go on."""
         seen = list[Cycle]()
         try:
             moving = cycles(self.scene, self.accuracy, self._meter, self.point(start), recording)
@@ -208,14 +209,14 @@ class ReturnMap:
         return seen
 
     def image(self, start: np.ndarray) -> np.ndarray | None:
-        """The section one event later, and the numbers of the event below it, of shape (1 + states
+        """The section one cycle later, and the numbers of the cycle below it, of shape (1 + states
         + numbers,); None where the motion does not come that far.
         """
-        seen = self.events(start, 1)
+        seen = self.cycles(start, 1)
         return image_of(seen[0]) if seen else None
 
     def slopes(self, start: np.ndarray, count: int, scale: float) -> tuple[np.ndarray, ...]:
-        """Derivatives of so many events, one after the other, none of which takes a small step far;
+        """Derivatives of so many cycles, one after the other, none of which takes a small step far;
         fewer where the motion does not come that far. States are of the size of the scale.
         """
         found, step = list[np.ndarray](), STEP * math.sqrt(self.accuracy.refinement) * scale
@@ -231,7 +232,7 @@ class ReturnMap:
 
     def along(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
         """The direction in which the motion passes a section, and what going that way changes of
-        the section and the numbers of an event, as long as mass hardly acts: the time it takes.
+        the section and the numbers of a cycle, as long as mass hardly acts: the time it takes.
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.friction + scene.dynamics.radiated(scene.log_load_rate)
@@ -241,7 +242,7 @@ class ReturnMap:
         return way, changes
 
     def _slopes(self, start: np.ndarray, step: float) -> np.ndarray | None:
-        """Of the section after one event and of its numbers, by differences of order four; along
+        """Of the section after one cycle and of its numbers, by differences of order four; along
         the motion, as it passes on.
         """
         point = self.point(start)
@@ -265,7 +266,7 @@ class ReturnMap:
     def orbit(
         self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
     ) -> Orbit | None:
-        """The cycle of so many events, or of a divisor of them, within reach of a section; None
+        """The orbit of so many cycles, or of a divisor of them, within reach of a section; None
         where there is none.
         """
         scale = self.scene.a * swing
@@ -273,23 +274,23 @@ class ReturnMap:
         found = self._solve(start, slopes, scale, reach) if len(slopes) == count else None
         if found is None:
             return None
-        count = _events_until_repeat(found.events, scale)
+        count = _cycles_until_repeat(found.cycles, scale)
         if np.abs(found.begin - start).max() > 10.0 * self.accuracy.rtol * scale:
             slopes = self.slopes(found.begin, count, scale)
         if len(slopes) < count:
             return None
-        return replace(found, events=found.events[:count], slopes=slopes[:count])
+        return replace(found, cycles=found.cycles[:count], slopes=slopes[:count])
 
     def again(self, known: Orbit) -> Orbit | None:
-        """A cycle that is known at another accuracy; None where it does not close."""
+        """An orbit that is known at another accuracy; None where it does not close."""
         if known.accuracy == self.accuracy:
             return known
-        return self._solve(known.begin, known.slopes, self.scene.a * known.events[0].swing, _NEAR)
+        return self._solve(known.begin, known.slopes, self.scene.a * known.cycles[0].swing, _NEAR)
 
     def _solve(
         self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, reach: float
     ) -> Orbit | None:
-        """The cycle of as many events as derivatives are known of, within reach of a section; None
+        """The orbit of as many cycles as derivatives are known of, within reach of a section; None
         where there is none.
 
         By Newton's method, ``J move = -(P(s) - s)``, with Broyden's corrections: where P(s) - s is
@@ -299,10 +300,10 @@ class ReturnMap:
         jacobian, move = product(slopes) - np.eye(len(start)), None
         for _ in range(_TRIES):
             spent, recording = self._meter.spent, Recording() if self._recorded else None
-            events = self.events(at, len(slopes), recording)
-            if len(events) < len(slopes):
+            seen = self.cycles(at, len(slopes), recording)
+            if len(seen) < len(slopes):
                 return None
-            off = section(events[-1].end) - at
+            off = section(seen[-1].end) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
@@ -310,18 +311,18 @@ class ReturnMap:
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.spent - spent
-                return Orbit(tuple(events), tuple(slopes), move, self.accuracy, work, recording)
+                return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
             if not max(map(abs, (at - start).tolist())) <= reach * scale:
                 return None
         return None
 
 
-def _events_until_repeat(events: Sequence[Cycle], scale: float) -> int:
-    """After how many of its events a cycle begins anew."""
-    begin = section(events[0].begin)
-    for count in range(1, len(events)):
-        apart = np.abs(section(events[count - 1].end) - begin).max()
-        if len(events) % count == 0 and apart < 1e-4 * scale:
+def _cycles_until_repeat(cycles: Sequence[Cycle], scale: float) -> int:
+    """After how many of its cycles an orbit begins anew."""
+    begin = section(cycles[0].begin)
+    for count in range(1, len(cycles)):
+        apart = np.abs(section(cycles[count - 1].end) - begin).max()
+        if len(cycles) % count == 0 and apart < 1e-4 * scale:
             return count
-    return len(events)
+    return len(cycles)

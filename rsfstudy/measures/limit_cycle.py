@@ -174,7 +174,7 @@ class LimitCycle(Recorded):
         errors = cycle_errors(accuracy, one, again)
         values = dict(zip(_HEADLINES, one.numbers.tolist(), strict=True))
         values |= {f"{n}_error": e for n, e in zip(_HEADLINES, errors.tolist(), strict=True)}
-        cycle = one.events[0]
+        cycle = one.cycles[0]
         carried = (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
@@ -184,7 +184,7 @@ class LimitCycle(Recorded):
         values["events_until_repeat"] = float(events)
         values["work_per_cycle"] = one.work / one.period
         status, why = judged(accuracy, one, errors)
-        path = path_of(scene, again.events, again.recording)
+        path = path_of(scene, again.cycles, again.recording)
         return Outcome(status, values | along_path(path, self.phases, engine=accuracy.engine), why)
 
 
