@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rsfstudy import Scene
+from rsfstudy import Scene, simulate
 from rsfstudy.analysis import after_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -187,3 +187,20 @@ def test_two_of_three_lengths_alike_are_two(engine):
     )  # fmt: skip
     assert other == pytest.approx(one, rel=2e-6)
     assert np.isfinite(one)
+
+
+@pytest.mark.parametrize("law", LAWS.values())
+def test_a_motion_tells_each_state(law):
+    """They add up to the state variable, to rounding, because stress takes nothing from them; and
+    come to rest at -b_i ln(V_0/V_*) each: the slower one to exp(-20) after 40 D_c, of length 2 D_c.
+    """
+    scene = Scene(
+        law=law, b1_over_a=1.4, b2_over_a=-0.6, length_ratio=2.0, stiffness=1.0,
+        load_velocity_ratio=math.e, **CONSTANT,
+    )  # fmt: skip
+    motion = simulate(scene, duration=40.0 / math.e, rtol=1e-8)
+    together = motion["state_1"] + motion["state_2"]
+    np.testing.assert_allclose(together, motion["state_variable"], atol=1e-14)
+    ends = [float(motion[name][-1]) for name in ("state_1", "state_2")]
+    assert ends == pytest.approx([-1.4 * scene.a, 0.6 * scene.a], rel=1e-7)
+    assert "state_1" not in simulate(Scene(law="slip", load_velocity_ratio=2.0), duration=1.0)

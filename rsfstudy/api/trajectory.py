@@ -90,8 +90,10 @@ def simulate(
         ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring), ``frictional_stress``,
         ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``, and what a rig reads,
         ``load_point_displacement`` and ``friction_coefficient`` (spring stress over normal stress
-        less pore pressure outside the fault), along ``time``; and ``porosity`` and
-        ``pore_pressure`` of a dilatant fault.
+        less pore pressure outside the fault), along ``time``; ``porosity`` and ``pore_pressure`` of
+        a dilatant fault; and of a law with several states ``state_1``, ``state_2`` and so on, each
+        freed of what stress has taken from it: where stress takes nothing, they add up to
+        ``state_variable``.
         Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
         time and what it then is a few floating-point numbers later, as are the points of a rupture
         too short for its times to differ. A motion that cannot go on ends early, with its
@@ -151,6 +153,9 @@ def simulate(
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
+    if scene.parts.law.states > 1:
+        of_law = range(scene.parts.law.states)
+        columns |= {_state(i + 1): seen[:, STATES + i] for i in of_law}
     columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
     columns[quantity("friction_coefficient")] = friction_coefficient_of(seen)
     dataset = xr.Dataset({q.name: ("time", values, q.attributes) for q, values in columns.items()})
@@ -193,6 +198,11 @@ def simulate(
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
     return dataset
+
+
+def _state(number: int) -> Quantity:
+    about = f"state {number} of the law, as a part of the friction coefficient, freed of stress"
+    return Quantity(f"state_{number}", rf"$\Psi_{{{number}}}$", "1", about)
 
 
 def _end_of(motion: object, scene: Scene) -> Event:
