@@ -35,7 +35,8 @@ def directory(output: str | Path | None) -> Path | None:
 
 def results(name: str | Path, output: str | Path | None) -> Path:
     """The results of a named study, or of the study that a file declares, in a directory; or the
-    results file that is named itself.
+    results file that is named itself. A file that declares a study is run, because results bear the
+    name that its `Study` states.
 
     Raises
     ------

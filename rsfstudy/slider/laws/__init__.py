@@ -164,7 +164,9 @@ class Law(LawOfStates):
         check(self, scene) -> None
 
     The first returns ``(*super().numbers(scene), ...)``, the second raises `InvalidValue`. The law
-    is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`.
+    is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`. A law with
+    one b may have several states, too, and then states `evolutions` and `steady_states`, as
+    `LawOfStates` says.
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
