@@ -20,7 +20,7 @@ from rsfstudy.motion.engines import SCIPY, check_engine
 from rsfstudy.motion.events import Event, Kind, rise
 from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.motion.readings import friction_coefficient_of, load_point_of
-from rsfstudy.motion.recording import OBSERVED, ROW_REGIME, STATES, Recording, strictly_later
+from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.history import History
@@ -164,7 +164,7 @@ def simulate(
         "flag_values": np.arange(len(recording.regimes), dtype=np.int8),
         "flag_meanings": " ".join(recording.regimes),
     }
-    dataset["regime"] = "time", seen[:, ROW_REGIME].astype(np.int8), regimes
+    dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), regimes
     dataset["reference_rate"] = (), scene.reference_rate, {"units": "s-1"}
     dataset = dataset.set_coords(["slip", "reference_rate"])
     dataset = dataset.assign_attrs(

@@ -109,7 +109,7 @@ NEVER, WITHIN_STEPS, AT_CLOCKS, AT_TIMES = range(4)
 
 
 #: Columns of the table of events; from POINT on, those of a point.
-CODE, REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
+CODE, EVENT_REGIME, CLOCK, TIME, SLIP, SPENT, POINT = range(7)
 #: Codes of events that are not asked for; those of others are the places of their specifications.
 BEGIN, CHANGE, END, SAMPLED, KINK = -1, -2, -3, -4, -5
 

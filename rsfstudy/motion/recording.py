@@ -31,7 +31,7 @@ STRESSES = slice(OBSERVED.index("shear_stress"), OBSERVED.index("frictional_stre
 READ = (*OBSERVED, "friction_coefficient")
 #: Columns behind those: the regime; the place within a step, 0 where a regime begins and `SAMPLES`
 #: at the end of each step; and from this one on the states.
-ROW_REGIME, PLACE, STATES = range(len(READ), len(READ) + 3)
+REGIME, PLACE, STATES = range(len(READ), len(READ) + 3)
 #: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
 #: they still differ in other units, where each is rounded anew.
 _APART, _LEAST = 4, 1e-290
@@ -74,7 +74,7 @@ class Recording:
         if self.at is not None and not np.isnan(rows[0, 0]):
             rows[:, 0] = self.at[len(self.at) - len(self.left()) :][: len(rows)]
         numbers = np.array([self.number(name) for name in regimes])
-        rows[:, ROW_REGIME] = numbers[rows[:, ROW_REGIME].astype(int)]
+        rows[:, REGIME] = numbers[rows[:, REGIME].astype(int)]
         self._rows.append(rows)
 
     def ends_at(self, time: float) -> None:
@@ -125,7 +125,7 @@ def strictly_later(table: np.ndarray) -> np.ndarray:
     of one that holds the same; where they differ, it follows a few floating-point numbers later, as
     do rows of a rupture shorter than the spacing of those numbers.
     """
-    same = (np.diff(np.delete(table, [ROW_REGIME, PLACE], axis=1), axis=0) == 0.0).all(axis=1)
+    same = (np.diff(np.delete(table, [REGIME, PLACE], axis=1), axis=0) == 0.0).all(axis=1)
     table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
     times, earliest = table[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):
@@ -153,7 +153,7 @@ def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
     within = part / SAMPLES * _PLACES[1:-1]
     step = table[begin + 1 : begin + SAMPLES + 1]
     step[:-1], step[-1] = _weights(within).T @ table[begin : begin + SAMPLES + 1], last
-    step[:, ROW_REGIME], step[:, PLACE] = last[ROW_REGIME], _PLACES[1:]
+    step[:, REGIME], step[:, PLACE] = last[REGIME], _PLACES[1:]
     return table[: begin + SAMPLES + 1]
 
 

@@ -17,6 +17,7 @@ from rsfstudy.motion.layout import (
     COEFFICIENT,
     DISTANCE,
     ENDS,
+    EVENT_REGIME,
     FARTHEST,
     FRICTION,
     GROWTH,
@@ -33,7 +34,6 @@ from rsfstudy.motion.layout import (
     RATIO,
     READING,
     READING_GROWTH,
-    REGIME,
     RISE,
     SETTLED,
     SLIP,
@@ -46,7 +46,7 @@ from rsfstudy.motion.layout import (
     WAITS,
     WITHIN_STEPS,
 )
-from rsfstudy.motion.recording import PLACE, ROW_REGIME, SAMPLES, STATES
+from rsfstudy.motion.recording import PLACE, REGIME, SAMPLES, STATES
 from rsfstudy.motion.roots import root_of
 from rsfstudy.motion.steppers import unknowns_at
 from rsfstudy.motion.steps import elapsed, passed_at_begin, passed_at_end, point_within
@@ -133,7 +133,7 @@ def located(what, at_begin, at_end, motion, space):
 def add_event(motion, events, code, clock, passed, columns, p):
     """Add an event to the table."""
     n = motion.events
-    events[n, CODE], events[n, REGIME], events[n, CLOCK] = code, motion.regime, clock
+    events[n, CODE], events[n, EVENT_REGIME], events[n, CLOCK] = code, motion.regime, clock
     events[n, TIME] = motion.time + passed
     events[n, SLIP] = slipped(motion, clock, passed, columns[SPRING], p)
     events[n, SPENT] = motion.spent_slow + motion.spent_fast
@@ -327,7 +327,7 @@ def record_point(motion, rows, clock, passed, columns, p):
     rows[n, 1] = slipped(motion, clock, passed, columns[SPRING], p)
     rows[n, 2], rows[n, 3], rows[n, 4] = columns[LOG_RATE], columns[SPRING], columns[FRICTION]
     rows[n, 5], rows[n, 6], rows[n, 7] = columns[RATIO], columns[STATE], columns[READING]
-    rows[n, ROW_REGIME], rows[n, PLACE] = motion.regime, 0.0
+    rows[n, REGIME], rows[n, PLACE] = motion.regime, 0.0
     for i in range(motion.states):
         rows[n, STATES + i] = columns[PSIS + i]
     motion.recorded = n + 1
