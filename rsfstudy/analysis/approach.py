@@ -19,7 +19,7 @@ trace is the eigenvalue that is not 0. So A**2 = (tr A) A, and from s to the fix
 
     (1 - A)^-1 (P(s) - s) = P(s) - s + A (P(s) - s)/(1 - tr A).
 
-With several states a motion is followed event by event: after how many it repeats itself, if ever.
+With several states a motion is followed cycle by cycle: after how many it repeats itself, if ever.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ from rsfstudy.status import Status
 _SLOW_APPROACH, _DIVERGES = 0.03, 0.98
 #: Longest leap, as a part of the swing of ln V.
 _NEAR = 0.1
-#: Most events of a period that is looked for.
+#: Most cycles of a period that is looked for.
 LONGEST = 16
 #: Accuracy at which cycles are closed, where no better one is asked for: differences lose digits.
 _FINE = 1e-7
-#: Events after which a motion is first looked at.
+#: Cycles after which a motion is first looked at.
 _FIRST_LOOK = 8
-#: Size of a multiplier from which a cycle repels beyond doubt, and how far off its like an event is
+#: Size of a multiplier from which an orbit repels beyond doubt, and how far off its like a cycle is
 #: that repeats none, over how far ln V swings.
 _REPELS, _OFF = 1.01, 0.02
 
@@ -211,11 +211,11 @@ class Course:
     Attributes
     ----------
     seen : list of Cycle
-        Its events.
+        Its cycles (the events of `measures.limit_cycle`).
     orbit : Orbit or None
-        The cycle it ends in; none, where it has not found one.
+        The periodic orbit it ends in; none, where it has not found one.
     open : bool
-        Whether it may still find one, as far as its events tell.
+        Whether it may still find one, as far as its cycles tell.
     """
 
     seen: list[Cycle]
@@ -226,7 +226,7 @@ class Course:
 def course(
     scene: Scene, accuracy: Accuracy, meter: Meter, events: int, *, to_its_end: bool = False
 ) -> Course | None:
-    """Follow a motion until it comes to a cycle that attracts, for so many events at most; or `to
+    """Follow a motion until it comes to an orbit that attracts, for so many cycles at most; or `to
     its end` in any case. None where it settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
@@ -250,17 +250,17 @@ def course(
 
 
 def _on_its_way(seen: Sequence[Cycle]) -> bool:
-    """True if events are too few to say anything of them, or still grow or shrink all the time."""
+    """True if cycles are too few to say anything of them, or still grow or shrink all the time."""
     growth = np.diff([cycle.swing for cycle in seen[len(seen) // 2 :]])
     return len(seen) < _FIRST_LOOK or bool((growth > 0.0).all() or (growth < 0.0).all())
 
 
 def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
-    """After how many events a motion comes closest to where it was, in all of the later half of its
-    events; and how far it is off then (infinitely, where there are too few events to say).
+    """After how many cycles a motion comes closest to where it was, in all of the later half of its
+    cycles; and how far it is off then (infinitely, where there are too few cycles to say).
 
-    After n events it is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the ends of
-    these events, over a times how far ln V swings; the smallest n that is within twice the least
+    After n cycles it is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the ends of
+    these cycles, over a times how far ln V swings; the smallest n that is within twice the least
     of all counts.
     """
     if len(seen) < 4:
