@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from operator import sub
 
 import numpy as np
@@ -144,7 +144,7 @@ class Approach:
                 self._known = True
                 # the motion passes a section without a change of spring stress
                 (_none, way), passed = self._by.along(begin)
-                along = tuple((passed / way).tolist())
+                along = tuple(change / way for change in passed)
                 left = (x - by_state * y for x, y in zip(changes, along, strict=True))
                 self._slopes = tuple(x / by_stress for x in left), along
         self._begin, self._image, self._changes = start, image, changes
@@ -230,7 +230,7 @@ def course(
     its end` in any case. None where it settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
-    fine = replace(accuracy, rtol=min(accuracy.rtol, _FINE))
+    fine = accuracy.at(min(accuracy.rtol, _FINE))
     by, look = ReturnMap(scene, fine, meter), min(_FIRST_LOOK, events)
     for cycle in cycles(scene, accuracy, meter, None):
         if cycle is None:

@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.linalg.lapack import dgesv
@@ -38,6 +38,7 @@ from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.starting import at_rate, beginning, check_start
 from rsfstudy.slider.equations import without_mass
+from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -147,6 +148,9 @@ def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
     return together
 
 
+_unit = lru_cache(np.eye)
+
+
 class ReturnMap:
     """The map of spring stress and states from one rise of V through V_0 to the next.
 
@@ -230,16 +234,15 @@ class ReturnMap:
             current = None if after is None else after[: len(current)]
         return tuple(found)
 
-    def along(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    def along(self, point: Point) -> tuple[Numbers, Numbers]:
         """The direction in which the motion passes a section, and what going that way changes of
         the section and the numbers of a cycle, as long as mass hardly acts: the time it takes.
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.friction + scene.dynamics.radiated(scene.log_load_rate)
         rates = without_mass(scene, clock=True).rates((spring_stress, *point.psis, 0.0))
-        way, changes = np.array((0.0, *rates[1:-1])), np.zeros(1 + states + NUMBERS)
-        changes[1 + states] = -rates[-1]
-        return way, changes
+        rest = (0.0,) * (NUMBERS - 1)
+        return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
     def _slopes(self, start: np.ndarray, step: float) -> np.ndarray | None:
         """Of the section after one cycle and of its numbers, by differences of order four; along
@@ -251,7 +254,7 @@ class ReturnMap:
         columns = list[np.ndarray]()
         for unit in directions.T:
             if not columns and not self._acts(point):
-                columns.append(passed / (unit @ way))
+                columns.append(np.array(passed) / (unit @ way))
                 continue
             slope = np.zeros(len(start) + NUMBERS)
             for number, weight in _WEIGHTS:
@@ -297,7 +300,7 @@ class ReturnMap:
         still `off` after a move, J changes by ``off move^T/(move . move)``.
         """
         at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
-        jacobian, move = product(slopes) - np.eye(len(start)), None
+        jacobian, move = product(slopes) - _unit(len(start)), None
         for _ in range(_TRIES):
             spent, recording = self._meter.spent, Recording() if self._recorded else None
             seen = self.cycles(at, len(slopes), recording)

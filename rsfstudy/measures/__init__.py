@@ -233,7 +233,8 @@ class Measure:
                 outcome = self._held_to(accuracy.rtol, scene, outcome)
         except Halt as halt:
             outcome = Outcome(halt.status, message=str(halt))
-        return replace(outcome, rhs_evaluations=_checks.count(meter.spent)), meter
+        spent = _checks.count(meter.spent)
+        return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
 
     def _checked(self, outcome: Outcome) -> Outcome:
         """An outcome whose numbers are as declared; ok without one that it must have becomes
@@ -255,12 +256,18 @@ class Measure:
             raise InvalidValue("measured", outcome, "must say what became of the cell")
         declared, inner = self.variables, self.inner_coordinates
         given = outcome.values.items()
-        values = {name: _checks.number(declared, inner, name, value) for name, value in given}
+        values = {
+            # most are plain numbers
+            name: value
+            if isinstance(value, float) and declared.get(name) == ()
+            else _checks.number(declared, inner, name, value)
+            for name, value in given
+        }
         lacking = self._lacking(values) if outcome.status is Status.OK else None
         if lacking:
             why = f"{lacking} = {values.get(lacking, math.nan)}"
             return Outcome(Status.NOT_FINITE, values, why)
-        return replace(outcome, values=values)
+        return Outcome(outcome.status, values, outcome.message)
 
     def _lacking(self, values: Mapping[str, Value]) -> str | None:
         """The first number of an ok outcome that is missing or not finite: the headline, and each

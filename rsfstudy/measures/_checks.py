@@ -107,8 +107,6 @@ def number(
     """A measured number, or an array of them, as NumPy's or Python's own."""
     if name not in declared:
         raise InvalidValue("measured", name, "is not declared", choices=declared)
-    if isinstance(value, float) and not declared[name]:
-        return value  # as most are
     if isinstance(value, np.ma.MaskedArray):
         raise InvalidValue(name, value, "is masked, and must be a real number")
     array = np.asarray(value)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 
@@ -156,7 +156,7 @@ class CriticalStep(Measure):
             # a cycle attracts no path, and takes more care
             rtols = accuracy.rtol, min(accuracy.rtol, _CAREFUL)
             for find, rtol in zip((from_critical_path, from_touching_cycle), rtols, strict=True):
-                asked = accuracy if rtol == accuracy.rtol else replace(accuracy, rtol=rtol)
+                asked = accuracy if rtol == accuracy.rtol else accuracy.at(rtol)
                 boundary = find(steps, asked, meter)
                 if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
                     outcome = self._verified(steps, boundary, asked, meter)
@@ -257,7 +257,7 @@ class CriticalStep(Measure):
         """
         stable, unstable = bracket
         rtol = max(steps.allowed(math.exp(unstable), accuracy.rtol), TIGHTEST_RTOL)
-        accuracy = replace(accuracy, rtol=rtol)
+        accuracy = accuracy.at(rtol)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable

@@ -255,7 +255,7 @@ class Fit(Measure):
         own = of_law(scene, self.free)
         if own != self.free:
             return self._widened(replace(self, free=own).find(scene, accuracy, meter))
-        smooth = replace(accuracy, rtol=min(accuracy.rtol, _SMOOTH))
+        smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
         distances = self.slip_distance_guess, self.slip_distance_2_guess

@@ -134,7 +134,7 @@ class LimitCycle(Recorded):
             return self._of_several_states(scene, accuracy, meter)
         loose = max(accuracy.rtol, _LOW)
         for rtol in dict.fromkeys((loose, accuracy.rtol)):
-            approach = Approach(scene, replace(accuracy, rtol=rtol), meter)
+            approach = Approach(scene, accuracy.at(rtol), meter)
             try:
                 found = approach.follow(self.events)
             except Halt:
@@ -152,7 +152,7 @@ class LimitCycle(Recorded):
         """Follow events loosely up to a cycle of any period that attracts, and close it from its
         largest event on.
         """
-        motion = course(scene, replace(accuracy, rtol=max(accuracy.rtol, _LOW)), meter, self.events)
+        motion = course(scene, accuracy.at(max(accuracy.rtol, _LOW)), meter, self.events)
         if motion is None:
             return settled(scene)
         if motion.orbit is None:
@@ -238,14 +238,14 @@ def judged(
     return Status.UNVERIFIED, f"{why}: ask for another rtol"
 
 
-def _scales(orbit: Orbit) -> np.ndarray:
+def _scales(orbit: Orbit) -> list[float]:
     """What the errors of the headline numbers are relative to.
 
     Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
     """
     *others, slowest, fastest = orbit.numbers.tolist()
     half = 0.5 * (fastest - slowest)
-    return np.array([*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)])
+    return [*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)]
 
 
 def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
@@ -253,7 +253,7 @@ def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
     derivatives that both share, because the events do not quite close.
     """
     chance, scales = _BY_CHANCE * accuracy.rtol, _scales(one)
-    pairs = zip(one.numbers.tolist(), again.numbers.tolist(), scales.tolist(), strict=True)
+    pairs = zip(one.numbers.tolist(), again.numbers.tolist(), scales, strict=True)
     errors = [error_between(number, refined, chance, scale) for number, refined, scale in pairs]
     return np.asarray(np.abs(one.implied) + np.array(errors))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from numbers import Real
 
 from rsfstudy.errors import InvalidValue
@@ -80,7 +81,11 @@ class Accuracy:
         At order eight it costs a third more than the first. The errors of the two are far apart,
         and nothing is shared that could be wrong in both.
         """
-        return replace(self, refinement=0.1 * self.refinement)
+        return _changed(self, self.rtol, 0.1 * self.refinement)
+
+    def at(self, rtol: float) -> Accuracy:
+        """The same with another `rtol`."""
+        return _changed(self, rtol, self.refinement)
 
     @property
     def solver(self) -> float:
@@ -115,6 +120,12 @@ class Accuracy:
         manifold.
         """
         return 0.3 * self.rtol * self.refinement
+
+
+@lru_cache(maxsize=256)
+def _changed(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
+    """A copy, the same for all cells of a study."""
+    return replace(accuracy, rtol=rtol, refinement=refinement)
 
 
 def error_between(

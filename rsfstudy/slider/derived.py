@@ -30,9 +30,10 @@ def once(make: Callable[Concatenate[Any, P], T]) -> Callable[Concatenate[Any, P]
 
     @wraps(make)
     def known(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
-        key = make, *stated, *named.values()
-        if key not in scene.made:
-            scene.made[key] = make(scene, *stated, **named)
-        return scene.made[key]
+        made, key = scene.made, (make, *stated, *named.values())
+        found = made.get(key)  # a key may take long to hash
+        if found is None:
+            found = made[key] = make(scene, *stated, **named)
+        return found
 
     return known
