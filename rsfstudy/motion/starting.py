@@ -24,7 +24,7 @@ from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-_TOLD_LATER = Point(*12 * (math.nan,), psis=())
+_TOLD_LATER = (math.nan,) * len(Point._fields[5:-1])
 
 
 def starting(scene: Scene) -> Point:
@@ -57,13 +57,8 @@ def beginning(
     """A point that holds what a motion begins with: spring stress, states and, with mass, ln(V/V_*)
     and frictional stress. All else is NaN, and told with the first event.
     """
-    return _TOLD_LATER._replace(
-        log_slip_rate=log_slip_rate,
-        spring_stress=spring_stress,
-        friction=friction,
-        psi=scene.functions.friction.state_sum(psis),
-        psis=psis,
-    )
+    psi = scene.functions.friction.state_sum(psis)
+    return Point(log_slip_rate, math.nan, spring_stress, friction, psi, *_TOLD_LATER, psis)
 
 
 def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:

@@ -94,17 +94,25 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 def _slow(scene: Scene, forms: System, regime: str, *, clock: bool) -> Equations:
     unknowns, form = ("spring_stress", *_states(scene)), forms.between_ruptures
-    scales, p = (scene.a,) * len(unknowns), scene.numbers
-    equations = Equations(
-        regime, unknowns, scales, form.rate, form.point, p, scene.states, forms.balance
-    )
-    return _with_time(equations, form) if clock else equations
+    scales = (scene.a,) * len(unknowns)
+    return _of_form(scene, regime, unknowns, scales, form, forms.balance, clock=clock)
 
 
-def _with_time(equations: Equations, form: Form) -> Equations:
-    """The same equations with time, of the form's clock, as a passenger."""
-    names, scales = (*equations.unknowns, "time"), (*equations.scales, 1.0)
-    return equations._replace(unknowns=names, scales=scales, rate=form.rate_with_time)
+def _of_form(
+    scene: Scene,
+    regime: str,
+    unknowns: tuple[str, ...],
+    scales: tuple[float, ...],
+    form: Form,
+    balance: Function | None,
+    *,
+    clock: bool,
+) -> Equations:
+    """Equations by a form; with time, of the form's clock, as a passenger."""
+    rate, p = form.rate, scene.numbers
+    if clock:
+        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), form.rate_with_time
+    return Equations(regime, unknowns, scales, rate, form.point, p, scene.states, balance)
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -121,9 +129,8 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """
     a, form, others = scene.a, _full(scene), _states(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
-    scales, p = (a, 1.0, a, *[a] * len(others)), scene.numbers
-    equations = Equations(IN_RUPTURE, unknowns, scales, form.rate, form.point, p, scene.states)
-    return _with_time(equations, form) if clock else equations
+    scales = (a, 1.0, a, *[a] * len(others))
+    return _of_form(scene, IN_RUPTURE, unknowns, scales, form, None, clock=clock)
 
 
 def _full(scene: Scene) -> Form:

@@ -19,6 +19,7 @@ import math
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -172,6 +173,14 @@ def quantities_of(part: type[Part]) -> list[Quantity]:
     return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 
 
+@cache
+def _stated(part: type[Part], name: str) -> tuple[Any, str, str, Callable[[float], bool] | None]:
+    """The default of a field, its rule, the remedy, and whether a number keeps to the rule."""
+    stated = part.__dataclass_fields__[name]
+    rule = stated.metadata["rule"]
+    return stated.default, rule, stated.metadata["remedy"], RULES.get(rule)
+
+
 def checked(part: type[Part], name: str, value: Any) -> Any:
     """A value for a field of a part, as Python's own number or flag.
 
@@ -180,12 +189,11 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
     InvalidValue
         Where it is none, or breaks the rule of the field.
     """
-    stated = part.__dataclass_fields__[name]
-    rule, remedy = stated.metadata["rule"], stated.metadata["remedy"]
-    if value is None and stated.default is None:
-        return None
-    if type(value) is float and math.isfinite(value) and rule in RULES and RULES[rule](value):
+    default, rule, remedy, allows = _stated(part, name)
+    if type(value) is float and math.isfinite(value) and allows and allows(value):
         return value  # as most are
+    if value is None and default is None:
+        return None
     flagged = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
     if rule == _FLAG:
         if not flagged:
