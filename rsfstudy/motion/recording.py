@@ -73,8 +73,9 @@ class Recording:
         """Take in rows as the loop makes them, in which regimes are numbered as in a list."""
         if self.at is not None and not np.isnan(rows[0, 0]):
             rows[:, 0] = self.at[len(self.at) - len(self.left()) :][: len(rows)]
-        numbers = np.array([self.number(name) for name in regimes])
-        rows[:, REGIME] = numbers[rows[:, REGIME].astype(int)]
+        numbers = [self.number(name) for name in regimes]
+        if numbers != list(range(len(numbers))):
+            rows[:, REGIME] = np.array(numbers)[rows[:, REGIME].astype(int)]
         self._rows.append(rows)
 
     def ends_at(self, time: float) -> None:

@@ -81,15 +81,18 @@ def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
 def _by_place(given: Mapping[str, Any], layout: Layout) -> dict[int, dict[str, Any]]:
     """What fields hold that are not None, by the place of the part that owns them."""
     values: dict[int, dict[str, Any]] = {}
+    kinds, places, idle = layout.kinds, layout.places, layout.idle
     for name, value in given.items():
-        place = layout.places.get(name)
+        place = places.get(name)
         if place is not None:
             if value is not None:
-                values.setdefault(place, {})[name] = checked(layout.kinds[place], name, value)
-        elif name in layout.refusing:
+                values.setdefault(place, {})[name] = checked(kinds[place], name, value)
+        elif name in idle:
             # one that calls for another part may be stated, if it does not call
+            if value is None or value is idle[name]:
+                continue
             owner = OWNERS[name]
-            if value is not None and (name != owner.called_by or checked(owner, name, value)):
+            if name != owner.called_by or checked(owner, name, value):
                 raise layout.refusing[name].refuse(name, value)
         elif name not in SLOT_NAMES:
             raise _unknown_field(name, value, layout)

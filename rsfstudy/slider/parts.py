@@ -194,7 +194,7 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
         return value  # as most are
     if value is None and default is None:
         return None
-    flagged = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's bool too
+    flagged = type(value).__name__ == "bool"  # numpy's too
     if rule == _FLAG:
         if not flagged:
             raise InvalidValue(name, value, rule)
