@@ -58,7 +58,8 @@ def beginning(
     and frictional stress. All else is NaN, and told with the first event.
     """
     psi = scene.functions.friction.state_sum(psis)
-    return Point(log_slip_rate, math.nan, spring_stress, friction, psi, *_TOLD_LATER, psis)
+    known = log_slip_rate, math.nan, spring_stress, friction, psi
+    return Point._make((*known, *_TOLD_LATER, psis))
 
 
 def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:

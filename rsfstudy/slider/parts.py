@@ -189,7 +189,7 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
     InvalidValue
         Where it is none, or breaks the rule of the field.
     """
-    default, rule, remedy, allows = _stated(part, name)
+    default, rule, remedy, allows = _stated(part, name)  # type: ignore[arg-type]
     if type(value) is float and math.isfinite(value) and allows and allows(value):
         return value  # as most are
     if value is None and default is None:
