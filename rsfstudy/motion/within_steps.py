@@ -214,7 +214,8 @@ def detect(motion, space):
                 space.when[w] = motion.end
         else:
             before, after = quantity(spec, space.before, p), quantity(spec, space.after, p)
-            if happens(spec, before, after, motion.direction):
+            changes = before < 0.0 <= after or before > 0.0 >= after
+            if changes and happens(spec, before, after, motion.direction):
                 space.when[w] = located(float(w), before, after, motion, space)
         if not math.isnan(space.when[w]):
             count += 1

@@ -60,55 +60,27 @@ def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Func
 @cache
 def sum_of(count: int) -> Function:
     """Sum of the first so many numbers."""
-    if count == 1:
-
-        def first(numbers: Numbers) -> float:
-            return numbers[0]
-
-        return first
-
-    others, last = sum_of(count - 1), count - 1
-
-    def total(numbers: Numbers) -> float:
-        return others(numbers) + numbers[last]
-
-    return total
+    return _written("numbers", " + ".join(f"numbers[{i}]" for i in range(count)))
 
 
 @cache
 def scaled(count: int) -> Function:
     """``(numbers, by) -> tuple``: so many times each of the first so many numbers."""
-    if count == 1:
-
-        def one(numbers: Numbers, by: float) -> Numbers:
-            return (by * numbers[0],)
-
-        return one
-
-    others, last = scaled(count - 1), count - 1
-
-    def several(numbers: Numbers, by: float) -> Numbers:
-        return (*others(numbers, by), by * numbers[last])
-
-    return several
+    each = (f"by * numbers[{i}], " for i in range(count))
+    return _written("numbers, by", f"({''.join(each)})")
 
 
 @cache
 def moved(count: int) -> Function:
     """``(psis, changes, by) -> tuple``: so many states after so many times their changes."""
-    if count == 1:
+    each = (f"psis[{i}] + by * changes[{i}], " for i in range(count))
+    return _written("psis, changes, by", f"({''.join(each)})")
 
-        def one(psis: Numbers, changes: Numbers, by: float) -> Numbers:
-            return (psis[0] + by * changes[0],)
 
-        return one
-
-    others, last = moved(count - 1), count - 1
-
-    def several(psis: Numbers, changes: Numbers, by: float) -> Numbers:
-        return (*others(psis, changes, by), psis[last] + by * changes[last])
-
-    return several
+def _written(arguments: str, value: str) -> Function:
+    """A function without a loop, which a compiler needs for tuples."""
+    function: Function = eval(f"lambda {arguments}: {value}", {"__name__": __name__})
+    return function
 
 
 def contribution_of(count: int, by_pressure: Function | None) -> Function:

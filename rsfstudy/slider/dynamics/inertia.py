@@ -122,7 +122,8 @@ def resisted(weight: float, growing: float, p: Numbers) -> float:
     than the motion meets before it leaves the slow manifold, so that trial steps beyond keep their
     sense of direction.
     """
-    return max(-p[A], min(p[A] * weight * growing, p[A]))
+    stress = p[A] * weight * growing
+    return stress if abs(stress) < p[A] else max(-p[A], min(stress, p[A]))
 
 
 def weight_at(x: float, slower: float, p: Numbers) -> float:
@@ -170,7 +171,7 @@ def rupture_rate(friction: Friction) -> Function:
 
 def bounded(rate: float) -> float:
     """A rate that a motion meets, or the largest."""
-    return max(min(rate, LARGEST_RATE), -LARGEST_RATE)
+    return rate if abs(rate) < LARGEST_RATE else max(min(rate, LARGEST_RATE), -LARGEST_RATE)
 
 
 @dataclass(frozen=True, kw_only=True)
