@@ -153,9 +153,10 @@ def rupture_rate(friction: Friction) -> Function:
     def rates(state: Numbers, p: Numbers) -> Numbers:
         spring_stress, x, g, others = state[0], state[1], state[2], state[3:]
         a, stiffness = p[A], p[STIFFNESS]
-        norm = math.exp(
-            max(min(x + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE), -LARGEST_LOG_SLIP_RATE)
-        )
+        log_norm = x + p[DYNAMICS + 1]
+        if abs(log_norm) > LARGEST_LOG_SLIP_RATE:
+            log_norm = math.copysign(LARGEST_LOG_SLIP_RATE, log_norm)
+        norm = math.exp(log_norm)
         value, slope, shift, _shift_slope = strength(g, others, p)
         faster = bounded((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)

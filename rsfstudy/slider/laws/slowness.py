@@ -36,7 +36,8 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     Linker and Dieterich (1992), J. Geophys. Res. 97 (first term of their slowness law).
     """
     b = p[LAW]
-    return b * exp_less_one(min(-(state / b + log_slip_rate), LARGEST_EXPONENT))
+    exponent = -(state / b + log_slip_rate)
+    return b * exp_less_one(LARGEST_EXPONENT if exponent > LARGEST_EXPONENT else exponent)
 
 
 def relaxation(rate: float, slip: float) -> float:
