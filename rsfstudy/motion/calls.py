@@ -20,3 +20,8 @@ def first_of(array):
 def moved(array, numbers):
     """An array from so many numbers further on."""
     return array[numbers:]
+
+
+def copy(source, target, count):
+    """Copy so many numbers."""
+    target[:count] = source[:count]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.calls import evaluate, first_of, moved
+from rsfstudy.motion.calls import copy, evaluate, first_of, moved
 from rsfstudy.motion.handover import (
     GOES_ON,
     Limits,
@@ -76,7 +76,7 @@ from rsfstudy.motion.within_steps import (
     slipped,
     waits,
 )
-from rsfstudy.motion.workspace import copy, workspace
+from rsfstudy.motion.workspace import workspace
 from rsfstudy.slider.places import (
     BEGINS,
     ENDS_AT,

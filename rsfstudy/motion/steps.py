@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.calls import evaluate
+from rsfstudy.motion.calls import copy, evaluate
 from rsfstudy.motion.layout import (
     BUDGET_SPENT,
     FAST,
@@ -16,7 +16,7 @@ from rsfstudy.motion.layout import (
     TAKEN,
 )
 from rsfstudy.motion.steppers import attempt, reach, retake, unknowns_at
-from rsfstudy.motion.workspace import copy, rate_of_step, spend
+from rsfstudy.motion.workspace import rate_of_step, spend
 from rsfstudy.slider.equations import LONGEST_STEP, stride
 from rsfstudy.slider.places import LOG_LOAD_RATE
 

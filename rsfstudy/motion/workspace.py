@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from rsfstudy.motion.calls import evaluate, moved
+from rsfstudy.motion.calls import copy, evaluate, moved
 from rsfstudy.motion.handover import Limits
 from rsfstudy.motion.layout import FUNCTIONS, PSIS, SLOW
 from rsfstudy.motion.steppers.unrolled import ALL_STAGES, ROWS, SIZES, STAGES
@@ -97,12 +97,6 @@ def workspace(block, y, unknowns, scales, states, functions, given):
     points = before, moved(before, columns), moved(before, 2 * columns), moved(before, 3 * columns)
     equations = functions[0], functions[1], functions[2], functions[FUNCTIONS - 1]
     return Workspace(unknowns, y, new, *step, *inside, *points, *equations, *given)
-
-
-def copy(source, target, count):
-    """Copy so many numbers."""
-    for i in range(count):
-        target[i] = source[i]
 
 
 def rate_of_step(motion, space, y, result):

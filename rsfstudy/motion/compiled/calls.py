@@ -69,6 +69,12 @@ def moved(pointer, numbers):
     return _moved(pointer, numbers)
 
 
+def copy(source, target, count):
+    """Copy so many numbers."""
+    for i in range(count):
+        target[i] = source[i]
+
+
 def at_rows(columns, at, found):
     """Fill in values of columns between rows (see `recording.at_rows`)."""
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES + 1)
@@ -102,6 +108,7 @@ IN_PLACE: Mapping[Any, Any] = {
     calls.evaluate: evaluate,
     calls.first_of: first_of,
     calls.moved: moved,
+    calls.copy: copy,
     recording.at_rows: at_rows,
     steppers.begin: order_eight.begin,
     steppers.attempt: order_eight.attempt,
