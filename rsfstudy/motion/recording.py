@@ -275,7 +275,6 @@ _PATH = tuple(OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shea
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
 HALF, _PLACES = 0.5 * SAMPLES, np.arange(SAMPLES + 1)
-_POWERS = _PLACES[:, None].astype(float)
 _INVERSE = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
 COEFFICIENTS = tuple(tuple(row) for row in _INVERSE.tolist())
 
@@ -290,4 +289,4 @@ def _polynomial(at: float, coefficients: Sequence[float]) -> float:
 
 def _weights(parts: np.ndarray) -> np.ndarray:
     """Weights of the values at the places of a step, a row each, at parts of it in places."""
-    return np.asarray(_INVERSE.T @ (parts / HALF - 1.0) ** _POWERS)
+    return np.asarray(_INVERSE.T @ (parts / HALF - 1.0) ** _PLACES[:, None])

@@ -94,25 +94,18 @@ def without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 def _slow(scene: Scene, forms: System, regime: str, *, clock: bool) -> Equations:
     unknowns, form = ("spring_stress", *_states(scene)), forms.between_ruptures
-    scales = (scene.a,) * len(unknowns)
-    return _of_form(scene, regime, unknowns, scales, form, forms.balance, clock=clock)
+    unknowns, scales, rate = _of_form(form, unknowns, (scene.a,) * len(unknowns), clock=clock)
+    p, states = scene.numbers, scene.states
+    return Equations(regime, unknowns, scales, rate, form.point, p, states, forms.balance)
 
 
 def _of_form(
-    scene: Scene,
-    regime: str,
-    unknowns: tuple[str, ...],
-    scales: tuple[float, ...],
-    form: Form,
-    balance: Function | None,
-    *,
-    clock: bool,
-) -> Equations:
-    """Equations by a form; with time, of the form's clock, as a passenger."""
-    rate, p = form.rate, scene.numbers
-    if clock:
-        unknowns, scales, rate = (*unknowns, "time"), (*scales, 1.0), form.rate_with_time
-    return Equations(regime, unknowns, scales, rate, form.point, p, scene.states, balance)
+    form: Form, unknowns: tuple[str, ...], scales: Numbers, *, clock: bool
+) -> tuple[tuple[str, ...], Numbers, Function]:
+    """Unknowns, scales and rate of a form; with time, of its clock, as a passenger."""
+    if not clock:
+        return unknowns, scales, form.rate
+    return (*unknowns, "time"), (*scales, 1.0), form.rate_with_time
 
 
 def _states(scene: Scene) -> tuple[str, ...]:
@@ -129,8 +122,9 @@ def in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     """
     a, form, others = scene.a, _full(scene), _states(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
-    scales = (a, 1.0, a, *[a] * len(others))
-    return _of_form(scene, IN_RUPTURE, unknowns, scales, form, None, clock=clock)
+    scales, p = (a, 1.0, a, *[a] * len(others)), scene.numbers
+    unknowns, scales, rate = _of_form(form, unknowns, scales, clock=clock)
+    return Equations(IN_RUPTURE, unknowns, scales, rate, form.point, p, scene.states)
 
 
 def _full(scene: Scene) -> Form:

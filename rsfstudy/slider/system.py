@@ -64,9 +64,9 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> Ratios:
     unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
     factors would underflow and overflow.
     """
-    load = p[LOG_LOAD_RATE]
-    x = load - STATIONARY if log_slip_rate < load - STATIONARY else log_slip_rate
-    slower = math.exp(load - x)
+    least = p[LOG_LOAD_RATE] - STATIONARY
+    x = least if log_slip_rate < least else log_slip_rate
+    slower = math.exp(p[LOG_LOAD_RATE] - x)
     return x, slower, 1.0 / (1.0 + slower)
 
 
