@@ -78,10 +78,10 @@ class Approach:
         self.seen: list[Cycle] = []
         #: The columns b and c of P', derivatives of the image by spring stress and by state; and
         #: whether they are known.
-        self._slopes, self._known = 2 * ((2 + NUMBERS) * (0.0,),), False
+        self._slopes, self._known = 2 * ([0.0] * (2 + NUMBERS),), False
         #: The section s where the last cycle begins, its image P(s), and dP, by how much that
         #: differs from the image before.
-        self._begin, self._image = (0.0, 0.0), (2 + NUMBERS) * (0.0,)
+        self._begin, self._image = (0.0, 0.0), [0.0] * (2 + NUMBERS)
         self._changes = self._image
         #: What is left from s to the fixed point, and P' times that: what it changes of the image.
         self._ahead, self._implied = self._begin, self._image
@@ -136,27 +136,27 @@ class Approach:
         last = self.seen[-1]
         begin, end = last.begin, last.end
         start = begin.spring_stress, begin.psi
-        image = end.spring_stress, end.psi, *last.numbers()
-        changes = tuple(map(sub, image, self._image))
+        image = [end.spring_stress, end.psi, *last.numbers()]
+        changes = list(map(sub, image, self._image))
         if len(self.seen) > 1:
             by_stress, by_state = map(sub, start, self._begin)
             if abs(by_stress) > (1000.0 if self._known else 1.0) * self._noise:
                 self._known = True
                 # the motion passes a section without a change of spring stress
                 (_none, way), passed = self._by.along(begin)
-                along = tuple(change / way for change in passed)
-                left = (x - by_state * y for x, y in zip(changes, along, strict=True))
-                self._slopes = tuple(x / by_stress for x in left), along
+                along = [change / way for change in passed]
+                pairs = zip(changes, along, strict=True)
+                self._slopes = [(x - by_state * y) / by_stress for x, y in pairs], along
         self._begin, self._image, self._changes = start, image, changes
-        off, kept = tuple(map(sub, image, start)), 1.0 - min(self._return, _DIVERGES)
+        off, kept = list(map(sub, image, start)), 1.0 - min(self._return, _DIVERGES)
         returned = self._by_slopes(off)
         self._ahead = off[0] + returned[0] / kept, off[1] + returned[1] / kept
         self._implied = self._by_slopes(self._ahead)
 
-    def _by_slopes(self, move: tuple[float, ...]) -> tuple[float, ...]:
+    def _by_slopes(self, move: Sequence[float]) -> list[float]:
         """What a move of the section where a cycle begins changes of the image."""
         by_stress, by_state = move
-        return tuple(x * by_stress + y * by_state for x, y in zip(*self._slopes, strict=True))
+        return [x * by_stress + y * by_state for x, y in zip(*self._slopes, strict=True)]
 
     def _repeats(self) -> bool:
         """True if the next cycles would all be the same: as the derivatives say, or because the
