@@ -23,8 +23,8 @@ from rsfstudy.status import Status
 #: The page at some width, in CSS pixels: of a phone and of a desk.
 FRAME = '<iframe src="{}" style="width:{}px;height:900px;border:0"></iframe>'
 WIDTHS = (390, 1280)
-#: Of each of them its width, that of what it shows, and those of its images.
-LOOK = """<script>onload = () => {document.title = JSON.stringify(
+#: Of each of them its width, that of what it shows, and those of its images; told on the console.
+LOOK = """<script>onload = () => {console.log("looked"); document.title = JSON.stringify(
 Array.from(document.querySelectorAll("iframe"), ({contentWindow: w, contentDocument: d}) =>
     [w.innerWidth, d.scrollingElement.scrollWidth, Array.from(d.images, i => i.naturalWidth)]))}
 </script>"""
@@ -161,7 +161,7 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
 
 
 def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
-    """Nothing is wider than the screen, and every figure is there."""
+    """Nothing is wider than the screen, every figure is there, and nothing is complained of."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         missing = f"the report was NOT opened in a browser: none of {BROWSERS} is installed"
@@ -171,15 +171,17 @@ def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
     page, frames = (written[0] / "report.html").as_uri(), tmp_path / "frames.html"
     frames.write_text("".join(FRAME.format(page, width) for width in WIDTHS) + LOOK)
     words = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
-    words += [f"--user-data-dir={tmp_path}", "--dump-dom", frames.as_uri()]
+    words += ["--enable-logging=stderr", f"--user-data-dir={tmp_path}", "--dump-dom"]
     ran = subprocess.run(
-        [browser, *words],
+        [browser, *words, frames.as_uri()],
         env=os.environ | {"HOME": str(tmp_path)},
         capture_output=True,
         text=True,
         check=True,
         timeout=HANGS,
     )
+    (said,) = re.findall("CONSOLE.*", ran.stderr)  # of the frames; errors of the page would be more
+    assert "looked" in said
     looks = json.loads(re.search("<title>(.*?)</title>", ran.stdout)[1])
     assert [inner for inner, _scroll, _images in looks] == [*WIDTHS]
     for inner, scroll, images in looks:
