@@ -98,6 +98,27 @@ def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     assert ends.get(exponent, exponent) == exponent  # the interval ends at the bound
 
 
+#: Of a synthetic test of trends that is published with the code steadystate.
+TWO_STATES = {"a": 0.0012, "b1": 0.010, "b2": 0.007, "slip_distance": 20.0}
+TWO_STATES |= {"slip_distance_2": 500.0, "mu_star": 0.6}
+
+
+def test_two_states_come_back_in_their_order() -> None:
+    """From a first guess of both slip distances that is nearer to the longer one."""
+    loading, size = ((0.0, 1.0), (500.0, 10.0)), 2.5e-4
+    times = np.concatenate([np.linspace(0.0, 499.0, 100), np.linspace(500.0, 650.0, 300)])
+    friction = synthetic.two_states(times, loading, TWO_STATES | {"stiffness": 0.01})
+    arrays = {"time": times, "displacement": synthetic.load_point(loading, times)}
+    arrays["friction"] = friction + synthetic.correlated(400, 0.0, size, 1)
+    one = rsfstudy.read_record(arrays).with_steps([(500.0, 500.0, 1.0, 10.0)])
+    options = {"stiffness": 0.01, "slip_distance": 300.0, "noise": "white", "engine": COMPILED}
+    free = (*TWO_STATES, "trend1")
+    fit = rsfstudy.fit(one, laws=["two_slip_states"], free=free, **options).squeeze()
+    for name in free:
+        assert abs(off(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
+    assert fit.slip_distance_high < fit.slip_distance_2_low
+
+
 def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
     """Each by the parameters that it has, as if it were alone; those of others are NaN."""
     one, options = record(count=150), OPTIONS | {"noise": "white"}
