@@ -55,6 +55,17 @@ def test_critical_stiffness_is_the_closed_form(law, first, second, over):
     assert found.values["critical_stiffness_error"] < 1e-5 * scene.critical_stiffness
 
 
+@pytest.mark.parametrize(("law", "of_two"), LAWS.items())
+@pytest.mark.parametrize("second", [1e-4, 1e-7])
+def test_a_state_that_hardly_acts_is_one_that_is_not_there(law, of_two, second):
+    """Growth differs by the part b_2/a, times a number of order one."""
+    one = Scene(law=law, b_over_a=1.5, stiffness=1e-3, **CONSTANT)
+    parts = {"b1_over_a": 1.5, "b2_over_a": second, "length_ratio": 3.0}
+    two = Scene(law=of_two, stiffness=1e-3, **parts, **CONSTANT)
+    growth, again = (stability.growth_rates(scene, 0.0)[0] for scene in (one, two))
+    assert again == pytest.approx(growth, rel=3.0 * second)
+
+
 def both(law: str, **fields) -> tuple[Scene, Scene]:
     """One state, and two of the same length."""
     one = Scene(law=law, b_over_a=2.0, **fields)
