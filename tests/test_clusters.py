@@ -3,15 +3,19 @@ faults of the cluster told for what they are.
 """
 
 import contextlib
+import functools
 import ipaddress
 import json
 import os
 import re
+import runpy
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
+import dask
 import psutil
 import pytest
 import yaml
@@ -19,6 +23,7 @@ from faulty import declared
 from running import (
     FAULTY,
     HANGS,
+    QUIET,
     SMALL,
     command,
     ended,
@@ -184,6 +189,24 @@ def test_nothing_listens_beyond_this_machine(cluster):
         assert [a for a in listening if not ipaddress.ip_address(a.ip).is_loopback] == []
 
 
+def test_a_scheduler_by_tls():
+    """With the certificates of Dask's configuration, as of its other clients."""
+    from distributed import LocalCluster, Security
+
+    security = Security.temporary()
+    pem = security.get_tls_config_for_role("client")
+    names = {f"distributed.comm.tls.{name}": pem[key] for name, key in (
+        ("ca-file", "ca_file"), ("client.cert", "cert"), ("client.key", "key"))}  # fmt: skip
+    with LocalCluster(1, processes=False, protocol="tls", security=security, **QUIET) as encrypted:
+        connected = functools.partial(
+            clusters.existing_cluster, encrypted.scheduler_address, timeout=HANGS
+        )
+        with dask.config.set(names), connected() as client:
+            same_numbers(run(client=client), run())
+        with pytest.raises(RunError, match=r"ssl_context.*certificates for tls://"), connected():
+            pass
+
+
 @pytest.mark.parametrize(
     "address", ["tcp://127.0.0.1:1", "nonsense", "tcp://", "http://127.0.0.1:1", "tcp://[", "", " "]
 )
@@ -195,7 +218,27 @@ def test_a_scheduler_that_does_not_answer_is_named(address):
         pass
 
 
+def test_a_port_that_listens_and_says_nothing():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with (
+            pytest.raises(RunError, match="no Dask scheduler answers"),
+            clusters.existing_cluster(address, timeout=0.3),
+        ):
+            pass
+
+
 # ---- the files of the page ----------------------------------------------------------------------
+
+
+def test_the_slurm_job_is_what_it_says():
+    from dask_jobqueue import SLURMCluster
+
+    job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
+    with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
+        script = cluster.job_script()
+    assert "#SBATCH --cpus-per-task=16" in script
+    assert re.search("--nthreads 1 .*--nworkers 16 ", script)
 
 
 #: Jobs that are processes of this machine, in place of SLURM's.
@@ -228,3 +271,18 @@ def test_the_slurm_script_runs_a_study(tmp_path):
     assert results["law"].values.tolist() == ["slip"]
     accuracy = results.rsf.study.accuracy
     assert (accuracy.rtol, accuracy.engine) == (1e-5, "compiled")
+
+
+def test_the_kubernetes_file_joins_its_parts():
+    """Its commands are those by which the cluster above is started."""
+    service = PARTS["Service", "rsfstudy-scheduler"]["spec"]
+    labels, scheduler = container("rsfstudy-scheduler")
+    workers, worker = container("rsfstudy-workers")
+    port = service["ports"][0]
+    assert service["selector"] == labels
+    assert {"containerPort": port["targetPort"]} in scheduler["ports"]
+    assert f"tcp://rsfstudy-scheduler:{port['port']}" in worker["args"]
+    policy = PARTS["NetworkPolicy", "rsfstudy"]["spec"]
+    (allowed,) = policy["podSelector"]["matchExpressions"]
+    assert allowed["values"] == [labels["app"], workers["app"]]
+    assert policy["ingress"] == [{"from": [{"podSelector": policy["podSelector"]}]}]

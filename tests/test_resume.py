@@ -23,6 +23,7 @@ from running import (
     run,
     run_with_failures,
     same_numbers,
+    until,
     until_kept,
 )
 
@@ -166,6 +167,18 @@ def test_a_signal_ends_a_motion_with_one_line(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_ctrl_c_while_the_workers_start(tmp_path):
+    """They never see it, and the run ends in order once they are there."""
+    words = ("run", FAULTY, "--workers", "1", "--output", tmp_path)
+    process = command(*words, FAULT="hangs")
+    until(lambda: any("spawn_main" in words for words in children(process)), process)
+    os.killpg(process.pid, signal.SIGINT)
+    code, _out, said = ended(process)
+    assert code == 1
+    assert "0 of 4 cells are finished and kept in" in said
+    assert len(said.splitlines()) == 1, said
+
+
 def test_workers_that_cannot_start(tmp_path):
     """The run ends with the reason."""
     import dask
@@ -193,6 +206,14 @@ def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
             run(study, output=tmp_path)
     assert (tmp_path / "faulty.nc").read_bytes() == old
     assert sorted(os.listdir(tmp_path)) == ["faulty.cells.sqlite", "faulty.nc"]
+    goes_on(tmp_path, CELLS)
+
+
+def test_what_a_killed_write_left_is_no_result(tmp_path):
+    """It is not taken for one, and goes with the next."""
+    run(declared(cells=CELLS), output=tmp_path)
+    (tmp_path / ".faulty.nc.new").write_bytes(b"what a killed run left")
+    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
     goes_on(tmp_path, CELLS)
 
 
