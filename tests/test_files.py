@@ -2,9 +2,11 @@
 kept.
 """
 
+import contextlib
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 
@@ -143,6 +145,16 @@ def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     content = path.read_bytes()
     assert content.count(right) == 1
     path.write_bytes(content.replace(right, wrong))
+    with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
+        kept.read(KEYS)
+
+
+def test_a_result_moved_to_another_cell_of_the_journal_is_noticed(tmp_path):
+    """It is whole, but for the other."""
+    with journal(tmp_path) as kept:
+        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
+    with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
+        db.execute("UPDATE cells SET key = ?", (KEYS[1].tobytes(),))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
         kept.read(KEYS)
 

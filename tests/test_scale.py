@@ -147,10 +147,15 @@ def test_a_file_and_a_store_of_one_name_are_told_apart(tmp_path):
     same_numbers(rsfstudy.open(tmp_path / "small.nc"), in_memory())
 
 
-def test_a_chunk_that_is_lost_is_noticed(tmp_path):
+def test_a_chunk_that_is_damaged_or_lost_is_noticed(tmp_path):
     run(SMALL, output=tmp_path, format="zarr")
+    chunk = tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0"
+    whole = chunk.read_bytes()
+    chunk.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+    with pytest.raises(DataError, match=r"small\.zarr is damaged"):
+        rsfstudy.open(tmp_path / "small.zarr")
+    chunk.unlink()
     (tmp_path / "small.zarr" / "status" / "c" / "0" / "0").unlink(missing_ok=True)
-    (tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0").unlink()
     with pytest.raises(DataError, match=r"small\.zarr is damaged"):
         rsfstudy.open(tmp_path / "small.zarr")
     # and whoever opens it without rsfstudy reads "pending", not "ok"
