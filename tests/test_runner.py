@@ -1,5 +1,6 @@
 """Running: the same numbers in this process, on workers and in any grouping."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from running import HANGS, OWN, SMALL, run, same_numbers
 from rsfstudy import Scene, Study
 from rsfstudy.api import runs
 from rsfstudy.compute import plan, runner, workers
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -139,3 +140,27 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
             assert ran("two", "dies") == ["OK", "OK", "WORKER_LOST", "OK"]
         assert ran("three") == 4 * ["OK"]
         assert len(started) == 1
+
+
+def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
+    """For the next run; here they compute in this process."""
+    started, lost = [], [True]
+
+    def mapper(task, batches):
+        if lost:
+            raise RunError("the Dask scheduler is lost")
+        yield from workers.serial(task, batches)
+
+    def start(_processes, file):
+        started.append(file)
+        return contextlib.nullcontext()
+
+    monkeypatch.setattr(workers, "local_cluster", start)
+    monkeypatch.setattr(workers, "on_client", lambda *_where: mapper)
+    with workers.Workers(1, log=tmp_path / "workers.log") as where:
+        begin = runs.prepared(declared(), runner.Keeping(output=tmp_path), where, False)
+        with pytest.raises(RunError, match="is lost"):
+            begin()
+        lost.clear()
+        assert (begin()["status"] == int(Status.OK)).all()
+        assert len(started) == 2
