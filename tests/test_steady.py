@@ -177,3 +177,11 @@ def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
         assert steady.steady_sliding(scene, slowest + 1e-6) is not None
         assert steady.steady_sliding(scene, slowest - 1e-6) is None
         assert steady.slowest_steady(scene.with_(**CONSTANT)) == -math.inf
+
+
+@pytest.mark.parametrize("excess", [-0.02, -0.055, -0.1])
+def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
+    """Strength ``mu_* + excess = a ln(2 sinh(mu/a))`` has a root of either sign."""
+    scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
+    mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
+    assert steady.stress_after_jump(scene, excess) + scene.mu_star == pytest.approx(mu, rel=1e-9)
