@@ -297,6 +297,11 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
     assert with_mass == pytest.approx(value, rel=1e-3)
+    # what waves carry away at the norm is stress that the step has to supply as well
+    damped = scene.with_(stiffness=scene.stiffness, radiation_damping=1e-7)
+    carried = damped.radiation_damping * math.expm1(scene.log_norm_rate)
+    more = found(damped, DISPLACEMENT)[0] - value
+    assert more == pytest.approx(carried / scene.stiffness, rel=1e-5)
 
 
 def test_the_survey_says_how_far_it_came():
