@@ -147,6 +147,13 @@ def test_what_never_repeats_itself_says_so(engine):
     assert found.values["floquet_multiplier"] == pytest.approx(-1.6183, abs=1e-3)
 
 
+def test_swings_that_still_shrink_are_not_called_aperiodic():
+    """Above critical stiffness each is a part smaller than the last, and twelve are not at rest."""
+    found = LimitCycle(events=12)(slow(1.12, load_velocity_ratio=1.02), quick(1e-6))
+    assert found.status is Status.WORK_BUDGET_SPENT
+    assert "no cycle repeats yet" in found.message
+
+
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     """Which way a departure begins is forgotten: by derivatives of each event, along more of them.
 
