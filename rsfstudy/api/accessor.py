@@ -156,13 +156,13 @@ class Accessor:
 
     @door
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
-        """The figure of the results of a study, or the picture of a motion.
+        """The figure of the results of a study, or the picture of a motion or a limit cycle.
 
         Parameters
         ----------
         *what, **how
             As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
-            `rsfstudy.picture` for a motion (`laboratory`, `against`).
+            `rsfstudy.picture` for a motion or a cycle (`laboratory`, `against`).
         """
         from rsfstudy.api import runs
         from rsfstudy.plots._motion import picture
@@ -170,9 +170,6 @@ class Accessor:
         if self._is_study:
             self._must_be_whole("figures show")
             return runs.plot(self._dataset, *what, **how)
-        if "load_point_displacement" not in self._dataset:
-            text = "only motions have a picture: draw its variables, as in"
-            raise DataError(f"{text} cycle.plot.scatter('log10_slip_rate', 'shear_stress')")
         return picture(self._dataset, *what, **how)
 
     @door

@@ -21,6 +21,7 @@ from rsfstudy.files import contents
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS, Status
+from rsfstudy.wording import counted
 
 #: What laboratories call parameters, where not as they are called here.
 _CALLED = {
@@ -38,6 +39,8 @@ _IN_SHORT = ("a", "b", "b1", "b2", "Dc")
 _ANSWERS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 #: Error over the number beyond which neither is printed.
 _BOUNDLESS = 1e4
+#: Difference of criteria that decides between laws.
+_DECIDES = 10.0
 #: Chance below which residuals are called correlated.
 _CHANCE = 0.01
 
@@ -196,8 +199,20 @@ def told(dataset: xr.Dataset) -> Iterator[Table | str]:
             yield _table(where, fits[first : first + _BESIDE])
         for one in fits:
             yield from _remarks(one)
+        yield from _choice(fits)
     if len(places) > 1:
         yield Table([_row(one) for fits in places.values() for one in fits], "Of all:")
+
+
+def _choice(fits: Sequence[xr.Dataset]) -> Iterator[str]:
+    """Which law explains a record best, and whether by enough."""
+    known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
+    known = sorted(pair for pair in known if math.isfinite(pair[0]))
+    if len(known) > 1:
+        (best, law), (next_best, _other) = known[:2]
+        by = next_best - best
+        enough = "decides" if by >= _DECIDES else f"does not decide: {_DECIDES:g} would"
+        yield f"{law} explains the record best; its criterion is lower by {by:.1f}, which {enough}"
 
 
 def _row(one: xr.Dataset) -> dict[str, str]:
@@ -226,7 +241,7 @@ def _column(one: xr.Dataset) -> dict[str, str]:
             "R2": f"{one['r_squared'].item():.4f}",
             "criterion": f"{one['criterion'].item():.1f}",
             "noise": f"{process}, sd {one['noise_size'].item():.2g}",
-            "worth": f"{one['effective_samples'].item():,.0f} independent rows",
+            "worth": counted(round(one["effective_samples"].item()), "independent row"),
         }
     return found | quality | {"status": status(one)}
 

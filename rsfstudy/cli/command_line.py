@@ -257,7 +257,9 @@ def rerun() -> None:
 @click.option("--mat", is_flag=True, help="For MATLAB: every variable.")
 @click.option("--units", nargs=3, metavar="STRESS LENGTH TIME", help="Of a rig, as in MPa um s.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), help="The file to write.  [default: beside FILE]"
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The file to write; .csv and .mat take the place of its ending.  [default: beside FILE]",
 )
 def export() -> None:
     """Write results, or a motion, for other programs.

@@ -194,9 +194,7 @@ def export(given: Given) -> int:
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
         raise click.UsageError("say --csv or --mat, or both")
-    if len(asked) > 1 and given.output:
-        raise click.UsageError(f"{given.output} is one file: no --csv beside --mat")
-    paths = {ending: given.output or given.file.with_suffix(f".{ending}") for ending in asked}
+    paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():
         if path.exists():
             raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")

@@ -280,6 +280,8 @@ class Fit(Measure):
             values |= self._drawn(search, found)
         if unidentified:
             text = f"{', '.join(unidentified)}: the record does not tell"
+            if set(unidentified) - set(found.unidentified):
+                text += f"; fewer than {_POINTS:g} rows stand in a slip distance"
             if "a" in unidentified and found.values["a"] < _LEAST * search.bounds("a")[0]:
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"

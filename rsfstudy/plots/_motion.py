@@ -1,4 +1,6 @@
-"""The picture of one motion: friction and slip rate along it, and its path on the phase plane."""
+"""The picture of one motion or limit cycle: friction and slip rate along it, and its path on the
+phase plane.
+"""
 
 from __future__ import annotations
 
@@ -37,36 +39,39 @@ _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 def picture(
     motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:
-    """Draw one motion.
+    """Draw one motion, or a limit cycle.
 
     Parameters
     ----------
     motion : xarray.Dataset
-        As `rsfstudy.simulate` gives it.
+        As `rsfstudy.simulate` or `rsfstudy.limit_cycle` gives it.
     laboratory : Laboratory, optional
         The rig, in whose units the axes are then.
     against : {"load_point_displacement", "slip", "time"}, optional
         What friction and slip rate are drawn against: by default load point displacement, or slip
-        where the load point is held throughout.
+        where the load point is held throughout; time along a limit cycle, of which load point
+        displacement is not known.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Friction, slip rate, and the path on the plane of both with the line of steady sliding.
+        Friction (of a limit cycle shear stress), slip rate, and the path on the plane of both with
+        the line of steady sliding.
 
     Raises
     ------
     DataError
-        Where the dataset is no motion.
+        Where the dataset is no motion and no limit cycle.
     InvalidValue
         For another abscissa.
     """
     if against not in (None, *AGAINST):
         raise InvalidValue("against", against, "is unknown", choices=AGAINST)
-    for name in (*AGAINST, "friction_coefficient", "log10_slip_rate"):
+    for name in (against or "time", "slip", "frictional_stress", "log10_slip_rate"):
         if name not in motion:
-            raise DataError(f"{name} is missing: it is no motion as simulate gives it")
-    if not motion.sizes["time"]:
+            text = "is missing: it is no motion as simulate gives it, and no limit cycle"
+            raise DataError(f"{name} {text}")
+    if not motion["slip"].size:
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"nothing moved, and there is nothing to draw. {text}")
     against = against or _abscissa(motion)
@@ -79,8 +84,13 @@ def picture(
         plane = figure.add_subplot(grid[:, 1])
         for axes in figure.axes:
             hold_ticks(axes)
-        upper.plot(shown[against], shown["friction_coefficient"])
-        upper.set_ylabel(_FRICTION)
+        if "friction_coefficient" in shown:
+            upper.plot(shown[against], shown["friction_coefficient"])
+            upper.set_ylabel(_FRICTION)
+        else:
+            upper.plot(shown[against], shown["shear_stress"])
+            stress = shown["shear_stress"].assign_attrs(long_name="shear stress")
+            upper.set_ylabel(_labelled(stress))
         upper.tick_params(labelbottom=False)
         _rate(shown, lower, against)
         lower.set_xlabel(_labelled(shown[against]))
@@ -93,7 +103,11 @@ def picture(
 
 
 def _abscissa(motion: xr.Dataset) -> str:
-    """Load point displacement, or slip where that does not change but for rounding."""
+    """Load point displacement, or slip where that does not change but for rounding; time where it
+    is not known.
+    """
+    if "load_point_displacement" not in motion:
+        return "time"
     pulled, slid = (np.asarray(motion[name]) for name in ("load_point_displacement", "slip"))
     least = _ROUNDING * max(float(np.ptp(slid)), float(np.abs(pulled).max()))
     return "load_point_displacement" if np.ptp(pulled) > least else "slip"
@@ -103,7 +117,8 @@ def _title(motion: xr.Dataset) -> str:
     """Title of a motion, and how it ended if not as it should."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
-    return f"{motion.attrs.get('title', '')}{ending}"
+    title = motion.attrs.get("title", "Limit cycle of a spring-slider")
+    return f"{title}{ending}"
 
 
 def _rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
@@ -158,9 +173,10 @@ def _steady(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | Non
 
 def _labelled(values: xr.DataArray) -> str:
     name = str(values.attrs["long_name"])
+    name = name.removesuffix(" since the step") if "phase" in values.dims else name
     name = f"{name[0].upper()}{name[1:]}"
     units = values.attrs.get("scale", values.attrs["units"])
-    scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$"}
+    scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$", "sigma_*": r"$\sigma_*$"}
     return f"{name} ({scales.get(units, _written(units))})"
 
 

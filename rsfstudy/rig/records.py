@@ -153,7 +153,7 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
     """Columns of a text file, by headings that are known or named."""
 
     def select(headings: list[str], place: str) -> dict[str, Selected]:
-        told = _known(headings, place) if columns is None else columns
+        told = _completed(columns or {}, headings, place)
         return {key: _selected(key, of, headings) for key, of in told.items()}
 
     return read_table(path, select)
@@ -164,18 +164,24 @@ def _of_arrays(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, C
     headings = [*map(str, source)]
     if columns is None and not any("(" in key or "[" in key for key in headings):
         return picked(source, {key: (key,) for key in headings})
-    told = columns or _known(headings, "record")
+    told = _completed(columns or {}, headings, "record")
     return picked(source, {key: _selected(key, of, headings) for key, of in told.items()})
 
 
-def _known(headings: list[str], place: str) -> dict[str, str]:
-    """Headings of the usual files, by what stands below them."""
-    wanted: dict[str, str] = {}
+def _completed(columns: Mapping[str, Any], headings: list[str], place: str) -> dict[str, Any]:
+    """Columns that are named, and those of the others that a record needs whose headings are of the
+    usual ones.
+    """
+    lacking = {"time", "displacement"} - set(columns)
+    if not {"friction", "shear_stress"} & set(columns):
+        lacking |= {"friction", "shear_stress", "normal_stress"} - set(columns)
+    wanted = dict(columns)
     for text in headings:
         match = HEADING.fullmatch(text)
         for key, begins in _HEADINGS.items():
             if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                wanted[key] = text
+                if key in lacking:
+                    wanted[key] = text
                 break
     if {"time", "displacement"} - set(wanted):
         remedy = (

@@ -226,7 +226,8 @@ def _number(name: str, text: str, column: Column, row: int) -> float:
         return math.nan
     found = number(text)
     if found is None:
-        wrong = InvalidValue(name, text, "is no number", remedy="Units stand in the header.")
+        remedy = "Write a decimal point." if "," in text else "Units stand in the header."
+        wrong = InvalidValue(name, text, "is no number", remedy=remedy)
         raise wrong.at(column.place(row))
     if not math.isfinite(found):
         raise InvalidValue(name, text.strip(), "must be finite").at(column.place(row))
